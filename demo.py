@@ -20,8 +20,8 @@ from conformance.commandline.exit_codes import ExitCode
 _ROAAS = (sys.executable, "-m", "roaas")
 _START_S = 60
 _STOP_S = 10
-# One operation and the client that takes least of the processor: on a machine that others use as well, robot and
-# generator together stay far from what it can do, and the difference is told from noise after half a minute.
+# One operation, and the client that needs the least processor time. So robot and load generator do not overload a
+# shared machine, and the difference is significant after half a minute.
 _MEASURED = ("--operation", "delivery", "--client", "wire", "--rate", "200", "--warmup", "1")
 _STATEMENT = Path(__file__).parent / "reference_robot" / "statement.toml"
 
@@ -36,9 +36,9 @@ def main() -> int:
     parser.add_argument("--duration", type=float, default=25.0, help="seconds of load [25]")
     options = parser.parse_args()
     started = time.monotonic()
-    # What ends a CI job takes the robot with it, like Ctrl-C.
+    # SIGTERM, which ends a CI job, stops the robot too, like Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    # A domain of its own, so that no other robot on this machine is in the conversation.
+    # A ROS domain that other robots on this machine probably do not use.
     domain = random.SystemRandom().randint(1, 101)
     _say("1/3", f"starting the reference robot on ROS domain {domain}")
     with _robot(domain) as (rest, soap):
@@ -58,14 +58,14 @@ def _robot(domain: int) -> Iterator[tuple[str, str]]:
     """Run the reference robot on free ports; yield the REST base URL and the WSDL URL of the publishers' service."""
     command = [*_ROAAS, "robot", "--rest-port", "0", "--soap-port", "0", "--domain-id", str(domain)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)  # noqa: S603 - ours
-    # A robot that never gets ready must not keep the demo waiting.
+    # Kill a robot that never gets ready, so that the demo does not wait for ever.
     watchdog = threading.Timer(_START_S, process.kill)
     watchdog.start()
     try:
         line = process.stdout.readline() if process.stdout else ""
         ready = re.match(r"ready rest=(\S+) soap=(\S+)", line)
         if ready is None:
-            raise SystemExit(f"the robot did not get ready within {_START_S} s (it said {line!r})")
+            raise SystemExit(f"the robot did not get ready within {_START_S} s (it printed {line!r})")
         watchdog.cancel()
         yield ready[1], ready[2]
     finally:
@@ -79,9 +79,9 @@ def _robot(domain: int) -> Iterator[tuple[str, str]]:
 
 
 def _roaas(*arguments: str) -> int:
-    # The robot's libraries set up their own environment; each command is to start from a clean one.
+    # Each command starts with an environment without the robot's domain.
     environment = {key: value for key, value in os.environ.items() if key != "ROS_DOMAIN_ID"}
-    # Progress and complaints are on standard error; what was found stands in the files, and the summary says it.
+    # Progress and errors go to standard error; the results go to files, which the summary reads.
     command = [*_ROAAS, *arguments]
     return subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=False).returncode  # noqa: S603 - ours
 

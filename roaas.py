@@ -30,17 +30,17 @@ _COMMANDS = {
     "selftest": ("conformance.cli.selftest", "selftest"),
     "contract": ("conformance.cli.contract", "contract"),
 }
-# What `roaas --help` says of them, so that it need not import every room.
+# The summaries in `roaas --help`, so that it need not import every package.
 _SUMMARIES = {
     "robot": "Run the reference robot.",
     "certify": "Judge a robot by its contract.",
     "load": "Measure SOAP against REST.",
-    "replay": "Send a finding's requests again, and say whether it is still there.",
+    "replay": "Send a finding's requests again, and report whether it persists.",
     "report": "Write the pages from the result files again.",
     "compare": "Show whether a robot got slower between two load tests.",
     "diff": "Show what changed between two results: new failures, fixed, lost coverage.",
     "keygen": "Make a key pair for signing results.",
-    "sign": "Sign a result, so that others can check who vouches for it.",
+    "sign": "Sign a result, so that others can verify the signer.",
     "verify": "Check a signed certificate, and whether it meets your policy.",
     "registry": "Make a static site from signed certificates: which robot passed which classes.",
     "selftest": "Test the suite: it must kill mutants, and must not fail a good device.",
@@ -62,7 +62,7 @@ def open_rooms() -> None:
         return
     sys.path.insert(0, folder)
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (folder, os.environ.get("PYTHONPATH"))))
-    # `python -m`, by which rooms start processes, would look into the working directory first.
+    # Otherwise `python -m`, with which packages start processes, would search the working directory first.
     os.environ["PYTHONSAFEPATH"] = "1"
 
 
@@ -92,14 +92,14 @@ class _Rooms(click.Group):
                 ctx,
             ) from missing
         if not isinstance(command, click.Command):
-            raise TypeError(f"{module}.{name} is no command")
+            raise TypeError(f"{module}.{name} is not a command")
         return command
 
 
 class FrontDoor:
     """Functions through which one package uses another without importing it.
 
-    Commands get this class as click's context object.
+    Commands get an instance as click's context object.
     """
 
     @staticmethod
@@ -150,7 +150,7 @@ class FrontDoor:
 @click.version_option(package_name="roaas", prog_name="roaas")
 def main() -> None:
     """Conformance and load tests for robots that are web services."""
-    # What ends a command in a container or a CI job cleans up like Ctrl-C; some commands have a handler of their own.
+    # SIGTERM, sent by containers and CI jobs, cleans up like Ctrl-C; some commands install their own handler.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 

@@ -84,7 +84,7 @@ class RosRuntime:
                 signal_handler_options=SignalHandlerOptions.NO,
             )
         except (rclpy_c.RCLError, rclpy_c.RCLInvalidROSArgsError, rclpy_c.UnknownROSArgsError) as error:
-            raise RosArgumentsError(f"ROS does not take {' '.join(arguments)}: {error}") from error
+            raise RosArgumentsError(f"ROS does not accept {' '.join(arguments)}: {error}") from error
         self._executors = [RosExecutor(context=self.context)]
         self._awake: list[float] = []  # for each thread: when its last callback or wait ended
         self._nodes: list[Node] = []
@@ -107,7 +107,7 @@ class RosRuntime:
             # Parameter services would appear among the robot's own services.
             node = Node(name, context=self.context, start_parameter_services=False)
         except ParameterException as error:
-            raise RosArgumentsError(f"a node does not take its parameter: {error}") from error
+            raise RosArgumentsError(f"a node does not accept its parameter: {error}") from error
         self._nodes.append(node)
         if not spun:
             return node

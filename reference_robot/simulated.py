@@ -84,7 +84,7 @@ class SimulatedRobot:
                 _end(process)
         if lost:
             raise SimulationError(
-                f"the simulation ended by itself with exit code {process.returncode}; its log is {self._log}"
+                f"the simulation ended unexpectedly with exit code {process.returncode}; its log is {self._log}"
             )
 
     def _await_ready(self, stdout: IO[bytes]) -> None:

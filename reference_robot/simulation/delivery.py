@@ -89,8 +89,8 @@ class Delivery:
             if goal.status in _CANCELED and goal.identity not in self._own and goal.identity not in self._seen_canceled
         ]
         self._seen_canceled.extend(canceled)
-        # A cancelled leg drops the queue when it ends (`_leg_ended`). Goals that the first report shows as cancelled were
-        # cancelled before any request, even if a request was read before that report.
+        # A cancelled leg drops the queue when it ends (`_leg_ended`). Goals that the first report shows as cancelled
+        # were cancelled before any request, even if a request was read before that report.
         if canceled and self._knows_goals and self._missions.active is None:
             self._missions.abandon()
             self._changed()
@@ -98,7 +98,7 @@ class Delivery:
         if self._goals.losses != self._losses:
             self._losses = self._goals.losses
             if self._leg and self._leg not in {goal.identity for goal in self._goals.active()}:
-                self._fail("the navigation went away")
+                self._fail("the navigation is no longer running")
         self._begin()
 
     def _is_busy(self) -> bool:
@@ -155,7 +155,7 @@ class Delivery:
         if outcome.status == GoalStatus.STATUS_SUCCEEDED:
             self._next_leg()
         elif outcome.result.error_code:  # as in Nav2; a displaced goal has no error code
-            self._fail(f"the navigation gave a leg up: {outcome.result.error_msg or outcome.result.error_code}")
+            self._fail(f"the navigation gave up a leg: {outcome.result.error_msg or outcome.result.error_code}")
         else:
             self._missions.abandon()
             self._changed()

@@ -32,7 +32,7 @@ class Localisation:
             PoseError: No odometry has been received yet.
         """
         if not self._octets:
-            raise PoseError("the robot does not know yet where it is")
+            raise PoseError("the robot has not received its first odometry yet")
         pose = deserialize_message(self._octets, Odometry).pose.pose
         return pose.position.x, pose.position.y, yaw_of(pose.orientation)
 

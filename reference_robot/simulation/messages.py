@@ -52,7 +52,7 @@ def pose_of(stamped: PoseStamped, frames: Frames) -> Pose:
     """
     known = (frames.map, frames.odom)
     if stamped.header.frame_id not in known:
-        raise PoseError(f"frame_id {stamped.header.frame_id!r} is unknown; known are {', '.join(known)}")
+        raise PoseError(f"frame_id {stamped.header.frame_id!r} is unknown; the robot knows {', '.join(known)}")
     turn = stamped.pose.orientation
     length = math.hypot(turn.x, turn.y, turn.z, turn.w)
     if not abs(length - 1.0) <= _UNIT_TOLERANCE:  # in this form NaN fails too

@@ -99,7 +99,7 @@ class Missions:
             self._queue.append(mission)
             self._set(mission, MissionState.QUEUED)
         else:
-            self._drop(mission, f"{self._capacity} missions wait already")
+            self._drop(mission, f"the queue is full with {self._capacity} missions")
         return mission
 
     def begin(self) -> Mission | None:

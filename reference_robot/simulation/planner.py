@@ -91,7 +91,7 @@ class Planner:
             raise PlanError(PlanFailure.START_OCCUPIED, f"the start ({start[0]:g}, {start[1]:g}) is walled in")
         turns = self._shortest(np.array(begin), np.array(end))
         if turns is None:
-            raise PlanError(PlanFailure.NO_VALID_PATH, f"no way leads to the goal ({goal[0]:g}, {goal[1]:g})")
+            raise PlanError(PlanFailure.NO_VALID_PATH, f"no path leads to the goal ({goal[0]:g}, {goal[1]:g})")
         return _poses([start[:2], *turns], start[2], goal[2])
 
     def _check_start(self, start: Pose) -> None:

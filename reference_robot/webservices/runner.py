@@ -97,9 +97,9 @@ async def _serve_until_signalled(publisher: EndpointPublisher, ready: Callable[[
 def _await_robot(publishers: RobotPublishersNode, subscribers: RobotSubscribersNode) -> None:
     missing = {
         "odometry": lambda: subscribers.odometry[0] is not None,
-        "a listener for velocity commands": publishers.find_velocity_subscribers,
+        "a subscriber to velocity commands": publishers.find_velocity_subscribers,
         "a delivery application": publishers.delivery_is_served,
-        "a navigation that takes goals": publishers.navigation_is_served,
+        "a navigation that accepts goals": publishers.navigation_is_served,
     }
     give_up = time.monotonic() + _DISCOVERY
     while missing:

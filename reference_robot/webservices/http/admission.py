@@ -38,7 +38,7 @@ class Admission:
         """Raise the Problem 421, 401 or 403 for a request with a wrong host, token or origin."""
         if not self._allows(request.authority):
             host = request.authority.decode("latin-1")[:_SHOWN]
-            raise Problem(421, f"this robot is not {host!a}; started with --allowed-host NAME, it answers to NAME too")
+            raise Problem(421, f"this robot is not {host!a}; to allow another NAME, start it with --allowed-host NAME")
         if self._authorization.is_asked_for:
             self._authorization.check(request.headers, scoped.needed(request))
         if b"origin" in request.headers and request.method not in SAFE:
@@ -53,5 +53,5 @@ class Admission:
         origin = request.headers[b"origin"]
         asked_by = origin.partition(b"://")[2].lower()  # empty if the origin is null
         if not (asked_by and asked_by == request.authority.lower()) and origin not in self._origins:
-            told = origin.decode("latin-1")[:_SHOWN]
-            raise Problem(403, f"a page of {told!a} may not command this robot; --public-url names the robot's own")
+            page = origin.decode("latin-1")[:_SHOWN]
+            raise Problem(403, f"a page of {page!a} may not command this robot; --public-url sets the robot's origin")

@@ -52,18 +52,18 @@ class Authorization:
         """
         scheme, _, sent = headers.get(b"authorization", b"").partition(b" ")
         if scheme.lower() != b"bearer":
-            raise Problem(401, "this robot asks for a bearer token in the Authorization field", _CHALLENGE)
+            raise Problem(401, "this robot requires a bearer token in the Authorization field", _CHALLENGE)
         sent, granted = sent.strip(), None
         for token, scopes in self._tokens:  # compare with all, so that the time reveals nothing
             if hmac.compare_digest(sent, token):
                 granted = scopes
         if granted is None:
-            raise Problem(401, "the bearer token in the Authorization field is none of this robot's", _INVALID)
+            raise Problem(401, "this robot does not know the bearer token in the Authorization field", _INVALID)
         if scope is not None and scope not in granted:
             challenge = _REALM + b', error="insufficient_scope", scope="%b"' % scope.encode()
             raise Problem(
                 403,
-                f"the bearer token is good for {' and '.join(sorted(granted))}; this needs the scope {scope}",
+                f"the request needs the scope {scope}; the bearer token has {' and '.join(sorted(granted))}",
                 ((b"www-authenticate", challenge),),
             )
 
@@ -90,8 +90,8 @@ def read_tokens(path: Path) -> dict[str, frozenset[Scope]]:
         token, *scopes = line.split()
         if not _TOKEN.fullmatch(token) or not EVERYTHING.issuperset(scopes):
             raise TokenFileError(
-                f"the token file {path}, line {number}, must be a token of printable ASCII and, after it, its scopes "
-                f"of {', '.join(Scope)}; a token alone has them all"
+                f"the token file {path}, line {number}, must have a token of printable ASCII and then its scopes, "
+                f"of {', '.join(Scope)}; a token without scopes has all of them"
             )
         if token in tokens:
             raise TokenFileError(f"the token file {path}, line {number}, repeats a token")

@@ -103,7 +103,7 @@ class HttpConnection(AnsweringConnection):
         """Store a part of the request target; raise the Problem 414 if the target is too long."""
         self._target += url
         if len(self._target) > TARGET_LIMIT:
-            raise Problem(414, f"the request target exceeds {TARGET_LIMIT} octets")
+            raise Problem(414, f"the request target exceeds {TARGET_LIMIT} bytes")
 
     def on_header(self, name: bytes, value: bytes) -> None:
         """Store a header field; trailer fields are ignored."""
@@ -141,7 +141,7 @@ class HttpConnection(AnsweringConnection):
         if request is None or self._is_refused:
             self._dropped += len(body)
             if self._dropped > _DRAINED:
-                raise Problem(413, f"the content exceeds {BODY_LIMIT} octets")
+                raise Problem(413, f"the body exceeds {BODY_LIMIT} bytes")
             return
         if not self._content:
             self._content = body  # usually the whole body

@@ -57,8 +57,8 @@ async def _awaited(request: Request, outcome: Awaitable[Response]) -> Response:
 def _failed(request: Request, error: Exception) -> Response:
     if isinstance(error, Problem):
         return described(error, request.headers.get(b"accept"))
-    _LOGGER.error("no answer to %s %r", request.method, request.path[:200], exc_info=error)
-    return described(Problem(500, "the robot failed to answer; its log says why"), None)
+    _LOGGER.error("cannot respond to %s %r", request.method, request.path[:200], exc_info=error)
+    return described(Problem(500, "an internal error of the robot; the robot's log has the details"), None)
 
 
 def described(problem: Problem, accept: bytes | None) -> Response:

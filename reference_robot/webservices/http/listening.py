@@ -59,8 +59,8 @@ def require_guarded(host: str, authorization: Authorization) -> None:
     """Raise the ListeningError if other machines could command the robot without a token."""
     if not authorization.is_asked_for and not is_loopback(host):
         raise ListeningError(
-            f"--host {host} lets everybody on its network drive this robot, for no token is asked for: "
-            "give --token-file FILE, or --insecure if that is what you want"
+            f"--host {host} would let everybody on its network drive this robot without a token: "
+            "give --token-file FILE, or --insecure to allow that"
         )
 
 

@@ -65,7 +65,7 @@ class Request:
             return self.body
         raise Problem(
             415,
-            f"Content-Encoding {coding.decode('latin-1')[:80]!a} is not read here",
+            f"Content-Encoding {coding.decode('latin-1')[:80]!a} is not supported",
             ((b"accept-encoding", b"identity"),),
         )
 

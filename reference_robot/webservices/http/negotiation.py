@@ -19,7 +19,7 @@ def chosen(accept: bytes | None, offers: Sequence[str]) -> str:
     if _quality(ranges, best) > 0:
         return best
     field = (accept or b"").decode("latin-1")
-    raise Problem(406, f"Accept: {field[:200]!a} excludes all that this resource offers: {', '.join(offers)}")
+    raise Problem(406, f"Accept: {field[:200]!a} excludes all formats of this resource: {', '.join(offers)}")
 
 
 @lru_cache(maxsize=256)

@@ -60,7 +60,7 @@ def require_short_head(fields: list[Field]) -> None:
 
 def head_too_large() -> Problem:
     """Return the Problem 431 for a head that is too long (RFC 6585 5)."""
-    return Problem(431, f"the head of the request exceeds {HEAD_LIMIT} octets")
+    return Problem(431, f"the head of the request exceeds {HEAD_LIMIT} bytes")
 
 
 def require_old_version(version: str) -> None:
@@ -69,17 +69,17 @@ def require_old_version(version: str) -> None:
         raise Problem(400, "the request has no Host field (RFC 9112 3.2)")
 
 
-def require_bounded(octets: int) -> None:
+def require_bounded(size: int) -> None:
     """Raise the Problem 413 if the body's size exceeds the limit (RFC 9110 15.5.14)."""
-    if octets > BODY_LIMIT:
-        raise Problem(413, f"{octets} octets exceed the limit of {BODY_LIMIT} octets")
+    if size > BODY_LIMIT:
+        raise Problem(413, f"the body of {size} bytes exceeds the limit of {BODY_LIMIT} bytes")
 
 
 def no_request(error: BaseException) -> Problem:
     """Return the Problem 400 for bytes that the parser rejects (RFC 9112 2.2)."""
-    return Problem(400, f"no valid HTTP request: {error}")
+    return Problem(400, f"the request is not valid HTTP: {error}")
 
 
 def full() -> Problem:
     """Return the Problem 503 for a request that would exceed the memory kept for clients (RFC 9110 15.6.4)."""
-    return not_yet("clients make the robot keep as much as it can")
+    return not_yet("the memory for requests of clients is full")

@@ -51,7 +51,7 @@ def server_context(certificate: Path, key: Path) -> ssl.SSLContext:
     try:
         context.load_cert_chain(certificate, key, password=_refuse_password)
     except _EncryptedKeyError as error:
-        raise TlsFileError(f"--tls-key {key} is encrypted; openssl pkey -in {key} writes it in the clear") from error
+        raise TlsFileError(f"--tls-key {key} is encrypted; decrypt it with openssl pkey -in {key}") from error
     except ssl.SSLError as error:
         why = _reason(error)
         if "mismatch" in why:
@@ -79,7 +79,7 @@ async def accept(port: Port, listener: socket.socket, context: ssl.SSLContext) -
             try:
                 client, _ = await port.loop.sock_accept(listener)
             except OSError as error:  # no file descriptor is left, or the client has disconnected
-                _LOGGER.warning("cannot take a connection: %s", error)
+                _LOGGER.warning("cannot accept a connection: %s", error)
                 await asyncio.sleep(_PAUSE)
                 continue
             if not port.has_room_for(len(handshakes) + 1):

@@ -61,4 +61,4 @@ class RosCalls:
             async with asyncio.timeout(self._deadline):
                 return await answer
         except TimeoutError as error:
-            raise not_yet(f"{what} did not answer within {self._deadline:g} s") from error
+            raise not_yet(f"{what} did not respond within {self._deadline:g} s") from error

@@ -29,7 +29,7 @@ def reader_of(message: Any) -> Callable[[Any], dict[str, Any]]:
 def _require_finite(plain: Any, where: str) -> None:
     if isinstance(plain, float):
         if not math.isfinite(plain):
-            raise not_yet(f"what the robot tells is not finite: {where} is {plain}")
+            raise not_yet(f"the robot measured a value that is not finite: {where} is {plain}")
     elif isinstance(plain, dict):
         for name, value in plain.items():
             _require_finite(value, f"{where}.{name}")

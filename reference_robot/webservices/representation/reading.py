@@ -85,7 +85,7 @@ def read_json(body: bytes) -> Any:
             parse_int=_whole,
         )
     except UnicodeDecodeError as error:
-        raise Problem(400, f"the body is not UTF-8: {error.reason} at octet {error.start}") from error
+        raise Problem(400, f"the body is not UTF-8: {error.reason} at byte {error.start}") from error
     except json.JSONDecodeError as error:
         raise Problem(400, f"the body is not JSON: {error.msg} at line {error.lineno} column {error.colno}") from error
     except RecursionError as error:
@@ -101,7 +101,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _refuse_constant(name: str) -> None:
-    raise Problem(400, f"{name} is no JSON number (RFC 8259 6)")
+    raise Problem(400, f"{name} is not a JSON number (RFC 8259 6)")
 
 
 def _real(lexeme: str) -> float | _Beyond:
@@ -155,4 +155,4 @@ def _refuse_text(text: str | None, where: str) -> None:
 
 def _unsupported(what: str) -> Problem:
     accepted = ", ".join(ACCEPTED)
-    return Problem(415, f"{what} is not read here; send {accepted} in UTF-8", ((b"accept", accepted.encode()),))
+    return Problem(415, f"{what} is not supported; send {accepted} in UTF-8", ((b"accept", accepted.encode()),))

@@ -130,15 +130,15 @@ def _as_utf8(body: bytes, charset: str | None) -> bytes:
     try:
         codec = name if name in _UTF8 else codecs.lookup(name).name
     except (LookupError, ValueError) as error:
-        raise Problem(415, f"unknown charset {name!a}; XML is read as UTF-8 or UTF-16") from error
+        raise Problem(415, f"unknown charset {name!a}; send XML in UTF-8 or UTF-16") from error
     if codec in _UTF8:
         return body.removeprefix(codecs.BOM_UTF8)
     if codec not in _UTF16:
-        raise Problem(415, f"charset {name!a}; XML is read as UTF-8 or UTF-16 (WS-I BP R1012)")
+        raise Problem(415, f"charset {name!a} is not supported; send XML in UTF-8 or UTF-16 (WS-I BP R1012)")
     try:
         text = body.decode(codec)
     except UnicodeDecodeError as error:
-        raise Problem(400, f"the body is not {name}: {error.reason} at octet {error.start}") from error
+        raise Problem(400, f"the body is not {name}: {error.reason} at byte {error.start}") from error
     return text.removeprefix("\ufeff").encode("utf-8", "surrogatepass")
 
 

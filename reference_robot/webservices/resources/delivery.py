@@ -66,7 +66,7 @@ def _spelled_out(path: bytes) -> tuple[bytes, ...]:
     """Return the percent-decoded values of a delivery path; raise the Problem 422 that names an invalid value."""
     match = _ANY.fullmatch(path)
     if match is None:
-        raise Problem(404, "no such delivery")
+        raise Problem(404, "there is no resource at this delivery path")
     code, *coordinates = values = tuple(unquote_to_bytes(group) for group in match.groups())
     if not _CODE.fullmatch(code):
         raise Problem(422, f"code must be an integer, not {shown(_text(code))}")

@@ -13,7 +13,7 @@ _PART: Final = {
     "properties": {
         "available": {"type": "boolean"},
         "age": {"type": "number", "minimum": 0, "description": "Seconds since the last message."},
-        "silence": {"type": "number", "minimum": 0, "description": "Seconds without a sign of life."},
+        "silence": {"type": "number", "minimum": 0, "description": "Seconds since the ROS threads were last active."},
         "state": {"type": "string", "description": "State of the managed node, or unmanaged, silent, unknown."},
         "by": {"type": "string", "enum": ["service", "action"]},
     },
@@ -36,11 +36,11 @@ class Health(Resource):
         "get": {
             "operationId": "getHealth",
             "tags": ["extension"],
-            "summary": "What of the robot is there, and how old what is known of it is",
-            "description": "Not in the contract: this robot's own.",
+            "summary": "The available parts of the robot, and the age of their data",
+            "description": "An extension of this robot; not in the contract.",
             "responses": {
                 "200": {
-                    "description": "A record for each part, and healthy for all together.",
+                    "description": "An object for each part, and healthy for the whole robot.",
                     "content": {
                         JSON: {"schema": _SCHEMA},
                         XML: {"schema": _SCHEMA},

@@ -94,7 +94,7 @@ class Goals:
             Problem: 503 while the ROS thread hangs, because the robot's present state is unknown.
         """
         if self._subscribers.hangs():
-            raise not_yet(f"ROS has not been heard of for {self._subscribers.silence():.1f} s: the goal is not known")
+            raise not_yet(f"ROS has been silent for {self._subscribers.silence():.1f} s: the goal is unknown")
         own = self._active_own()
         if own is not None:
             return own.described | {"status": {"code": own.status, "text": STATUS_TEXTS[own.status]}}
@@ -202,7 +202,7 @@ class Goals:
                 navigation.
         """
         if not self._publishers.navigation_is_served():
-            raise not_yet("the robot has no navigation that takes goals")
+            raise not_yet("the robot has no navigation that accepts goals")
         identity = uuid.uuid4().bytes  # not the client's id, which may be reused for another goal
         self._known.append(identity.hex())
         losses = self._subscribers.goals.losses
@@ -226,7 +226,7 @@ class Goals:
 
     def _require_wanted(self, cancels: int) -> None:
         if self._cancels != cancels:
-            raise Problem(409, "the goal was cancelled, by a DELETE, before the navigation had taken it")
+            raise Problem(409, "a DELETE request cancelled the goal before the navigation had accepted it")
 
     async def _reason(self, target: dict[str, Any]) -> str:
         """Return why the robot refused a goal; the reference robot publishes the reason on a topic, Nav2 does not."""
@@ -238,7 +238,7 @@ class Goals:
             except (ValueError, KeyError, AttributeError):
                 break
             await asyncio.sleep(_REASON_STEP)
-        return "it gave no reason"
+        return "no reason was given"
 
 
 def _destination(goal: dict[str, Any]) -> tuple[str, Any]:

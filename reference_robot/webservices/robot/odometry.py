@@ -70,7 +70,7 @@ class LatestOdometry:
             raise not_yet("the robot has not published its odometry yet")
         age = monotonic() - received
         if age > OLDEST:
-            raise not_yet(f"the robot's last odometry came {age:.1f} s ago: where it is now is not known")
+            raise not_yet(f"the robot's last odometry is {age:.1f} s old: the robot's pose is unknown")
         told = self._told
         if octets is not told.octets:
             told = self._told = self._successor(octets, told)

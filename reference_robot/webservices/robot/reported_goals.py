@@ -48,6 +48,6 @@ def untold_goal(goal: ReportedGoal) -> dict[str, Any]:
         "goal": {"target_pose": {"header": header, "pose": _ORIGIN}},
         "status": {
             "code": goal.status,
-            "text": f"{STATUS_TEXTS[goal.status]}; another client sent it, and its target is not known",
+            "text": f"{STATUS_TEXTS[goal.status]}; another client sent it, and its target is unknown",
         },
     }

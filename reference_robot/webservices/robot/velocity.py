@@ -63,7 +63,7 @@ class Velocity:
         else:
             self._watchdog.release()
         if not self._publishers.publish_velocity(message_from(shape_of(Twist), twist)):
-            raise not_yet("the robot does not take velocity commands fast enough")
+            raise not_yet("the robot does not receive velocity commands fast enough")
 
     async def command_linear(self, linear: dict[str, float]) -> None:
         """Publish a velocity with a new linear part and the angular part that is in force.
@@ -107,5 +107,5 @@ class Velocity:
         give_up = time.monotonic() + _DISCOVERY
         while not self._publishers.find_velocity_subscribers():
             if time.monotonic() > give_up:
-                raise not_yet("no robot on the ROS graph takes velocity commands")
+                raise not_yet("no robot on the ROS graph subscribes to velocity commands")
             await asyncio.sleep(_DISCOVERY_STEP)

@@ -38,4 +38,4 @@ class ServiceDescription:
             # libxml2's texts quote only names and values of the message, nothing internal to the robot.
             log: Any = self._schema.error_log
             told = "; ".join(entry.message for entry in log[:_ERRORS_TOLD])
-            raise client_fault(f"{shown(element.tag)} is not what the description says: {told}")
+            raise client_fault(f"{shown(element.tag)} is not valid by the XSD: {told}")

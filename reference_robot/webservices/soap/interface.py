@@ -47,7 +47,7 @@ class SoapInterface(Interface):
             return Response(204, (allow,))
         if description is not None and request.method in _READ:
             return content(200, "text/xml", description)
-        raise Problem(405, f"the method is not one of {allow[1].decode()}; messages come by POST", (allow,))
+        raise Problem(405, f"the method is not one of {allow[1].decode()}; send messages by POST", (allow,))
 
     def _description(self, service: SoapService, request: Request) -> bytes | None:
         asked = request.query.lower()

@@ -42,7 +42,7 @@ class PublishersWebService(SoapService):
             Problem: 422 for an invalid field; 503 as ``Deliveries.accept``.
         """
         if not len(wrapper):
-            raise client_fault("arg0 is missing: it holds the delivery request")
+            raise client_fault("arg0, which holds the delivery request, is missing")
         sent = [element.text or "" for element in wrapper[0]]
         try:
             self._deliveries.accept(_request(sent, code), "soap")
@@ -63,5 +63,5 @@ def _request(sent: list[str], code: int | None) -> DeliveryRequest:
     try:
         asked = int(sent[_CODE])
     except ValueError as error:  # thousands of leading zeros: valid, but too long for Python's int
-        raise UnusableFieldError("message_code", "must be an integer of fewer digits") from error
+        raise UnusableFieldError("message_code", "must be an integer with fewer digits") from error
     return DeliveryRequest(asked if code is None else code, *map(float, sent[:_CODE]), *map(float, sent[_CODE + 1 :]))

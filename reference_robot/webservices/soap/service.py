@@ -54,7 +54,7 @@ class SoapService:
         if media_type != _MEDIA_TYPE:
             raise Problem(
                 415,
-                f"SOAP 1.1 comes as text/xml, not {media_type[:200]!a} (WS-I BP R1115)",
+                f"a SOAP 1.1 message must be text/xml, not {media_type[:200]!a} (WS-I BP R1115)",
                 ((b"accept", _MEDIA_TYPE.encode()),),
             )
         root = parsed(request.content(), charset)
@@ -68,7 +68,7 @@ class SoapService:
         element = operation_element(root)
         operation = self._operations.get(str(element.tag))
         if operation is None:
-            raise client_fault(f"no operation is asked for by {shown(element.tag)}")
+            raise client_fault(f"no operation has the request element {shown(element.tag)}")
         self.description.require_valid(element)
         return operation(element)
 
@@ -90,6 +90,6 @@ def _faulted(root: etree._Element, error: Exception) -> Response:
         code = FaultCode.SERVER if error.status >= _SERVERS_FAULT else FaultCode.CLIENT
         error = Fault(code, error.detail)
     elif not isinstance(error, Fault):
-        _LOGGER.error("no answer to %s", root.tag, exc_info=error)
-        error = Fault(FaultCode.SERVER, "the robot failed to answer; its log says why")
+        _LOGGER.error("cannot respond to %s", root.tag, exc_info=error)
+        error = Fault(FaultCode.SERVER, "an internal error of the robot; the robot's log has the details")
     return content(500, _MEDIA_TYPE, error.envelope())
