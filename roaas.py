@@ -15,38 +15,27 @@ from typing import Any
 
 import click
 
+# The module of each command, in which the command has its own name, and the summary in `roaas --help`, which is given
+# here so that it need not import every package.
 _COMMANDS = {
-    "robot": ("reference_robot.cli", "robot"),
-    "certify": ("conformance.cli.certify", "certify"),
-    "load": ("loadtests.cli", "load"),
-    "replay": ("conformance.cli.replay", "replay"),
-    "report": ("reports.cli.pages", "report"),
-    "compare": ("reports.cli.pages", "compare"),
-    "diff": ("reports.cli.difference", "diff"),
-    "keygen": ("reports.cli.attestation", "keygen"),
-    "sign": ("reports.cli.signing", "sign"),
-    "verify": ("reports.cli.attestation", "verify"),
-    "registry": ("reports.cli.registry", "registry"),
-    "selftest": ("conformance.cli.selftest", "selftest"),
-    "contract": ("conformance.cli.contract", "contract"),
+    "robot": ("reference_robot.cli", "Run the reference robot."),
+    "certify": ("conformance.cli.certify", "Judge a robot by its contract."),
+    "load": ("loadtests.cli", "Measure SOAP against REST."),
+    "replay": ("conformance.cli.replay", "Send a finding's requests again, and report whether it persists."),
+    "report": ("reports.cli.pages", "Write the pages from the result files again."),
+    "compare": ("reports.cli.pages", "Show whether a robot got slower between two load tests."),
+    "diff": ("reports.cli.difference", "Show what changed between two results: new failures, fixed, lost coverage."),
+    "keygen": ("reports.cli.attestation", "Make a key pair for signing results."),
+    "sign": ("reports.cli.signing", "Sign a result, so that others can verify the signer."),
+    "verify": ("reports.cli.attestation", "Check a signed certificate, and whether it meets your policy."),
+    "registry": (
+        "reports.cli.registry",
+        "Make a static site from signed certificates: which robot passed which classes.",
+    ),
+    "selftest": ("conformance.cli.selftest", "Test the suite: it must kill mutants, and must not fail a good device."),
+    "contract": ("conformance.cli.contract", "Show the requirements, export the contract's files."),
 }
-# The summaries in `roaas --help`, so that it need not import every package.
-_SUMMARIES = {
-    "robot": "Run the reference robot.",
-    "certify": "Judge a robot by its contract.",
-    "load": "Measure SOAP against REST.",
-    "replay": "Send a finding's requests again, and report whether it persists.",
-    "report": "Write the pages from the result files again.",
-    "compare": "Show whether a robot got slower between two load tests.",
-    "diff": "Show what changed between two results: new failures, fixed, lost coverage.",
-    "keygen": "Make a key pair for signing results.",
-    "sign": "Sign a result, so that others can verify the signer.",
-    "verify": "Check a signed certificate, and whether it meets your policy.",
-    "registry": "Make a static site from signed certificates: which robot passed which classes.",
-    "selftest": "Test the suite: it must kill mutants, and must not fail a good device.",
-    "contract": "Show the requirements, export the contract's files.",
-}
-_EXTRAS = {"robot": "robot", "load": "load"}
+_EXTRAS = {"robot", "load"}  # commands that need the optional dependencies of the same name
 _ROOMS = {"conformance", "loadtests", "reference_robot", "reports"}
 _INSTALLED = Path(__file__).with_name("roaas_rooms")
 
@@ -74,25 +63,25 @@ class _Rooms(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click's
         with formatter.section("Commands"):
-            formatter.write_dl(list(_SUMMARIES.items()))
+            formatter.write_dl([(name, summary) for name, (_, summary) in _COMMANDS.items()])
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
             return None
         open_rooms()
-        module, name = _COMMANDS[cmd_name]
+        module, _ = _COMMANDS[cmd_name]
         try:
-            command = getattr(import_module(module), name)
+            command = getattr(import_module(module), cmd_name)
         except ModuleNotFoundError as missing:
             if cmd_name not in _EXTRAS or (missing.name or "").split(".")[0] in _ROOMS:
                 raise
             raise click.UsageError(
                 f"'roaas {cmd_name}' needs the Python module {missing.name!r}, which is not installed: "
-                f"pip install 'roaas[{_EXTRAS[cmd_name]}]'",
+                f"pip install 'roaas[{cmd_name}]'",
                 ctx,
             ) from missing
         if not isinstance(command, click.Command):
-            raise TypeError(f"{module}.{name} is not a command")
+            raise TypeError(f"{module}.{cmd_name} is not a command")
         return command
 
 
