@@ -2,7 +2,8 @@
 
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Awaitable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
+from functools import partial
 from typing import Any, Final
 
 from reference_robot.webservices.http.admission import SAFE, Admission
@@ -26,7 +27,7 @@ class Interface(ABC):
 
     def admit(self, request: Request) -> None:
         """Raise a Problem if the head of a request fails the access check."""
-        self._admission.check(request, self)
+        self._admission.check(request, self.needed)
 
     @abstractmethod
     def scope(self, request: Request) -> Scope:
@@ -44,14 +45,15 @@ class Interface(ABC):
             outcome = self.answer(request)
         except Exception as error:  # noqa: BLE001 - after any error the client gets a response
             return _failed(request, error)
-        return outcome if isinstance(outcome, Response) else _awaited(request, outcome)
+        return outcome if isinstance(outcome, Response) else awaited(outcome, partial(_failed, request))
 
 
-async def _awaited(request: Request, outcome: Awaitable[Response]) -> Response:
+async def awaited(outcome: Awaitable[Response], failed: Callable[[Exception], Response]) -> Response:
+    """Return the awaited response, or the response that ``failed`` returns for an error."""
     try:
         return await outcome
-    except Exception as error:  # noqa: BLE001 - as above
-        return _failed(request, error)
+    except Exception as error:  # noqa: BLE001 - after any error the client gets a response
+        return failed(error)
 
 
 def _failed(request: Request, error: Exception) -> Response:

@@ -10,8 +10,8 @@ from reference_robot.deliveries import DeliveryRequest
 from reference_robot.webservices.http.authorization import Scope
 from reference_robot.webservices.http.messages import Response
 from reference_robot.webservices.robot.deliveries import Deliveries, UnusableFieldError
-from reference_robot.webservices.soap.faults import SOAP, client_fault
-from reference_robot.webservices.soap.service import SoapService, answered
+from reference_robot.webservices.soap.faults import client_fault
+from reference_robot.webservices.soap.service import SoapService
 
 PATH: Final = "/turtlesim_publisher_ws"
 
@@ -30,7 +30,7 @@ class PublishersWebService(SoapService):
         codes = {"ExecuteDeliveryRequest": None, "ExecuteCoffeeRequest": COFFEE}
         super().__init__("publishers", PATH, {name: partial(self._execute, name, code) for name, code in codes.items()})
         self._deliveries = deliveries
-        self._done = {name: self._empty_response(name) for name in codes}
+        self._done = {name: self.response(name) for name in codes}
 
     def _execute(self, operation: str, code: int | None, wrapper: etree._Element) -> Response:
         """Publish the delivery request in a schema-valid message; return the empty response.
@@ -49,14 +49,6 @@ class PublishersWebService(SoapService):
         except UnusableFieldError as error:
             raise error.refusal(error.field, sent[_ORDER.index(error.field)]) from error
         return self._done[operation]
-
-    def _empty_response(self, operation: str) -> Response:
-        envelope = (
-            f'<soap:Envelope xmlns:soap="{SOAP}"><soap:Body>'
-            f'<tns:{operation}Response xmlns:tns="{self.description.namespace}"/>'
-            "</soap:Body></soap:Envelope>"
-        )
-        return answered(envelope.encode())
 
 
 def _request(sent: list[str], code: int | None) -> DeliveryRequest:

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Awaitable, Callable
-from typing import Final
+from collections.abc import Awaitable, Callable, Iterable
+from functools import partial
+from typing import Any, Final
 
 from lxml import etree
 
 from reference_robot.webservices.http.authorization import Scope
+from reference_robot.webservices.http.interface import awaited
 from reference_robot.webservices.http.messages import Request, Response, content
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.reading import parsed_content_type
+from reference_robot.webservices.representation.writing import element_of
 from reference_robot.webservices.representation.xml_input import parsed
 from reference_robot.webservices.soap.description import ServiceDescription
 from reference_robot.webservices.soap.envelope import operation_element
-from reference_robot.webservices.soap.faults import Fault, FaultCode, client_fault
+from reference_robot.webservices.soap.faults import SOAP, Fault, FaultCode, client_fault
 
 Operation = Callable[[etree._Element], Response | Awaitable[Response]]  # noqa: SLF001 - lxml's only name for the class
 
@@ -28,8 +31,8 @@ _SERVERS_FAULT: Final = 500
 class SoapService:
     """A SOAP service; subclasses pass their operations by the local name of the request element.
 
-    An operation gets the schema-valid request element and returns the response, which ``answered`` makes of an
-    envelope.
+    An operation gets the schema-valid request element and returns the response, which ``response``
+    creates.
 
     Attributes:
         scope: The token scope that clients need to send messages.
@@ -62,7 +65,17 @@ class SoapService:
             outcome = self._answer(root)
         except Exception as error:  # noqa: BLE001 - after any error the client gets a fault
             return _faulted(root, error)
-        return outcome if isinstance(outcome, Response) else _awaited(root, outcome)
+        return outcome if isinstance(outcome, Response) else awaited(outcome, partial(_faulted, root))
+
+    def response(self, operation: str, returned: Iterable[Any] = ()) -> Response:
+        """Return the response of an operation: an envelope with one unqualified ``return`` element for each value."""
+        namespace = self.description.namespace
+        root = etree.Element(f"{{{SOAP}}}Envelope", nsmap={"soap": SOAP})
+        wrapper = etree.SubElement(
+            etree.SubElement(root, f"{{{SOAP}}}Body"), f"{{{namespace}}}{operation}Response", nsmap={"tns": namespace}
+        )
+        wrapper.extend([element_of(value, "return") for value in returned])
+        return content(200, _MEDIA_TYPE, etree.tostring(root, encoding="utf-8", xml_declaration=True))
 
     def _answer(self, root: etree._Element) -> Response | Awaitable[Response]:
         element = operation_element(root)
@@ -71,18 +84,6 @@ class SoapService:
             raise client_fault(f"no operation has the request element {shown(element.tag)}")
         self.description.require_valid(element)
         return operation(element)
-
-
-def answered(envelope: bytes) -> Response:
-    """Return the 200 response with an envelope as its body."""
-    return content(200, _MEDIA_TYPE, envelope)
-
-
-async def _awaited(root: etree._Element, outcome: Awaitable[Response]) -> Response:
-    try:
-        return await outcome
-    except Exception as error:  # noqa: BLE001 - as above
-        return _faulted(root, error)
 
 
 def _faulted(root: etree._Element, error: Exception) -> Response:

@@ -10,13 +10,12 @@ from reference_robot.webservices.http.authorization import Scope
 from reference_robot.webservices.http.messages import Response
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.checking import shown
-from reference_robot.webservices.representation.writing import element_of
 from reference_robot.webservices.robot.goals import Goals
 from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.plans import Planner, PlanQuery
 from reference_robot.webservices.robot.velocity import Velocity
-from reference_robot.webservices.soap.faults import SOAP, client_fault
-from reference_robot.webservices.soap.service import Operation, SoapService, answered
+from reference_robot.webservices.soap.faults import client_fault
+from reference_robot.webservices.soap.service import Operation, SoapService
 
 PATH: Final = "/turtlesim_subscriber_ws"
 
@@ -46,11 +45,11 @@ class SubscribersWebService(SoapService):
         operations |= {"GetPose": self._get_pose, "GetPlan": self._get_plan}
         super().__init__("subscribers", PATH, operations)
         self._odometry = odometry
-        self._write_pose = lambda pose: self._response("GetPose", [pose])
+        self._write_pose = lambda pose: self.response("GetPose", [pose])
         self._planner = planner
 
     def _tell(self, operation: str, values: Callable[[], list[Any]], _wrapper: etree._Element) -> Response:
-        return self._response(operation, values())
+        return self.response(operation, values())
 
     def _get_pose(self, _wrapper: etree._Element) -> Response:
         """Return the latest odometry; each message is serialized to XML at most once."""
@@ -61,17 +60,7 @@ class SubscribersWebService(SoapService):
         for element in wrapper:
             name, text = str(element.tag), element.text or ""
             given[name] = text if name == "frame_id" else _finite(name, text)
-        return self._response("GetPlan", [await self._planner.plan(PlanQuery(**given))])
-
-    def _response(self, operation: str, returned: list[Any]) -> Response:
-        """Return a response envelope with one unqualified ``return`` element for each value."""
-        namespace = self.description.namespace
-        root = etree.Element(f"{{{SOAP}}}Envelope", nsmap={"soap": SOAP})
-        wrapper = etree.SubElement(
-            etree.SubElement(root, f"{{{SOAP}}}Body"), f"{{{namespace}}}{operation}Response", nsmap={"tns": namespace}
-        )
-        wrapper.extend([element_of(value, "return") for value in returned])
-        return answered(etree.tostring(root, encoding="utf-8", xml_declaration=True))
+        return self.response("GetPlan", [await self._planner.plan(PlanQuery(**given))])
 
 
 def _finite(name: str, text: str) -> float:
