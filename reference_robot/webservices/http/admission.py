@@ -1,7 +1,7 @@
 """Access control by the head of a request: host name, bearer token and scope, and origin of a web page."""
 
-from collections.abc import Iterable
-from typing import Final, Protocol
+from collections.abc import Callable, Iterable
+from typing import Final
 
 from reference_robot.webservices.http.authorization import Authorization, Scope
 from reference_robot.webservices.http.hosts import AllowedHosts
@@ -11,13 +11,6 @@ from reference_robot.webservices.representation.problems import Problem
 SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})  # RFC 9110 9.2.1
 
 _SHOWN: Final = 100  # characters of a client's text in error messages
-
-
-class Scoped(Protocol):
-    """An interface that knows which token scope a request needs."""
-
-    def needed(self, request: Request) -> Scope | None:
-        """Return the scope that a request needs; None if any valid token is sufficient."""
 
 
 class Admission:
@@ -34,13 +27,16 @@ class Admission:
         self._allows = hosts.allows
         self._origins = frozenset(origin.encode() for origin in origins)
 
-    def check(self, request: Request, scoped: Scoped) -> None:
-        """Raise the Problem 421, 401 or 403 for a request with a wrong host, token or origin."""
+    def check(self, request: Request, needed: Callable[[Request], Scope | None]) -> None:
+        """Raise the Problem 421, 401 or 403 for a request with a wrong host, token or origin.
+
+        ``needed`` returns the scope that a request needs; None if any valid token is sufficient.
+        """
         if not self._allows(request.authority):
             host = request.authority.decode("latin-1")[:_SHOWN]
             raise Problem(421, f"this robot is not {host!a}; to allow another NAME, start it with --allowed-host NAME")
         if self._authorization.is_asked_for:
-            self._authorization.check(request.headers, scoped.needed(request))
+            self._authorization.check(request.headers, needed(request))
         if b"origin" in request.headers and request.method not in SAFE:
             self._require_own_origin(request)
 

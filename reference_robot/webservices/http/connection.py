@@ -33,7 +33,6 @@ from reference_robot.webservices.http.reading import (
     readable,
     require_bounded,
     require_old_version,
-    require_short_head,
 )
 from reference_robot.webservices.representation.problems import Problem, not_yet
 
@@ -113,8 +112,8 @@ class HttpConnection(AnsweringConnection):
     def on_headers_complete(self) -> None:
         """Refuse a request with an invalid head; otherwise send 100 Continue if the client waits for that status."""
         fields = self._fields
-        if self._head_octets > HEAD_LIMIT:
-            require_short_head(fields)
+        if self._head_octets > HEAD_LIMIT and sum(len(name) + len(value) for name, value in fields) > HEAD_LIMIT:
+            raise head_too_large()
         self._in_head = False
         headers, parser = dict(fields), self._parser
         request = Request(parser.get_method().decode(), self._target, headers, keep_alive=parser.should_keep_alive())

@@ -52,12 +52,6 @@ def fields_by_name(fields: list[Field]) -> dict[bytes, bytes]:
     return headers
 
 
-def require_short_head(fields: list[Field]) -> None:
-    """Raise the Problem 431 if the header fields exceed the size limit."""
-    if sum(len(name) + len(value) for name, value in fields) > HEAD_LIMIT:
-        raise head_too_large()
-
-
 def head_too_large() -> Problem:
     """Return the Problem 431 for a head that is too long (RFC 6585 5)."""
     return Problem(431, f"the head of the request exceeds {HEAD_LIMIT} bytes")
