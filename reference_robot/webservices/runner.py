@@ -8,6 +8,7 @@ import resource
 import signal
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import uvloop
@@ -16,6 +17,7 @@ from reference_robot.ros import RosRuntime
 from reference_robot.webservices.assembly import Endpoints, interfaces
 from reference_robot.webservices.configuration import Configuration
 from reference_robot.webservices.endpoint import EndpointPublisher, bound
+from reference_robot.webservices.http.address import url_of
 from reference_robot.webservices.http.listening import Listening
 from reference_robot.webservices.http.port import Limits
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
@@ -31,20 +33,14 @@ class RobotNotFoundError(RuntimeError):
     """An error for a robot that was started but did not appear on the ROS graph."""
 
 
+@dataclass(frozen=True)
 class RobotWebServiceNodesRunner:
     """The web services of one robot with their ROS nodes; ``ros_arguments`` are passed to these nodes."""
 
-    def __init__(
-        self,
-        configuration: Configuration,
-        listening: Listening,
-        domain_id: int | None,
-        ros_arguments: Sequence[str] = (),
-    ) -> None:
-        self._configuration = configuration
-        self._listening = listening
-        self._domain_id = domain_id
-        self._ros_arguments = ros_arguments
+    configuration: Configuration
+    listening: Listening
+    domain_id: int | None
+    ros_arguments: Sequence[str] = ()
 
     def run(self, ready: Callable[[Endpoints], None], *, wait_for_robot: bool) -> None:
         """Serve until SIGINT or SIGTERM; call ``ready`` once, when both interfaces accept requests.
@@ -53,19 +49,18 @@ class RobotWebServiceNodesRunner:
             PortInUseError: A port cannot be bound.
             RobotNotFoundError: ``wait_for_robot`` is set and no robot appeared in time.
         """
-        configuration = self._configuration
+        configuration, listening = self.configuration, self.listening
         _raise_descriptor_limit()
         # This is Fast DDS's default, and overrides a user's setting. In asynchronous mode each publish waits for a lock
         # of the sender's thread, which delays one response in ten by 3 ms. Other middleware ignores the variable.
         os.environ["RMW_FASTRTPS_PUBLICATION_MODE"] = "SYNCHRONOUS"
-        listening = self._listening
         host = listening.host
         with (
             bound(host, listening.rest_port) as rest,
             bound(host, listening.soap_port) as soap,
-            RosRuntime(self._domain_id, self._ros_arguments) as ros,
+            RosRuntime(self.domain_id, self.ros_arguments) as ros,
         ):
-            endpoints = Endpoints(listening.scheme, host, rest.getsockname()[1], soap.getsockname()[1])
+            endpoints = Endpoints(*(url_of(host, at.getsockname()[1], listening.scheme) for at in (rest, soap)))
             publishers, subscribers = RobotPublishersNode(ros, configuration), RobotSubscribersNode(ros, configuration)
             ros.start()
             if wait_for_robot:
