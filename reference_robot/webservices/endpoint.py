@@ -6,6 +6,7 @@ The robot publishes its endpoints itself, without an application server (paper, 
 import asyncio
 import socket
 import ssl
+from dataclasses import dataclass
 
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.port import Held, Limits, Port
@@ -33,27 +34,21 @@ def bound(host: str, port: int) -> socket.socket:
     return listener
 
 
+@dataclass(frozen=True)
 class EndpointPublisher:
     """A server for several interfaces, each on its own socket.
 
-    Args:
+    Attributes:
         interfaces: Each interface with its listening socket.
         limits: What clients may use of each interface; the limit on memory applies to all interfaces together.
         proxies: The proxies whose X-Forwarded fields are trusted.
         context: The TLS settings; None for plain HTTP.
     """
 
-    def __init__(
-        self,
-        interfaces: list[tuple[Interface, socket.socket]],
-        limits: Limits,
-        proxies: TrustedProxies,
-        context: ssl.SSLContext | None,
-    ) -> None:
-        self._interfaces = interfaces
-        self._limits = limits
-        self._proxies = proxies
-        self._context = context
+    interfaces: list[tuple[Interface, socket.socket]]
+    limits: Limits
+    proxies: TrustedProxies
+    context: ssl.SSLContext | None
 
     async def serve(self, stop: asyncio.Event, started: asyncio.Event) -> None:
         """Serve requests until ``stop`` is set; set ``started`` once all interfaces are ready.
@@ -63,10 +58,10 @@ class EndpointPublisher:
         held = Held()
         async with asyncio.TaskGroup() as group:
             listening = []
-            for interface, listener in self._interfaces:
+            for interface, listener in self.interfaces:
                 listening.append(asyncio.Event())
-                port = Port(interface, self._limits, held, self._proxies)
-                group.create_task(serve(port, listener, listening[-1], stop, self._context))
+                port = Port(interface, self.limits, held, self.proxies)
+                group.create_task(serve(port, listener, listening[-1], stop, self.context))
             for event in listening:
                 await event.wait()
             started.set()
