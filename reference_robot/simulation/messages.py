@@ -4,12 +4,10 @@ import math
 from typing import Any, Final
 
 from geometry_msgs.msg import PoseStamped, Quaternion
-from nav_msgs.msg import Path
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
 from reference_robot.names import Frames
-from reference_robot.simulation.office import Floats
 from reference_robot.simulation.planner import Pose
 
 _UNIT_TOLERANCE: Final = 1e-3  # of a quaternion's length, as in the contract
@@ -66,11 +64,6 @@ def stamped_pose(pose: Pose, header: Header) -> PoseStamped:
     message.pose.position.x, message.pose.position.y = float(pose[0]), float(pose[1])
     message.pose.orientation = quaternion_of(float(pose[2]))
     return message
-
-
-def path_message(poses: Floats, header: Header) -> Path:
-    """Return a Path message for a (k, 3) array of x, y, yaw; every pose gets the same header."""
-    return Path(header=header, poses=[stamped_pose((x, y, yaw), header) for x, y, yaw in poses])
 
 
 def plain(stamped: PoseStamped) -> dict[str, Any]:

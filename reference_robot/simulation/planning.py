@@ -14,7 +14,7 @@ from std_msgs.msg import Header
 
 from reference_robot.names import RosNames
 from reference_robot.simulation.localisation import Localisation
-from reference_robot.simulation.messages import RESULT_TIMEOUT_S, PoseError, path_message, pose_of
+from reference_robot.simulation.messages import RESULT_TIMEOUT_S, PoseError, pose_of, stamped_pose
 from reference_robot.simulation.planner import PlanError, Planner, Pose
 
 
@@ -73,7 +73,8 @@ class Planning:
 
     def _plan(self, start: Pose, goal: PoseStamped, tolerance: float) -> Path:
         poses = self._planner.plan(start, pose_of(goal, self._frames), tolerance)
-        path = path_message(poses, self._header(goal.header.frame_id))
+        header = self._header(goal.header.frame_id)
+        path = Path(header=header, poses=[stamped_pose((x, y, yaw), header) for x, y, yaw in poses])
         if not tolerance or _same_point(path.poses[-1], goal):
             path.poses[-1].pose = goal.pose  # exactly; converting to yaw and back would round
         return path

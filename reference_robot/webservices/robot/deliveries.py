@@ -65,7 +65,8 @@ class Deliveries:
 
     def listed(self) -> list[dict[str, Any]]:
         """Return the latest accepted requests, newest first, with the states and reasons reported for them."""
-        self._catch_up()
+        while self._reports:
+            self._missions.note(self._reports.popleft())
         find = self._missions.finder()
         listed = []
         for request, nanoseconds, interface in reversed(self._accepted):
@@ -78,10 +79,6 @@ class Deliveries:
             }
             listed.append(entry | {"reason": mission.reason} if mission.reason else entry)
         return listed
-
-    def _catch_up(self) -> None:
-        while self._reports:
-            self._missions.note(self._reports.popleft())
 
 
 def _require_usable(request: DeliveryRequest) -> None:

@@ -26,13 +26,9 @@ def require_known_frame(frame_id: str, frames: Frames, where: str) -> None:
         raise Problem(422, f"{where} must be {frames.map} or {frames.odom}: the robot knows no frame {shown(frame_id)}")
 
 
-def require_unit(orientation: dict[str, float], where: str) -> None:
-    """Raise the Problem 422 for a quaternion whose length is not 1 within 1e-3."""
-    if not abs(math.hypot(*orientation.values()) - 1) <= _UNIT_TOLERANCE:
-        raise refused(where, orientation, f"must have length 1 within {_UNIT_TOLERANCE}")
-
-
 def require_pose(stamped: dict[str, Any], frames: Frames, where: str) -> None:
-    """Raise the Problem 422 for a plain PoseStamped with an unknown frame or without a unit quaternion."""
+    """Raise the Problem 422 for a plain PoseStamped in an unknown frame or without a unit quaternion."""
     require_known_frame(stamped["header"]["frame_id"], frames, f"{where}.header.frame_id")
-    require_unit(stamped["pose"]["orientation"], f"{where}.pose.orientation")
+    orientation = stamped["pose"]["orientation"]
+    if not abs(math.hypot(*orientation.values()) - 1) <= _UNIT_TOLERANCE:
+        raise refused(f"{where}.pose.orientation", orientation, f"must have length 1 within {_UNIT_TOLERANCE}")
