@@ -23,7 +23,7 @@ class DeliveryRequest(NamedTuple):
     source_x: float
     source_y: float
 
-    def octets(self) -> bytes:
+    def serialized(self) -> bytes:
         """Return the request as a serialized DeliveryRequestMsg (CDR, little endian).
 
         Packing the bytes directly takes 0.3 µs; rclpy's serialization, field by field, takes 2 µs.
@@ -34,15 +34,15 @@ class DeliveryRequest(NamedTuple):
         return _CDR.pack(_LITTLE_ENDIAN, *self)
 
     @classmethod
-    def of(cls, octets: bytes) -> Self:
+    def of(cls, data: bytes) -> Self:
         """Return the request that is stored in a serialized DeliveryRequestMsg of either byte order.
 
         Raises:
             rclpy's RMWError: The bytes are not a DeliveryRequestMsg.
         """
-        if len(octets) == _CDR.size and octets.startswith(_LITTLE_ENDIAN[:2]):  # the last two bytes are options
-            return cls._make(_CDR.unpack(octets)[1:])
-        return cls._make(_FIELDS_OF(deserialize_message(octets, DeliveryRequestMsg)))
+        if len(data) == _CDR.size and data.startswith(_LITTLE_ENDIAN[:2]):  # the last two bytes are options
+            return cls._make(_CDR.unpack(data)[1:])
+        return cls._make(_FIELDS_OF(deserialize_message(data, DeliveryRequestMsg)))
 
 
 _FIELDS_OF: Final = attrgetter(*DeliveryRequest._fields)

@@ -6,7 +6,7 @@ import signal
 
 
 class Ending:
-    """A one-time event that SIGINT, SIGTERM or a call of ``bring`` triggers. Create it in the main thread.
+    """A one-time event that SIGINT, SIGTERM or a call of ``trigger`` sets off. Create it in the main thread.
 
     Python runs signal handlers only when the main thread executes Python code, so a thread that blocks on an event
     would not wake up. The interpreter also writes a byte to a pipe for each signal, whichever thread receives the
@@ -14,17 +14,17 @@ class Ending:
     """
 
     def __init__(self) -> None:
-        self._told, self._tell = os.pipe()
-        os.set_blocking(self._tell, False)
-        signal.set_wakeup_fd(self._tell)
+        self._read_end, self._write_end = os.pipe()
+        os.set_blocking(self._write_end, False)
+        signal.set_wakeup_fd(self._write_end)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda _number, _frame: None)
 
     def wait(self) -> None:
-        """Block until SIGINT, SIGTERM or a call of ``bring``."""
-        os.read(self._told, 1)
+        """Block until SIGINT, SIGTERM or a call of ``trigger``."""
+        os.read(self._read_end, 1)
 
-    def bring(self) -> None:
+    def trigger(self) -> None:
         """Make ``wait`` return; may be called from any thread."""
         with contextlib.suppress(BlockingIOError):  # the pipe is full, so `wait` returns anyway
-            os.write(self._tell, b"\0")
+            os.write(self._write_end, b"\0")

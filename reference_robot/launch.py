@@ -126,7 +126,7 @@ def _listening(options: Options) -> Listening:
         require_guarded(options.host, authorization)
     if (options.tls_cert is None) != (options.tls_key is None):
         raise ListeningError("give both --tls-cert and --tls-key: a server needs a certificate and its key")
-    if authorization.is_asked_for and options.tls_cert is None and not is_loopback(options.host):
+    if authorization.is_required and options.tls_cert is None and not is_loopback(options.host):
         _LOGGER.warning("tokens are sent to --host %s unencrypted; --tls-cert and --tls-key encrypt them", options.host)
     return Listening(
         options.host,

@@ -98,7 +98,7 @@ class RosRuntime:
         Args:
             name: The node's name.
             apart: Run the node's callbacks in a thread of its own, so that its messages do not delay other nodes.
-            spun: False for a node without callbacks: ``watch`` notices its messages and ``taken`` reads them.
+            spun: False for a node without callbacks; ``watch`` and ``waiting_messages`` serve its subscriptions.
 
         Raises:
             RosArgumentsError: The ROS arguments contain a parameter that a node cannot have.
@@ -189,7 +189,7 @@ class RosRuntime:
                     get_logger("ros").error(f"a callback failed:\n{traceback.format_exc()}")
 
     def _watch(
-        self, subscription: Subscription, wake: rclpy_c.GuardCondition, tell: Callable[[], object], pause_s: float
+        self, subscription: Subscription, wake: rclpy_c.GuardCondition, notify: Callable[[], object], pause_s: float
     ) -> None:
         waiting = rclpy_c.WaitSet(1, 1, 0, 0, 0, 0, self.context.handle)
         while not self._closing.is_set() and self.context.ok():
@@ -198,11 +198,11 @@ class RosRuntime:
             waiting.add_guard_condition(wake)
             waiting.wait(-1)
             if waiting.is_ready("subscription", 0):
-                tell()
+                notify()
                 self._closing.wait(pause_s)
 
 
-def taken(subscription: Subscription) -> Iterator[bytes]:
+def waiting_messages(subscription: Subscription) -> Iterator[bytes]:
     """Remove and yield the serialized messages that wait at a subscription of a node that is not spun."""
     handle = subscription.handle
     with handle:

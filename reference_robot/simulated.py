@@ -89,14 +89,14 @@ class SimulatedRobot:
 
     def _await_ready(self, stdout: IO[bytes]) -> None:
         give_up = time.monotonic() + _START
-        told = b""
-        while b"ready" not in told.split():
+        output = b""
+        while b"ready" not in output.split():
             readable, _, _ = select.select([stdout], [], [], max(0.0, give_up - time.monotonic()))
-            octets = os.read(stdout.fileno(), 4096) if readable else b""
-            if not octets:
+            data = os.read(stdout.fileno(), 4096) if readable else b""
+            if not data:
                 why = "ended" if readable else f"was not ready within {_START:g} s"
                 raise SimulationError(f"the simulation {why}: {' '.join(self._command)}; its log is {self._log}")
-            told += octets
+            output += data
 
     def _watch(self, process: subprocess.Popen[bytes], stdout: IO[bytes]) -> None:
         while os.read(stdout.fileno(), 4096):

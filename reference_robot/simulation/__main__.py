@@ -84,7 +84,7 @@ def _await_end_of_stdin(ending: Ending) -> None:
     with contextlib.suppress(OSError):
         while os.read(0, 4096):
             pass
-    ending.bring()
+    ending.trigger()
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile
 from reference_robot.names import RosNames
 from reference_robot.simulation.frames import FramePublisher
 from reference_robot.simulation.kinematics import Accelerations, Motion, advance
-from reference_robot.simulation.odometry import OdometryOctets
+from reference_robot.simulation.odometry import SerializedOdometry
 from reference_robot.simulation.office import BODY_RADIUS, DEPOT, OFFICE
 from reference_robot.simulation.realism import Delayed, Realism
 
@@ -57,20 +57,20 @@ class Base:
         odometry.header.frame_id = names.frames.odom
         odometry.pose.covariance = _POSE_COVARIANCE
         odometry.twist.covariance = _TWIST_COVARIANCE
-        self._odometry = OdometryOctets(odometry)
+        self._odometry = SerializedOdometry(odometry)
         self._publisher = node.create_publisher(Odometry, names.topics.odom, 10)
         self._frames = FramePublisher(node, names)
         newest = QoSProfile(depth=1)
         if names.velocity.message == "TwistStamped":
-            node.create_subscription(TwistStamped, names.topics.cmd_vel, self._take_stamped, newest)
+            node.create_subscription(TwistStamped, names.topics.cmd_vel, self._receive_stamped, newest)
         else:
-            node.create_subscription(Twist, names.topics.cmd_vel, self._take, newest)
+            node.create_subscription(Twist, names.topics.cmd_vel, self._receive, newest)
         node.create_timer(max(_PERIOD_S / time_scale, _SHORTEST_PERIOD_S), self._step)
 
-    def _take_stamped(self, command: TwistStamped) -> None:
-        self._take(command.twist)
+    def _receive_stamped(self, command: TwistStamped) -> None:
+        self._receive(command.twist)
 
-    def _take(self, command: Twist) -> None:
+    def _receive(self, command: Twist) -> None:
         setpoint = (command.linear.x, command.angular.z)
         if not all(map(math.isfinite, setpoint)):
             self._node.get_logger().warning(f"refused a velocity command of {setpoint}", throttle_duration_sec=1.0)
@@ -103,4 +103,4 @@ class Base:
     def _report(self, motion: Motion) -> None:
         stamp = divmod(self._clock.now().nanoseconds, _NANOSECONDS)
         self._publisher.publish(self._odometry.filled(stamp, motion))
-        self._frames.tell(stamp, motion)
+        self._frames.publish(stamp, motion)

@@ -64,10 +64,10 @@ class Delivery:
         self._begin_later.cancel()
         self._navigate = ActionClient(node, NavigateToPose, names.actions.navigate_to_pose)
         self._goals = GoalStatuses(node, names.actions.navigate_to_pose, self._note_goals)
-        requests.tell(node, self._take)
+        requests.watch(node, self._add_waiting)
 
-    def _take(self) -> None:
-        for request in self._requests.taken():
+    def _add_waiting(self) -> None:
+        for request in self._requests.waiting():
             self._add(request)
 
     def _add(self, request: DeliveryRequest) -> None:
@@ -135,11 +135,11 @@ class Delivery:
         identity = uuid.uuid4()
         self._leg = identity.hex
         self._own.append(self._leg)
-        asked = self._navigate.send_goal_async(goal, goal_uuid=UUID(uuid=list(identity.bytes)))
-        asked.add_done_callback(partial(self._leg_answered, self._leg))
+        sent = self._navigate.send_goal_async(goal, goal_uuid=UUID(uuid=list(identity.bytes)))
+        sent.add_done_callback(partial(self._leg_accepted_or_refused, self._leg))
 
-    def _leg_answered(self, leg: str, answer: Any) -> None:
-        handle = answer.result()
+    def _leg_accepted_or_refused(self, leg: str, response: Any) -> None:
+        handle = response.result()
         if leg != self._leg:
             return  # the leg has been given up
         if handle.accepted:
@@ -147,11 +147,11 @@ class Delivery:
         else:
             self._fail("the navigation refused a leg")
 
-    def _leg_ended(self, leg: str, answer: Any) -> None:
+    def _leg_ended(self, leg: str, response: Any) -> None:
         if leg != self._leg:
             return
         self._leg = ""
-        outcome = answer.result()
+        outcome = response.result()
         if outcome.status == GoalStatus.STATUS_SUCCEEDED:
             self._next_leg()
         elif outcome.result.error_code:  # as in Nav2; a displaced goal has no error code
@@ -181,9 +181,9 @@ class Delivery:
         self._report_is_due = False
         self._reported_at = time.monotonic()
         missions = self._missions
-        told = {
+        report = {
             "taken": missions.taken,
             "dropped": missions.dropped,
             "missions": [mission.plain() for mission in missions.changes()],
         }
-        self._reports.publish(String(data=json.dumps(told)))
+        self._reports.publish(String(data=json.dumps(report)))

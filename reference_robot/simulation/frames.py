@@ -29,7 +29,7 @@ class FramePublisher:
         self._base = TransformStamped(child_frame_id=names.frames.base)
         self._base.header.frame_id = names.frames.odom
         self._message = TFMessage(transforms=[self._base])
-        self._told_at = -math.inf
+        self._published_at = -math.inf
         self._moving = node.create_publisher(TFMessage, names.topics.tf, _TRANSFORMS)
         self._static = node.create_publisher(TFMessage, names.topics.tf_static, LATCHED)
         identity = TransformStamped(child_frame_id=names.frames.odom)  # the default quaternion is the identity
@@ -37,12 +37,12 @@ class FramePublisher:
         identity.header.frame_id = names.frames.map
         self._static.publish(TFMessage(transforms=[identity]))
 
-    def tell(self, stamp: tuple[int, int], motion: Motion) -> None:
+    def publish(self, stamp: tuple[int, int], motion: Motion) -> None:
         """Publish the transform of the base at a time (seconds, nanoseconds), at most ten times a second."""
         now = time.monotonic()
-        if now - self._told_at < _PERIOD_S:
+        if now - self._published_at < _PERIOD_S:
             return
-        self._told_at = now
+        self._published_at = now
         base = self._base
         base.header.stamp.sec, base.header.stamp.nanosec = stamp
         base.transform.translation.x, base.transform.translation.y = motion.x, motion.y

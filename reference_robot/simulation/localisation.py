@@ -22,8 +22,8 @@ class Localisation:
 
     def __init__(self, node: Node, names: RosNames) -> None:
         self.on_update: Callable[[], None] | None = None
-        self._octets = b""
-        node.create_subscription(Odometry, names.topics.odom, self._take, 1, raw=True)
+        self._serialized = b""
+        node.create_subscription(Odometry, names.topics.odom, self._receive, 1, raw=True)
 
     def pose(self) -> Pose:
         """Return the robot's x, y (m) and yaw (rad).
@@ -31,12 +31,12 @@ class Localisation:
         Raises:
             PoseError: No odometry has been received yet.
         """
-        if not self._octets:
+        if not self._serialized:
             raise PoseError("the robot has not received its first odometry yet")
-        pose = deserialize_message(self._octets, Odometry).pose.pose
+        pose = deserialize_message(self._serialized, Odometry).pose.pose
         return pose.position.x, pose.position.y, yaw_of(pose.orientation)
 
-    def _take(self, octets: bytes) -> None:
-        self._octets = octets
+    def _receive(self, serialized: bytes) -> None:
+        self._serialized = serialized
         if self.on_update is not None:
             self.on_update()

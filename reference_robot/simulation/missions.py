@@ -47,11 +47,11 @@ class Mission:
 
     def stops(self) -> tuple[tuple[float, float], ...]:
         """Return the (x, y) positions that the robot drives to, in order: source, destination, depot."""
-        asked = self.request
+        request = self.request
         return (
-            (asked.source_x, asked.source_y),
-            (asked.destination_x, asked.destination_y),
-            (asked.depot_x, asked.depot_y),
+            (request.source_x, request.source_y),
+            (request.destination_x, request.destination_y),
+            (request.depot_x, request.depot_y),
         )
 
     def plain(self) -> dict[str, Any]:

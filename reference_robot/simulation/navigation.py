@@ -81,7 +81,7 @@ class Navigation:
         self._velocities = node.create_publisher(velocity, names.topics.cmd_vel, 1)
         self._current_goals = node.create_publisher(String, names.topics.current_goal, LATCHED)
         self._rejections = node.create_publisher(String, names.topics.last_rejection, LATCHED)
-        self._tell_current_goal()
+        self._publish_current_goal()
         localisation.on_update = self._step
         self._action = _DeferringActionServer(
             node,
@@ -101,8 +101,8 @@ class Navigation:
         except (PlanError, PoseError) as error:
             self._node.get_logger().info(f"refused a goal: {error}", throttle_duration_sec=1.0)
             # Published before the refusal is sent, so that the client can look up the reason.
-            told = {"pose": plain(goal.pose), "reason": str(error)}
-            self._rejections.publish(String(data=json.dumps(told)))
+            rejection = {"pose": plain(goal.pose), "reason": str(error)}
+            self._rejections.publish(String(data=json.dumps(rejection)))
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT
 
@@ -114,7 +114,7 @@ class Navigation:
             displaced.handle.abort()
             self._action.finish(displaced.handle, NavigateToPose.Result(error_msg="preempted by a newer goal"))
         handle.execute()
-        self._tell_current_goal()
+        self._publish_current_goal()
 
     def _step(self) -> None:
         """Execute one control step for the active goal; runs after each odometry message."""
@@ -124,7 +124,7 @@ class Navigation:
         if drive.handle.is_cancel_requested:
             if not drive.canceling:
                 drive.canceling = True
-                self._tell_current_goal()
+                self._publish_current_goal()
             self._end(drive, drive.handle.canceled)
             return
         pose = self._localisation.pose()
@@ -139,14 +139,14 @@ class Navigation:
         self._command(command.linear, command.angular)
         if now - drive.reported >= _FEEDBACK_PERIOD_S:
             drive.reported = now
-            self._tell_progress(drive, pose, command, now)
+            self._publish_feedback(drive, pose, command, now)
 
     def _end(self, drive: _Drive, transition: Callable[[], None], error: int = 0, message: str = "") -> None:
         self._drive = None
         self._command(0.0, 0.0)
         transition()
         self._action.finish(drive.handle, NavigateToPose.Result(error_code=error, error_msg=message))
-        self._tell_current_goal()
+        self._publish_current_goal()
 
     def _command(self, linear: float, angular: float) -> None:
         twist = Twist()
@@ -156,7 +156,7 @@ class Navigation:
         else:
             self._velocities.publish(twist)
 
-    def _tell_progress(self, drive: _Drive, pose: Pose, command: Command, now: float) -> None:
+    def _publish_feedback(self, drive: _Drive, pose: Pose, command: Command, now: float) -> None:
         feedback = NavigateToPose.Feedback(
             current_pose=stamped_pose(pose, self._header(self._names.frames.map)),
             navigation_time=Duration(seconds=now - drive.began).to_msg(),
@@ -165,7 +165,7 @@ class Navigation:
         )
         drive.handle.publish_feedback(feedback)
 
-    def _tell_current_goal(self) -> None:
+    def _publish_current_goal(self) -> None:
         drive, text = self._drive, ""
         if drive is not None:
             status = GoalStatus.STATUS_CANCELING if drive.canceling else GoalStatus.STATUS_EXECUTING

@@ -22,21 +22,21 @@ _TWIST: Final = "6d"  # x, y, z; x, y, z
 _COVARIANCE: Final = 36 * 8  # bytes
 
 
-class OdometryOctets:
+class SerializedOdometry:
     """A serialized nav_msgs/Odometry, made from ``message``, whose stamp, pose and velocity can be replaced."""
 
     def __init__(self, message: Odometry) -> None:
-        self._octets = bytearray(serialize_message(message))
-        order = "<" if self._octets[1] & _LITTLE_ENDIAN else ">"
+        self._data = bytearray(serialize_message(message))
+        order = "<" if self._data[1] & _LITTLE_ENDIAN else ">"
         self._stamp, self._pose, self._twist = (struct.Struct(order + form) for form in ("iI", _POSE, _TWIST))
-        self._twist_at = len(self._octets) - _COVARIANCE - self._twist.size
+        self._twist_at = len(self._data) - _COVARIANCE - self._twist.size
         self._pose_at = self._twist_at - _COVARIANCE - self._pose.size
 
     def filled(self, stamp: tuple[int, int], motion: Motion) -> bytes:
         """Return the serialized message with a stamp (seconds, nanoseconds) and a motion filled in."""
-        octets, half = self._octets, motion.yaw / 2
-        self._stamp.pack_into(octets, _STAMP_AT, *stamp)
+        data, half = self._data, motion.yaw / 2
+        self._stamp.pack_into(data, _STAMP_AT, *stamp)
         turn = (0.0, 0.0, math.sin(half), math.cos(half))
-        self._pose.pack_into(octets, self._pose_at, motion.x, motion.y, 0.0, *turn)
-        self._twist.pack_into(octets, self._twist_at, motion.linear, 0.0, 0.0, 0.0, 0.0, motion.angular)
-        return bytes(octets)
+        self._pose.pack_into(data, self._pose_at, motion.x, motion.y, 0.0, *turn)
+        self._twist.pack_into(data, self._twist_at, motion.linear, 0.0, 0.0, 0.0, 0.0, motion.angular)
+        return bytes(data)

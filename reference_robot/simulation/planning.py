@@ -50,7 +50,7 @@ class Planning:
         return response
 
     def _compute_path(self, handle: Any) -> ComputePathToPose.Result:
-        asked = time.monotonic()
+        began = time.monotonic()
         request, result = handle.request, ComputePathToPose.Result()
         try:
             start = self._start(request.start if request.use_start else None)
@@ -59,7 +59,7 @@ class Planning:
             result.error_code, result.error_msg = int(error.failure), str(error)
         except PoseError as error:
             result.error_code, result.error_msg = ComputePathToPose.Result.TF_ERROR, str(error)
-        result.planning_time = Duration(seconds=time.monotonic() - asked).to_msg()
+        result.planning_time = Duration(seconds=time.monotonic() - began).to_msg()
         if result.error_code == ComputePathToPose.Result.NONE:
             handle.succeed()
         else:

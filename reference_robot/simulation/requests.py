@@ -15,7 +15,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.names import RosNames
-from reference_robot.ros import RosRuntime, taken
+from reference_robot.ros import RosRuntime, waiting_messages
 
 # No request is lost: unread messages are kept, and a publisher with KEEP_ALL waits when the queue is full.
 _QOS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
@@ -34,10 +34,10 @@ class DeliveryRequests:
             DeliveryRequestMsg, names.topics.delivery, lambda _: None, _QOS, raw=True
         )
 
-    def tell(self, node: Node, callback: Callable[[], None]) -> None:
+    def watch(self, node: Node, callback: Callable[[], None]) -> None:
         """Call ``callback`` in a node's thread whenever requests are waiting to be read."""
         self._ros.watch(self._subscription, node, callback, _PAUSE_S)
 
-    def taken(self) -> Iterator[DeliveryRequest]:
+    def waiting(self) -> Iterator[DeliveryRequest]:
         """Yield the waiting requests, oldest first, and remove them from the subscription's queue."""
-        return map(DeliveryRequest.of, islice(taken(self._subscription), _MOST))
+        return map(DeliveryRequest.of, islice(waiting_messages(self._subscription), _MOST))

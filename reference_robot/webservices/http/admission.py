@@ -35,7 +35,7 @@ class Admission:
         if not self._allows(request.authority):
             host = request.authority.decode("latin-1")[:_SHOWN]
             raise Problem(421, f"this robot is not {host!a}; to allow another NAME, start it with --allowed-host NAME")
-        if self._authorization.is_asked_for:
+        if self._authorization.is_required:
             self._authorization.check(request.headers, needed(request))
         if b"origin" in request.headers and request.method not in SAFE:
             self._require_own_origin(request)
@@ -47,7 +47,7 @@ class Admission:
         also stops browsers or intermediaries that omit the preflight.
         """
         origin = request.headers[b"origin"]
-        asked_by = origin.partition(b"://")[2].lower()  # empty if the origin is null
-        if not (asked_by and asked_by == request.authority.lower()) and origin not in self._origins:
+        page_host = origin.partition(b"://")[2].lower()  # empty if the origin is null
+        if not (page_host and page_host == request.authority.lower()) and origin not in self._origins:
             page = origin.decode("latin-1")[:_SHOWN]
             raise Problem(403, f"a page of {page!a} may not command this robot; --public-url sets the robot's origin")

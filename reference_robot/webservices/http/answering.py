@@ -22,7 +22,7 @@ from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.http.port import Port
 from reference_robot.webservices.http.reading import full
 
-FIELD_OCTETS: Final = 200  # bytes of memory per field besides its text: two Python objects and their references
+FIELD_BYTES: Final = 200  # bytes of memory per field besides its text: two Python objects and their references
 NEVER: Final = math.inf
 
 _LINGER: Final = 2.0  # seconds for which data from a refused client is read and dropped
@@ -218,13 +218,13 @@ class AnsweringConnection(asyncio.Protocol, ABC):
             self.due = NEVER
             self._transport.pause_reading()
 
-    def _hold(self, octets: int) -> None:
-        self._held += octets
-        self._port.held.octets += octets
+    def _hold(self, size: int) -> None:
+        self._held += size
+        self._port.held.size += size
 
 
 def _weight(request: Request) -> int:
     """Return the memory that a request occupies, in bytes."""
     fields = request.headers.items()
-    head = sum(FIELD_OCTETS + len(name) + len(value) for name, value in fields)
+    head = sum(FIELD_BYTES + len(name) + len(value) for name, value in fields)
     return len(request.path) + len(request.query) + head + len(request.body)

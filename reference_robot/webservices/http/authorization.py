@@ -36,11 +36,11 @@ class Authorization:
     """The check of bearer tokens; without tokens every request is allowed.
 
     Attributes:
-        is_asked_for: Whether a token is required.
+        is_required: Whether a token is required.
     """
 
     def __init__(self, tokens: Mapping[str, frozenset[Scope]] | None) -> None:
-        self.is_asked_for = tokens is not None
+        self.is_required = tokens is not None
         self._tokens = [(token.encode(), scopes) for token, scopes in (tokens or {}).items()]
 
     def check(self, headers: dict[bytes, bytes], scope: Scope | None) -> None:

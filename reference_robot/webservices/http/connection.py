@@ -18,7 +18,7 @@ from typing import Final, cast
 
 from httptools import HttpParserCallbackError, HttpParserError, HttpRequestParser
 
-from reference_robot.webservices.http.answering import FIELD_OCTETS, AnsweringConnection
+from reference_robot.webservices.http.answering import FIELD_BYTES, AnsweringConnection
 from reference_robot.webservices.http.interface import described
 from reference_robot.webservices.http.messages import BODY_LIMIT, Field, Request
 from reference_robot.webservices.http.port import Port
@@ -51,7 +51,7 @@ class HttpConnection(AnsweringConnection):
         self._is_proxied = False  # the peer is a trusted proxy
         # The request that is being received
         self._in_head = True
-        self._head_octets = 0
+        self._head_size = 0
         self._target = b""
         self._fields: list[Field] = []
         self._request: Request | None = None
@@ -78,7 +78,7 @@ class HttpConnection(AnsweringConnection):
         if self._in_head:
             if not self._has_begun:
                 data = readable(data)
-            self._head_octets += len(data)
+            self._head_size += len(data)
         try:
             self._parser.feed_data(data)
         except HttpParserCallbackError as error:
@@ -112,7 +112,7 @@ class HttpConnection(AnsweringConnection):
     def on_headers_complete(self) -> None:
         """Refuse a request with an invalid head; otherwise send 100 Continue if the client waits for that status."""
         fields = self._fields
-        if self._head_octets > HEAD_LIMIT and sum(len(name) + len(value) for name, value in fields) > HEAD_LIMIT:
+        if self._head_size > HEAD_LIMIT and sum(len(name) + len(value) for name, value in fields) > HEAD_LIMIT:
             raise head_too_large()
         self._in_head = False
         headers, parser = dict(fields), self._parser
@@ -160,7 +160,7 @@ class HttpConnection(AnsweringConnection):
         request, refused = self._request, self._is_refused
         self._has_begun = self._is_refused = False
         self._in_head = True
-        self._head_octets = 0
+        self._head_size = 0
         self._target = b""
         self._fields = []
         self._request = None
@@ -208,12 +208,12 @@ class HttpConnection(AnsweringConnection):
     def _hold_arriving(self) -> None:
         """Count the memory of the incomplete request; refuse the request if its head is too large or memory is full."""
         if self._in_head:
-            if not self._head_octets:  # the head began in the middle of a segment
-                self._head_octets = len(self._target) + sum(len(name) + len(value) for name, value in self._fields)
-            if self._head_octets > HEAD_LIMIT:
+            if not self._head_size:  # the head began in the middle of a segment
+                self._head_size = len(self._target) + sum(len(name) + len(value) for name, value in self._fields)
+            if self._head_size > HEAD_LIMIT:
                 self._refuse(head_too_large())
                 return
-        weight = self._head_octets + FIELD_OCTETS * len(self._fields) + len(self._content)
+        weight = self._head_size + FIELD_BYTES * len(self._fields) + len(self._content)
         self._hold(weight - self._arriving)
         self._arriving = weight
         if self._in_head and self._port.is_full():

@@ -38,12 +38,12 @@ class AllowedHosts:
     def _allows(self, authority: bytes) -> bool:
         if self._is_open or not authority:  # HTTP/1.0 has no Host field; browsers do not use HTTP/1.0
             return True
-        told = AUTHORITY.fullmatch(authority.decode("latin-1"))
-        if told is None:
+        parts = AUTHORITY.fullmatch(authority.decode("latin-1"))
+        if parts is None:
             return False
-        if told["ipv6"] is not None or _is_address(told["name"]):
+        if parts["ipv6"] is not None or _is_address(parts["name"]):
             return True
-        name = told["name"].lower().rstrip(".")
+        name = parts["name"].lower().rstrip(".")
         return name == _LOCALHOST or name in self._names or name.endswith(self._endings)
 
 

@@ -57,7 +57,7 @@ class Listening:
 
 def require_guarded(host: str, authorization: Authorization) -> None:
     """Raise the ListeningError if other machines could command the robot without a token."""
-    if not authorization.is_asked_for and not is_loopback(host):
+    if not authorization.is_required and not is_loopback(host):
         raise ListeningError(
             f"--host {host} would let everybody on its network drive this robot without a token: "
             "give --token-file FILE, or --insecure to allow that"

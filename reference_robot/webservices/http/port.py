@@ -46,11 +46,11 @@ class Held:
     """The memory kept for clients: incomplete requests, waiting requests, and responses that a client does not read.
 
     Attributes:
-        octets: Bytes kept for all connections of the ports that share this object.
+        size: Bytes kept for all connections of the ports that share this object.
     """
 
     def __init__(self) -> None:
-        self.octets = 0
+        self.size = 0
 
 
 class Port:
@@ -101,7 +101,7 @@ class Port:
 
     def is_full(self) -> bool:
         """Return whether more memory is kept for clients than the limit."""
-        return self.held.octets > self._limits.held
+        return self.held.size > self._limits.held
 
     def tick(self) -> None:
         """Update the Date field, and end all connections whose time is over; called every half second."""

@@ -43,7 +43,7 @@ class RobotPublishersNode:
         # rclpy's Publisher does the same, but takes 0.4 µs more per call to guard against its own destruction. This
         # publisher is destroyed only after all serving has ended.
         self._count_readers = self._delivery.handle.get_subscription_count
-        self._publish_octets = self._delivery.handle.publish_raw
+        self._publish_serialized = self._delivery.handle.publish_raw
         self._behind_until = 0.0
         self._velocity: dict[str, Any] = {}
         self._navigation = ActionClient(self.node, NavigateToPose, names.actions.navigate_to_pose)
@@ -63,7 +63,7 @@ class RobotPublishersNode:
         if now < self._behind_until:
             return False
         try:
-            self._publish_octets(request.octets())
+            self._publish_serialized(request.serialized())
         except rclpy_c.RCLError:
             self._behind_until = now + _RECOVERY
             return False

@@ -57,15 +57,15 @@ class RobotSubscribersNode:
         self.node.create_subscription(
             String, topics.missions, lambda report: self.mission_reports.append(report.data), _MISSIONS_QOS
         )
-        for told in ("current_goal", "last_rejection"):
-            keep = partial(self._keep_text, told)
-            self.node.create_subscription(String, getattr(topics, told), keep, _LATCHED_QOS)
+        for name in ("current_goal", "last_rejection"):
+            keep = partial(self._keep_text, name)
+            self.node.create_subscription(String, getattr(topics, name), keep, _LATCHED_QOS)
         self._planner_service = self.node.create_client(GetPlan, names.services.get_plan)
         self._planner_action = ActionClient(self.node, ComputePathToPose, names.actions.compute_path_to_pose)
 
-    def _keep_odometry(self, octets: bytes) -> None:
-        self.on_odometry(octets)
-        self.odometry = octets, monotonic()
+    def _keep_odometry(self, serialized: bytes) -> None:
+        self.on_odometry(serialized)
+        self.odometry = serialized, monotonic()
 
     def _keep_text(self, attribute: str, message: String) -> None:
         setattr(self, attribute, message.data)

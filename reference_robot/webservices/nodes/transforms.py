@@ -29,11 +29,11 @@ class MapTransform:
         self._parent = names.frames.map
         self._child = names.frames.odom
         self._mark = self._parent.encode() + b"\0"  # CDR strings end with a zero byte
-        node.create_subscription(TFMessage, names.topics.tf, self._take, _MOVING, raw=True)
-        node.create_subscription(TFMessage, names.topics.tf_static, self._take, _STATIC, raw=True)
+        node.create_subscription(TFMessage, names.topics.tf, self._receive, _MOVING, raw=True)
+        node.create_subscription(TFMessage, names.topics.tf_static, self._receive, _STATIC, raw=True)
 
-    def _take(self, octets: bytes) -> None:
-        if self._mark in octets:
-            for stamped in deserialize_message(octets, TFMessage).transforms:
+    def _receive(self, serialized: bytes) -> None:
+        if self._mark in serialized:
+            for stamped in deserialize_message(serialized, TFMessage).transforms:
                 if (stamped.header.frame_id, stamped.child_frame_id) == (self._parent, self._child):
                     self.latest = stamped.transform

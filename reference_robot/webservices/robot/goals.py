@@ -22,7 +22,7 @@ from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import message_from
 from reference_robot.webservices.representation.problems import Problem, not_yet
 from reference_robot.webservices.representation.shapes import Record, Text, shape_of
-from reference_robot.webservices.robot.reported_goals import STATUS_TEXTS, told_goal, untold_goal
+from reference_robot.webservices.robot.reported_goals import STATUS_TEXTS, goal_from_report, goal_from_status
 from reference_robot.webservices.robot.target_poses import require_pose
 
 _GOAL_ID: Final = Record("GoalID", (("stamp", shape_of(Time)), ("id", Text(1, 255))), optional=frozenset({"stamp"}))
@@ -170,13 +170,13 @@ class Goals:
         """Return the active goal that another client or a mission of the robot has sent, or None."""
         if not self._publishers.navigation_is_served():
             return None
-        told = self._subscribers.current_goal
-        if told == "":
+        report = self._subscribers.current_goal
+        if report == "":
             return None  # the robot reports that it follows no goal
-        goal = told_goal(told) if told else None
+        goal = goal_from_report(report) if report else None
         if goal is None:
             unknown = [goal for goal in self._subscribers.goals.active() if goal.identity not in self._known]
-            goal = untold_goal(unknown[-1]) if unknown else None
+            goal = goal_from_status(unknown[-1]) if unknown else None
         return None if goal is None or goal["goal_id"]["id"] in self._known else goal
 
     def _filled_in(self, wanted: dict[str, Any]) -> dict[str, Any]:
@@ -232,9 +232,9 @@ class Goals:
         """Return why the robot refused a goal; the reference robot publishes the reason on a topic, Nav2 does not."""
         for _ in range(round(_REASON_COMES_WITHIN / _REASON_STEP)):
             try:
-                told = json.loads(self._subscribers.last_rejection or "{}")
-                if told.get("pose") == target:
-                    return str(told["reason"])
+                rejection = json.loads(self._subscribers.last_rejection or "{}")
+                if rejection.get("pose") == target:
+                    return str(rejection["reason"])
             except (ValueError, KeyError, AttributeError):
                 break
             await asyncio.sleep(_REASON_STEP)

@@ -16,7 +16,7 @@ class _Time(msgspec.Struct):
     nanosec: int
 
 
-class _Told(msgspec.Struct):
+class _ReportedMission(msgspec.Struct):
     """A mission in a report of the delivery application (see ``names.toml``)."""
 
     number: int
@@ -27,7 +27,7 @@ class _Told(msgspec.Struct):
 
 
 class _Report(msgspec.Struct):
-    missions: list[_Told]
+    missions: list[_ReportedMission]
 
 
 # msgspec reads a report of a hundred missions in 0.1 ms, json and checks in Python in 0.3 ms; other requests wait.
@@ -52,7 +52,7 @@ class MissionTable:
     def note(self, report: str) -> None:
         """Add the missions of a report (JSON, see ``names.toml``); an invalid report is ignored."""
         try:
-            found = [_mission(told) for told in _REPORT.decode(report).missions]
+            found = [_mission(entry) for entry in _REPORT.decode(report).missions]
         except (msgspec.DecodeError, TypeError):
             return
         for key, mission in reversed(found):  # a report lists the newest first
@@ -80,8 +80,8 @@ class MissionTable:
         return find
 
 
-def _mission(told: _Told) -> tuple[tuple[int, int], Mission]:
+def _mission(entry: _ReportedMission) -> tuple[tuple[int, int], Mission]:
     """Return a reported mission with its sort key (time, number); raise TypeError for an invalid request."""
-    nanoseconds = told.accepted.sec * _NANOSECONDS + told.accepted.nanosec
-    mission = Mission(DeliveryRequest(**told.request), nanoseconds, told.state, told.reason)  # type: ignore[arg-type]
-    return (nanoseconds, told.number), mission
+    nanoseconds = entry.accepted.sec * _NANOSECONDS + entry.accepted.nanosec
+    mission = Mission(DeliveryRequest(**entry.request), nanoseconds, entry.state, entry.reason)  # type: ignore[arg-type]
+    return (nanoseconds, entry.number), mission

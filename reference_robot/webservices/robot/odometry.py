@@ -23,7 +23,7 @@ OLDEST: Final = 1.0  # seconds; older odometry counts as missing (contract, REST
 T = TypeVar("T")
 Writer = Callable[[dict[str, Any]], Any]  # of a plain nav_msgs/Odometry
 
-_NOBODY: Final[frozenset[Writer]] = frozenset()
+_NO_WRITERS: Final[frozenset[Writer]] = frozenset()
 
 
 class LatestOdometry:
@@ -32,9 +32,9 @@ class LatestOdometry:
     def __init__(self, subscribers: RobotSubscribersNode) -> None:
         self._subscribers = subscribers
         self._read = reader_of(Odometry)
-        self._came = 0  # messages so far
-        self._told = _Told(0, b"", None, _NOBODY)
-        subscribers.on_odometry = self._foresee
+        self._count = 0  # messages so far
+        self._converted = _Converted(0, b"", None, _NO_WRITERS)
+        subscribers.on_odometry = self._convert_ahead
 
     def message(self) -> Odometry:
         """Return the latest odometry message.
@@ -49,8 +49,8 @@ class LatestOdometry:
 
     def age(self) -> float | None:
         """Return how many seconds ago the latest message arrived; None before the first."""
-        octets, received = self._subscribers.odometry
-        return None if octets is None else monotonic() - received
+        serialized, received = self._subscribers.odometry
+        return None if serialized is None else monotonic() - received
 
     def written(self, writer: Callable[[dict[str, Any]], T]) -> T:
         """Return the result of a writer for the latest message; each writer is called at most once per message.
@@ -58,54 +58,54 @@ class LatestOdometry:
         Raises:
             Problem: 503 as ``message``, and for a value that is not finite.
         """
-        told = self._latest()
-        told.asked.add(writer)
-        if writer not in told.written:
-            told.written[writer] = writer(self._read(told.message))
-        return cast("T", told.written[writer])
+        converted = self._latest()
+        converted.writers.add(writer)
+        if writer not in converted.written:
+            converted.written[writer] = writer(self._read(converted.message))
+        return cast("T", converted.written[writer])
 
-    def _latest(self) -> _Told:
-        octets, received = self._subscribers.odometry
-        if octets is None:
+    def _latest(self) -> _Converted:
+        serialized, received = self._subscribers.odometry
+        if serialized is None:
             raise not_yet("the robot has not published its odometry yet")
         age = monotonic() - received
         if age > OLDEST:
             raise not_yet(f"the robot's last odometry is {age:.1f} s old: the robot's pose is unknown")
-        told = self._told
-        if octets is not told.octets:
-            told = self._told = self._successor(octets, told)
-        return told
+        converted = self._converted
+        if serialized is not converted.serialized:
+            converted = self._converted = self._successor(serialized, converted)
+        return converted
 
-    def _foresee(self, octets: bytes) -> None:
+    def _convert_ahead(self, serialized: bytes) -> None:
         """Convert a message that has just arrived, if clients requested the last two; runs in the ROS thread.
 
         The event loop's thread may do the same conversion at the same time; then one of the two results is unused.
         """
-        self._came += 1
-        last = self._told
-        wanted = last.asked & last.asked_before
+        self._count += 1
+        last = self._converted
+        wanted = last.writers & last.earlier_writers
         if not wanted:
             return
-        told = self._successor(octets, last)
+        converted = self._successor(serialized, last)
         try:
-            plain = self._read(told.message)
-            told.written = {writer: writer(plain) for writer in wanted}
+            plain = self._read(converted.message)
+            converted.written = {writer: writer(plain) for writer in wanted}
         except Problem:
             return  # a request for the message gets the problem
-        self._told = told
+        self._converted = converted
 
-    def _successor(self, octets: bytes, last: _Told) -> _Told:
-        asked_before = frozenset(last.asked) if self._came == last.number + 1 else _NOBODY
-        return _Told(self._came, octets, deserialize_message(octets, Odometry), asked_before)
+    def _successor(self, serialized: bytes, last: _Converted) -> _Converted:
+        earlier_writers = frozenset(last.writers) if self._count == last.number + 1 else _NO_WRITERS
+        return _Converted(self._count, serialized, deserialize_message(serialized, Odometry), earlier_writers)
 
 
-class _Told:
+class _Converted:
     """An odometry message, its representations so far, and the writers used for it and for its predecessor."""
 
-    def __init__(self, number: int, octets: bytes, message: Any, asked_before: frozenset[Writer]) -> None:
+    def __init__(self, number: int, serialized: bytes, message: Any, earlier_writers: frozenset[Writer]) -> None:
         self.number = number
-        self.octets = octets
+        self.serialized = serialized
         self.message = message
         self.written: dict[Writer, Any] = {}
-        self.asked: set[Writer] = set()
-        self.asked_before = asked_before
+        self.writers: set[Writer] = set()
+        self.earlier_writers = earlier_writers

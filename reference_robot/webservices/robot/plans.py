@@ -93,15 +93,15 @@ class Planner:
             raise Problem(422, f"the robot plans in frame {plain['header']['frame_id']}, not {query.frame_id}")
         return {"plan": plain}
 
-    def _planning_frame(self, asked: str) -> tuple[str, _Move, _Move]:
+    def _planning_frame(self, requested: str) -> tuple[str, _Move, _Move]:
         """Return the frame to plan in, and the functions that transform a pose into it and back.
 
         Planners work in the map frame. If the transform from the map to the requested frame is unknown, the requested
         frame is used.
         """
         transform = self._subscribers.map_transform.latest
-        if transform is None or asked == self._frames.map:
-            return asked, _as_it_is, _as_it_is
+        if transform is None or requested == self._frames.map:
+            return requested, _as_it_is, _as_it_is
         return self._frames.map, partial(moved, transform), partial(moved, inverse(transform))
 
     async def _by_action(self, start: PoseStamped | None, goal: PoseStamped) -> Path:

@@ -19,15 +19,15 @@ STATUS_TEXTS: Final = {
 _ORIGIN: Final = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
 
 
-def told_goal(report: str) -> dict[str, Any] | None:
+def goal_from_report(report: str) -> dict[str, Any] | None:
     """Return the goal in a report of the robot (``current_goal`` in ``names.toml``); None for an invalid report."""
     try:
-        told = json.loads(report)
-        code, pose = int(told["status"]), told["pose"]
+        fields = json.loads(report)
+        code, pose = int(fields["status"]), fields["pose"]
         header = {"stamp": pose["header"]["stamp"], "frame_id": pose["header"]["frame_id"]}
         return {
             "header": header,
-            "goal_id": {"stamp": header["stamp"], "id": str(told["goal_id"])},
+            "goal_id": {"stamp": header["stamp"], "id": str(fields["goal_id"])},
             "goal": {"target_pose": reader_of(PoseStamped)(message_from(shape_of(PoseStamped), pose))},
             "status": {"code": code, "text": STATUS_TEXTS[code]},
         }
@@ -35,7 +35,7 @@ def told_goal(report: str) -> dict[str, Any] | None:
         return None
 
 
-def untold_goal(goal: ReportedGoal) -> dict[str, Any]:
+def goal_from_status(goal: ReportedGoal) -> dict[str, Any]:
     """Return an active goal whose target pose is unknown, because only the action's status reports the goal.
 
     The representation requires a pose. It is the origin in an empty ``frame_id``, so that no client takes it for a real

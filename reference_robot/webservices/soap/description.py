@@ -10,7 +10,7 @@ from reference_robot.webservices.soap.faults import client_fault
 
 _WSDL_SOAP: Final = "{http://schemas.xmlsoap.org/wsdl/soap/}"
 _XSD: Final = "{http://www.w3.org/2001/XMLSchema}"
-_ERRORS_TOLD: Final = 3
+_ERRORS_SHOWN: Final = 3
 
 
 class ServiceDescription:
@@ -37,5 +37,5 @@ class ServiceDescription:
         if not self._schema.validate(element):
             # libxml2's texts quote only names and values of the message, nothing internal to the robot.
             log: Any = self._schema.error_log
-            told = "; ".join(entry.message for entry in log[:_ERRORS_TOLD])
-            raise client_fault(f"{shown(element.tag)} is not valid by the XSD: {told}")
+            errors = "; ".join(entry.message for entry in log[:_ERRORS_SHOWN])
+            raise client_fault(f"{shown(element.tag)} is not valid by the XSD: {errors}")

@@ -50,7 +50,7 @@ class SoapInterface(Interface):
         raise Problem(405, f"the method is not one of {allow[1].decode()}; send messages by POST", (allow,))
 
     def _description(self, service: SoapService, request: Request) -> bytes | None:
-        asked = request.query.lower()
-        if asked in {b"wsdl", b"wsdl=1"}:
+        query = request.query.lower()
+        if query in {b"wsdl", b"wsdl=1"}:
             return service.description.wsdl(self._address(request))
-        return service.description.xsd if asked == b"xsd=1" else None
+        return service.description.xsd if query == b"xsd=1" else None

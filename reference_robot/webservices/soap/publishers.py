@@ -53,7 +53,7 @@ class PublishersWebService(SoapService):
 
 def _request(sent: list[str], code: int | None) -> DeliveryRequest:
     try:
-        asked = int(sent[_CODE])
+        number = int(sent[_CODE])
     except ValueError as error:  # thousands of leading zeros: valid, but too long for Python's int
         raise UnusableFieldError("message_code", "must be an integer with fewer digits") from error
-    return DeliveryRequest(asked if code is None else code, *map(float, sent[:_CODE]), *map(float, sent[_CODE + 1 :]))
+    return DeliveryRequest(number if code is None else code, *map(float, sent[:_CODE]), *map(float, sent[_CODE + 1 :]))

@@ -40,7 +40,7 @@ class SubscribersWebService(SoapService):
             "GetGoal": lambda: [goal] if (goal := goals.current()) else [],
         }
         operations: dict[str, Operation] = {
-            name: partial(self._tell, name, values) for name, values in returned.items()
+            name: partial(self._return_values, name, values) for name, values in returned.items()
         }
         operations |= {"GetPose": self._get_pose, "GetPlan": self._get_plan}
         super().__init__("subscribers", PATH, operations)
@@ -48,7 +48,7 @@ class SubscribersWebService(SoapService):
         self._write_pose = lambda pose: self.response("GetPose", [pose])
         self._planner = planner
 
-    def _tell(self, operation: str, values: Callable[[], list[Any]], _wrapper: etree._Element) -> Response:
+    def _return_values(self, operation: str, values: Callable[[], list[Any]], _wrapper: etree._Element) -> Response:
         return self.response(operation, values())
 
     def _get_pose(self, _wrapper: etree._Element) -> Response:
