@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 from conformance.commandline.exit_codes import ExitCode
+from conformance.selftest.robots import stopped
 
 _ROAAS = (sys.executable, "-m", "roaas")
 _START_S = 60
-_STOP_S = 10
 # One operation, and the client that needs the least processor time. So robot and load generator do not overload a
 # shared machine, and the difference is significant after half a minute.
 _MEASURED = ("--operation", "delivery", "--client", "wire", "--rate", "200", "--warmup", "1")
@@ -58,24 +58,17 @@ def _robot(domain: int) -> Iterator[tuple[str, str]]:
     """Run the reference robot on free ports; yield the REST base URL and the WSDL URL of the publishers' service."""
     command = [*_ROAAS, "robot", "--rest-port", "0", "--soap-port", "0", "--domain-id", str(domain)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)  # noqa: S603 - ours
-    # Kill a robot that never gets ready, so that the demo does not wait for ever.
-    watchdog = threading.Timer(_START_S, process.kill)
-    watchdog.start()
-    try:
+    with stopped(process):
+        # Kill a robot that never gets ready, so that the demo does not wait for ever.
+        watchdog = threading.Timer(_START_S, process.kill)
+        watchdog.daemon = True
+        watchdog.start()
         line = process.stdout.readline() if process.stdout else ""
+        watchdog.cancel()
         ready = re.match(r"ready rest=(\S+) soap=(\S+)", line)
         if ready is None:
             raise SystemExit(f"the robot did not get ready within {_START_S} s (it printed {line!r})")
-        watchdog.cancel()
         yield ready[1], ready[2]
-    finally:
-        watchdog.cancel()
-        process.terminate()
-        try:
-            process.wait(_STOP_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
 
 
 def _roaas(*arguments: str) -> int:
