@@ -101,15 +101,11 @@ class Delivery:
                 self._fail("the navigation is no longer running")
         self._begin()
 
-    def _is_busy(self) -> bool:
-        """Return whether the navigation follows another client's goal."""
-        return any(goal.identity not in self._own for goal in self._goals.active())
-
     def _begin(self) -> None:
         """Begin the next waiting mission, provided that the navigation is running and not busy."""
         self._begin_later.cancel()
-        if self._is_busy():
-            return
+        if any(goal.identity not in self._own for goal in self._goals.active()):
+            return  # the navigation follows another client's goal
         if not self._navigate.server_is_ready():
             self._begin_later.reset()
             return
