@@ -32,6 +32,7 @@ class RobotSubscribersNode:
     reads. Messages are interpreted when a request needs them.
 
     Attributes:
+        ros: The runtime of the node; while its threads hang, the stored messages are out of date.
         odometry: The last odometry, serialized (None before the first), and its time of arrival by ``time.monotonic``.
         on_odometry: Called with each serialized odometry message, in the executor's thread.
         mission_reports: Reports of changed missions as JSON (see ``names.toml``), oldest first; readers remove them.
@@ -43,7 +44,7 @@ class RobotSubscribersNode:
 
     def __init__(self, ros: RosRuntime, names: RosNames) -> None:
         self.node = ros.create_node("robot_subscribers")
-        self._ros = ros
+        self.ros = ros
         self._namespace = self.node.get_namespace().rstrip("/") + "/"  # a graph may contain several robots
         self.odometry: tuple[bytes | None, float] = (None, 0.0)
         self.on_odometry: Callable[[bytes], None] = lambda _: None
@@ -69,14 +70,6 @@ class RobotSubscribersNode:
 
     def _keep_text(self, attribute: str, message: String) -> None:
         setattr(self, attribute, message.data)
-
-    def silence(self) -> float:
-        """Return for how many seconds the ROS threads have been inactive; up to 0.5 s is normal."""
-        return self._ros.silence()
-
-    def hangs(self) -> bool:
-        """Return whether a ROS thread hangs, so that the stored messages are out of date."""
-        return self._ros.hangs()
 
     # The graph
 

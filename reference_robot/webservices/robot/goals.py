@@ -93,8 +93,9 @@ class Goals:
         Raises:
             Problem: 503 while the ROS thread hangs, because the robot's present state is unknown.
         """
-        if self._subscribers.hangs():
-            raise not_yet(f"ROS has been silent for {self._subscribers.silence():.1f} s: the goal is unknown")
+        ros = self._subscribers.ros
+        if ros.hangs():
+            raise not_yet(f"ROS has been silent for {ros.silence():.1f} s: the goal is unknown")
         own = self._active_own()
         if own is not None:
             return own.described | {"status": {"code": own.status, "text": STATUS_TEXTS[own.status]}}

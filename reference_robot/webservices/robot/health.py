@@ -27,7 +27,7 @@ class Health:
         delivery application are not required.
         """
         publishers, subscribers = self.publishers, self.subscribers
-        hangs = subscribers.hangs()
+        hangs = subscribers.ros.hangs()
         age = self.odometry.age()
         is_current = age is not None and age <= OLDEST
         # While a ROS thread hangs, no response would arrive.
@@ -40,7 +40,7 @@ class Health:
             planned_by = {"by": "action"} if subscribers.plan_action_is_served() else {}
         return {
             "healthy": is_current and not hangs,
-            "ros": {"available": not hangs, "silence": round(subscribers.silence(), 3)},
+            "ros": {"available": not hangs, "silence": round(subscribers.ros.silence(), 3)},
             "odometry": {"available": is_current} | ({} if age is None else {"age": round(age, 3)}),
             "velocity": {"available": publishers.find_velocity_subscribers()},
             "navigation": {"available": publishers.navigation_is_served(), "state": navigator},
