@@ -1,1 +1,1 @@
-"""What a mutant is made of: messages on the wire, and one change between a client and a good device."""
+"""Mutants: messages on the wire, and one change between a client and a good device."""

@@ -1,4 +1,4 @@
-"""What mutants are made of: conditions that choose exchanges, and edits of requests and responses."""
+"""Building blocks of mutants: conditions that choose requests and responses, and edits of them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SUCCESS, _REFUSED = range(200, 300), range(400, 500)
 
 
 def rest(method: str = "", *paths: str) -> Where:
-    """REST requests with one of these methods (any, when empty) to one of these paths (likewise)."""
+    """Return a condition for REST requests by method (several are separated by spaces; empty: any) and path."""
     methods = method.split()
 
     def where(request: Request) -> bool:
@@ -35,12 +35,12 @@ def rest(method: str = "", *paths: str) -> Where:
 
 
 def unwanted(where: Where) -> Where:
-    """Return a condition for those requests that accept only a media type that no device has."""
+    """Return a condition for requests of ``where`` that accept only images, which no device has."""
     return lambda request: where(request) and (request.field("Accept") or "").startswith("image/")
 
 
 def soap(*operations: str) -> Where:
-    """SOAP requests whose body speaks of one of these operations (of any, when there are none)."""
+    """Return a condition for SOAP requests that name one of the operations, or any without arguments."""
     names = "|".join(operations) or r"[\w.-]+"
     pattern = re.compile(rb"<(?:[\w.-]+:)?(?:%s)[\s/>]" % names.encode())
 
@@ -51,37 +51,37 @@ def soap(*operations: str) -> Where:
 
 
 def posted(request: Request) -> bool:
-    """SOAP requests, whatever is in them."""
+    """Return whether a request is a SOAP POST, whatever its body."""
     return request.side == "soap" and request.method == "POST"
 
 
 def wsdls(request: Request) -> bool:
-    """Requests for a WSDL, or for a document that it imports."""
+    """Return whether a request is for a WSDL or a document that it imports."""
     return request.side == "soap" and request.method in {"GET", "HEAD"} and bool(request.query)
 
 
 def success(response: Response) -> bool:
-    """Answers with 2xx."""
+    """Return whether the status is 2xx."""
     return response.status in _SUCCESS
 
 
 def status(*values: int) -> When:
-    """Answers with one of these."""
+    """Return a condition for responses with one of the statuses."""
     return lambda response: response.status in values
 
 
 def refusal(response: Response) -> bool:
-    """Answers with 4xx."""
+    """Return whether the status is 4xx."""
     return response.status in _REFUSED
 
 
 def anything(_answer: Response) -> bool:
-    """Every answer."""
+    """Return True for every response."""
     return True
 
 
 def altered(where: Where, edit: Callable[[Response], object], when: When = success, *, nth: int = 1) -> Make:
-    """Alter answers; with ``nth`` only each nth of those that it concerns."""
+    """Return a change that edits every nth response to ``where`` that fulfils ``when``."""
 
     def make() -> Change:
         seen = 0
@@ -102,7 +102,7 @@ def altered(where: Where, edit: Callable[[Response], object], when: When = succe
 
 
 def rewritten(where: Where, edit: Callable[[Request], object]) -> Make:
-    """Alter requests on their way to the robot."""
+    """Return a change that edits requests before they reach the device."""
 
     def make() -> Change:
         def change(request: Request, forward: Forward) -> Response:
@@ -117,7 +117,7 @@ def rewritten(where: Where, edit: Callable[[Request], object]) -> Make:
 
 
 def secretly(where: Where, edit: Callable[[Request], object]) -> Make:
-    """Alter requests on their way to the robot, and answer 204, so that no answer tells."""
+    """Return a change that edits requests and answers a success with 204, which does not show the edit."""
 
     def make() -> Change:
         def change(request: Request, forward: Forward) -> Response:
@@ -134,7 +134,7 @@ def secretly(where: Where, edit: Callable[[Request], object]) -> Make:
 
 
 def instead(where: Where, response: Callable[[Request], Response]) -> Make:
-    """Answer requests without asking the robot."""
+    """Return a change that answers requests without forwarding them to the device."""
 
     def make() -> Change:
         def change(request: Request, forward: Forward) -> Response:
@@ -146,7 +146,7 @@ def instead(where: Where, response: Callable[[Request], Response]) -> Make:
 
 
 def hanging_up(where: Where) -> Make:
-    """Close the connection in place of a response."""
+    """Return a change that closes the connection instead of responding."""
 
     def respond(_request: Request) -> Response:
         raise HangUpError
@@ -157,19 +157,19 @@ def hanging_up(where: Where) -> Make:
 def plain(
     status_: int, body: bytes = b"", media_type: str = "", *fields: tuple[str, str]
 ) -> Callable[[Request], Response]:
-    """An answer of one's own."""
+    """Return a maker of responses with this status, body, media type and headers."""
     said = [("Content-Type", media_type)] if media_type else []
     return lambda request: Response(status_, [*said, *fields], body, method=request.method)
 
 
 def problem(status_: int, detail: str, *fields: tuple[str, str]) -> Callable[[Request], Response]:
-    """A problem as RFC 9457 has it."""
+    """Return a maker of responses with problem details (RFC 9457)."""
     body = json.dumps({"status": status_, "detail": detail}).encode()
     return plain(status_, body, "application/problem+json", *fields)
 
 
 def page(status_: int, body: bytes = b"", media_type: str = "") -> Callable[[Response], object]:
-    """Another status and another body, of this media type (of none, when empty); the other fields stay."""
+    """Return an edit that replaces status, body and media type; an empty media type removes the header."""
 
     def edit(response: Response) -> None:
         response.status, response.reason, response.body = status_, "", body
@@ -179,7 +179,7 @@ def page(status_: int, body: bytes = b"", media_type: str = "") -> Callable[[Res
 
 
 def becomes(status_: int) -> Callable[[Response], object]:
-    """Another status, in the problem too."""
+    """Return an edit that replaces the status, in problem details too."""
 
     def edit(response: Response) -> None:
         response.status, response.reason = status_, ""
@@ -192,7 +192,7 @@ def becomes(status_: int) -> Callable[[Response], object]:
 
 
 def parsed(body: bytes) -> Any:
-    """JSON, or None."""
+    """Return the JSON value of a body, or None if it is not JSON."""
     try:
         return json.loads(body)
     except (ValueError, RecursionError):
@@ -200,7 +200,7 @@ def parsed(body: bytes) -> Any:
 
 
 def values(edit: Callable[[Any], Any]) -> Callable[[Response], object]:
-    """Alter the value of a JSON answer: ``edit`` changes it in place, or returns another one."""
+    """Return an edit of JSON responses: ``edit`` changes the value in place or returns another one."""
 
     def apply(response: Response) -> None:
         value = parsed(response.body)
@@ -212,7 +212,7 @@ def values(edit: Callable[[Any], Any]) -> Callable[[Response], object]:
 
 
 def inputs(edit: Callable[[Any], Any]) -> Callable[[Request], object]:
-    """Alter the value of a JSON request, as values() does."""
+    """Return an edit of JSON requests: ``edit`` changes the value in place or returns another one."""
 
     def apply(request: Request) -> None:
         value = parsed(request.body)
@@ -224,7 +224,7 @@ def inputs(edit: Callable[[Any], Any]) -> Callable[[Request], object]:
 
 
 def guarded(edit: Callable[[Any], object]) -> Callable[[Any], None]:
-    """An edit that leaves values of another shape than it expects as they are, to be refused."""
+    """Return an edit that leaves a value of unexpected shape unchanged, so that the device refuses it."""
 
     def apply(value: Any) -> None:
         with contextlib.suppress(TypeError, KeyError, AttributeError, ValueError, OverflowError):
@@ -234,7 +234,7 @@ def guarded(edit: Callable[[Any], object]) -> Callable[[Any], None]:
 
 
 def query(edit: Callable[[dict[str, str]], object]) -> Callable[[Request], object]:
-    """Alter the parameters of a request's query."""
+    """Return an edit of the parameters in a request's query."""
 
     def apply(request: Request) -> None:
         given = dict(parse_qsl(request.query, keep_blank_values=True))
@@ -245,7 +245,7 @@ def query(edit: Callable[[dict[str, str]], object]) -> Callable[[Request], objec
 
 
 def text(pattern: str, by: str, count: int = 0) -> Callable[[Response], object]:
-    """Replace a regular expression in an answer's body."""
+    """Return an edit that replaces a regular expression in a response's body, ``count`` times (0: everywhere)."""
     compiled = re.compile(pattern.encode(), re.DOTALL)
 
     def edit(response: Response) -> None:
@@ -255,5 +255,5 @@ def text(pattern: str, by: str, count: int = 0) -> Callable[[Response], object]:
 
 
 def header(name: str, value: str | None) -> Callable[[Response], object]:
-    """Set a header field, or remove it."""
+    """Return an edit that sets a header, or removes it if the value is None."""
     return lambda response: response.drop(name) if value is None else response.put(name, value)

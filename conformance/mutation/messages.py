@@ -1,4 +1,4 @@
-"""HTTP messages as values that a mutant can alter in any way, the octets that they become, and what a change is."""
+"""HTTP requests and responses as values that a mutant can change, and the protocol of a change."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ _NO_BODY = {204, 304}
 
 
 class _Message:
-    """What requests and responses share: header fields in their order."""
+    """The header fields, version and raw bytes that requests and responses share."""
 
     fields: list[tuple[str, str]]
     version: str
     raw: bytes | None
 
     def field(self, name: str) -> str | None:
-        """The first value of a field, whatever its case."""
+        """Return the first value of a header, or None; the name's case does not matter."""
         return next((value for key, value in self.fields if key.lower() == name.lower()), None)
 
     def drop(self, name: str) -> None:
-        """Remove a field."""
+        """Remove all headers of a name."""
         self.fields = [(key, value) for key, value in self.fields if key.lower() != name.lower()]
 
     def put(self, name: str, value: str) -> None:
-        """Set a field, once."""
+        """Set a header, replacing all of its name."""
         if self.field(name) != value or self._count(name) > 1:
             self.drop(name)
             self.fields.append((name, value))
@@ -38,12 +38,12 @@ class _Message:
 
     @property
     def media_type(self) -> str:
-        """The media type of the body, without parameters; empty where none is said."""
+        """The media type in Content-Type, without parameters, in lower case; empty without the header."""
         return (self.field("Content-Type") or "").partition(";")[0].strip().lower()
 
     @property
     def is_last(self) -> bool:
-        """Whether its connection ends with it: it says so, or where it ends is not known."""
+        """Whether the connection must be closed after this message."""
         closes = "close" in (self.field("Connection") or "").lower()
         return closes or self.raw is not None or self.version == "HTTP/1.0"
 
@@ -54,12 +54,12 @@ class _Message:
 
 @dataclass
 class Request(_Message):
-    """A request.
+    """A request as a client sent it.
 
     Attributes:
-        side: "rest" or "soap", by the port that it came to.
-        raw: its octets, where they are no HTTP; then all the rest is empty.
-        came: its octets as they came, in pieces.
+        side: "rest" or "soap", by the port that received it.
+        raw: its bytes if they are not HTTP; the other attributes are then empty. None for HTTP.
+        came: its bytes as received, in pieces.
     """
 
     side: str
@@ -73,20 +73,20 @@ class Request(_Message):
 
     @property
     def path(self) -> str:
-        """The target without its query."""
+        """The request target without its query."""
         return self.target.partition("?")[0]
 
     @property
     def query(self) -> str:
-        """What follows the question mark."""
+        """The query of the request target, without the question mark."""
         return self.target.partition("?")[2]
 
     def copy(self, **changes: Any) -> Request:
-        """A copy with other parts; its fields can be altered without altering ours."""
+        """Return a copy with some attributes replaced; its headers can be changed independently."""
         return replace(self, **{"fields": list(self.fields), **changes})
 
     def octets(self) -> bytes:
-        """Its octets, with a Content-Length that fits unless several contradict each other."""
+        """Return its bytes, with a matching Content-Length unless it has several that contradict each other."""
         if self.raw is not None:
             return self.raw
         body = self.body
@@ -101,11 +101,11 @@ class Request(_Message):
 
 @dataclass
 class Response(_Message):
-    """A response.
+    """A response to a client.
 
     Attributes:
-        raw: octets to send in its place, after which the connection is closed.
-        method: of its request.
+        raw: bytes to send instead of the other attributes, before the connection is closed; or None.
+        method: the method of its request.
     """
 
     status: int
@@ -117,11 +117,11 @@ class Response(_Message):
     method: str = "GET"
 
     def copy(self) -> Response:
-        """A copy whose fields can be altered without altering ours."""
+        """Return a copy whose headers can be changed independently."""
         return replace(self, fields=list(self.fields))
 
     def octets(self) -> bytes:
-        """Its octets, with a Content-Length that fits."""
+        """Return its bytes, with a matching Content-Length."""
         if self.raw is not None:
             return self.raw
         self.drop("Transfer-Encoding")
@@ -138,27 +138,27 @@ Forward = Callable[[Request], Response]
 
 
 class HangUpError(Exception):
-    """The connection is closed without a response."""
+    """Raised by a change to close the connection without a response."""
 
 
 class Change(Protocol):
-    """What a proxy does to exchanges; one instance for one run, so it may remember."""
+    """What a proxy does to each request and response. Each run has an instance of its own, which may keep state."""
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """Respond to a request; ``forward`` asks the robot, as often as one likes.
+        """Return the response to a request. ``forward`` sends a request to the device, any number of times.
 
         Raises:
-            HangUpError: there is to be no response.
+            HangUpError: the connection is to be closed without a response.
         """
 
 
 class IncompleteRequest(Protocol):
-    """What a mutant does with a request that was never completed."""
+    """What a mutant does with a request that its client never completed."""
 
     def __call__(self, side: str, octets: bytes, forward: Forward) -> None:
-        """Take what had come when the client went away."""
+        """Take the bytes that were received before the client disconnected."""
 
 
 def unchanged(request: Request, forward: Forward) -> Response:
-    """The change that changes nothing."""
+    """Forward the request and return the response unchanged."""
     return forward(request)

@@ -1,29 +1,28 @@
-"""What a mutant is: one change between a client and a good robot, and what must notice it."""
+"""A mutant: a good device with one change between it and its clients, and the requirements that must kill it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from conformance.mutation.messages import Change, IncompleteRequest
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A mutant.
+    """One mutant.
 
     Attributes:
-        name: its name, unique.
-        says: one sentence on what is wrong with it.
-        catches: ids of the requirements each of which must say fail (MUST) or warn (SHOULD).
+        name: its unique name.
+        says: a sentence that says what is wrong with the device.
+        catches: ids of the requirements of which each must fail (MUST) or warn (SHOULD).
         interface: "rest", "soap" or "both".
-        make: makes the change for one run.
-        incomplete_request: makes what is done with requests that are never completed, or None.
-        probe: whether only a ROS probe can see it.
-        observer: whether only a ROS probe, or a device that shows what reached it, can see it.
-        token: bearer token that the robot wants, or empty.
-        serial: whether the robot takes the next request only when the one before is complete.
-        backwards: whether of two requests that were sent at once on one connection the second is answered first.
-        forgetful: whether of requests that were sent at once on one connection the first alone is answered.
+        make: returns a new instance of the change, for one run.
+        incomplete_request: returns what handles requests that clients never complete, or None.
+        probe: whether only a ROS probe can observe the fault.
+        observer: whether only a ROS probe, or a device that shows what reached it, can observe the fault.
+        token: the bearer token that the device requires, or an empty text.
+        serial: whether the device reads the next request only after the previous one is complete.
+        backwards: whether the device answers the second of two pipelined requests first.
+        forgetful: whether the device answers only the first of pipelined requests.
     """
 
     name: str
@@ -38,19 +37,3 @@ class Mutant:
     serial: bool = False
     backwards: bool = False
     forgetful: bool = False
-
-
-def of_class(class_: str, interface: str, **common: Any) -> Callable[..., Mutant]:
-    """A maker of mutants that requirements of one class catch: their names in the class, or the only one's.
-
-    A requirement of another class is named with it; ``common`` are settings of them all.
-    """
-
-    def mutant(name: str, says: str, catches: str | tuple[str, ...], make: Callable[[], Change], **more: Any) -> Mutant:
-        names = (catches,) if isinstance(catches, str) else catches
-        settings: dict[str, Any] = {"interface": interface, **common, **more}
-        return Mutant(
-            name, says, tuple(one if "/" in one else f"{class_}/{one}" for one in names), make=make, **settings
-        )
-
-    return mutant

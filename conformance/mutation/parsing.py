@@ -1,4 +1,4 @@
-"""Octets to messages, without a socket: h11 reads what is HTTP, and what it refuses stays as it came."""
+"""Parsers of HTTP messages from bytes, without a socket. h11 parses; bytes that it rejects are kept as received."""
 
 import re
 from typing import Any
@@ -14,10 +14,10 @@ _ASKED = {method: h11.Request(method=method, target="/", headers=[("Host", "robo
 
 
 class RequestParser:
-    """Reads one request.
+    """A parser of one request.
 
     Attributes:
-        rest: what came after it.
+        rest: the bytes that followed the request.
     """
 
     def __init__(self, side: str) -> None:
@@ -30,16 +30,16 @@ class RequestParser:
 
     @property
     def octets(self) -> bytes:
-        """All that has come, as it came."""
+        """All bytes received so far."""
         return b"".join(self._pieces)
 
     @property
     def waits_for_continue(self) -> bool:
-        """Whether the client sends the body only once it is told to (RFC 9110 10.1.1)."""
+        """Whether the client waits for 100 (Continue) before it sends the body (RFC 9110 10.1.1)."""
         return self._http.they_are_waiting_for_100_continue
 
     def feed(self, data: bytes) -> Request | None:
-        """Read what has come, in whatever pieces. Returns the request once it is complete, or is no HTTP."""
+        """Parse more bytes; return the request once it is complete or known not to be HTTP, otherwise None."""
         if not self._pieces:
             # Empty lines before a request are none of it (RFC 9112 2.2).
             data = data.lstrip(b"\r\n")
@@ -74,10 +74,10 @@ class RequestParser:
 
 
 class ResponseParser:
-    """Reads one response; informational ones before it are passed over.
+    """A parser of one response, which skips informational (1xx) responses before it.
 
     Args:
-        method: of the request; empty where the request was no HTTP.
+        method: the request's method; empty if the request was not HTTP.
     """
 
     def __init__(self, method: str) -> None:
@@ -89,10 +89,10 @@ class ResponseParser:
         self._http.send(h11.EndOfMessage())
 
     def feed(self, data: bytes) -> Response | None:
-        """Read what has come; no octets mean that the connection has ended. Returns the response once it is complete.
+        """Parse more bytes (empty: the connection ended); return the response once it is complete, otherwise None.
 
         Raises:
-            h11.RemoteProtocolError: it is no HTTP, or ends too early.
+            h11.RemoteProtocolError: the bytes are not HTTP, or end too early.
         """
         self._http.receive_data(data)
         while (event := self._http.next_event()) is not h11.NEED_DATA:
@@ -111,5 +111,5 @@ class ResponseParser:
 
 
 def _fields(event: h11.Request | h11.Response) -> list[tuple[str, str]]:
-    """Header fields, written as they came."""
+    """Return the headers of an h11 event with the case of their names as received."""
     return [(name.decode(), value.decode("latin-1")) for name, value in event.headers.raw_items()]

@@ -1,4 +1,4 @@
-"""What servers are made of: found, or named with what installs it; programs in Go are built first."""
+"""Find the programs and packages that good devices are made of, and build programs in Go."""
 
 import os
 import shutil
@@ -13,14 +13,14 @@ _BUILD_S = 300.0
 
 
 class NotInstalledError(Exception):
-    """Something is not there; the message says what installs it."""
+    """Raised when a program or package is not installed; the message says how to install it."""
 
 
 def program(name: str, package: str) -> str:
-    """Path of a program. Servers are in /usr/sbin, which is on no user's PATH on Debian.
+    """Return the path of a program, from PATH or /usr/sbin (which Debian leaves out of a user's PATH).
 
     Raises:
-        NotInstalledError: it is not there.
+        NotInstalledError: it is not installed.
     """
     found = shutil.which(name, path=os.pathsep.join([os.environ.get("PATH", os.defpath), "/usr/sbin", "/sbin"]))
     if found is None:
@@ -29,10 +29,10 @@ def program(name: str, package: str) -> str:
 
 
 def check_installed(*modules: str) -> None:
-    """See whether Python packages are there.
+    """Check that Python packages are installed.
 
     Raises:
-        NotInstalledError: they are not.
+        NotInstalledError: one is not.
     """
     lacking = [name for name in modules if find_spec(name) is None]
     if lacking:
@@ -40,10 +40,10 @@ def check_installed(*modules: str) -> None:
 
 
 def built(*sources: Path) -> Path:
-    """A Go program, built from its files and the standard library; kept until one of them changes.
+    """Build a Go program from source files, unless it is newer than all of them, and return its path.
 
     Raises:
-        NotInstalledError: there is no Go, or it fails.
+        NotInstalledError: Go is not installed, or the build fails.
     """
     go = program("go", "golang-go")
     checksum = zlib.crc32(b"".join(source.read_bytes() for source in sources))

@@ -1,12 +1,13 @@
-"""What a contract pack says for its self-test: good devices, mutants, and what only the pack knows of them.
+"""What a contract pack declares for `roaas selftest`: good devices, mutants, and facts about both.
 
-The pack's plugin module names the module with it: ``SELFTEST = "lamp_contract.selftest"``. Without that, it is
-``selftest.py`` beside ``pack.toml``. The module has a value ``SELFTEST``. A small pack says how its device starts::
+The pack's plugin module names the module that declares it: ``SELFTEST = "lamp_contract.selftest"``. The default is
+``selftest.py`` beside ``pack.toml``. That module has a value ``SELFTEST``. A small pack declares how its device
+starts::
 
     LAMP = GoodDevice("lamp", lambda _: [sys.executable, str(Path(__file__).with_name("lamp.py")), "0"])
     SELFTEST = SelfTest(devices=(LAMP,))
 
-The suite then makes mutants by rule from the pack's descriptions. Everything else has a default.
+The suite then generates mutants from the pack's descriptions. Everything else has a default.
 """
 
 from __future__ import annotations
@@ -28,11 +29,11 @@ MODULE = "selftest.py"
 
 @dataclass(frozen=True)
 class Start:
-    """How one device is to start.
+    """How to start one device.
 
     Attributes:
-        domain_id: its ROS domain, for a device on ROS.
-        seed: of everything random in it.
+        domain_id: its ROS domain, if it uses ROS.
+        seed: seed of everything random in it.
     """
 
     domain_id: int = 0
@@ -41,17 +42,17 @@ class Start:
 
 @dataclass(frozen=True)
 class GoodDevice:
-    """A conforming device, which runs in a process of its own.
+    """A conforming device, which runs as a process.
 
     Attributes:
-        name: its name, as ``--target`` takes it.
-        command: returns the command that starts it on free ports. When it is ready, it prints ``ready rest=URL`` or
-            ``ready rest=URL soap=URL``, the URLs being an origin and a WSDL. It ends at SIGTERM. Raises
-            NotInstalledError where something that it needs is not installed.
+        name: its name, as in ``--target``.
+        command: returns the command that starts it on free ports. The process prints ``ready rest=URL`` or
+            ``ready rest=URL soap=URL`` (an origin and a WSDL) when it is ready, and ends at SIGTERM. Raises
+            NotInstalledError if something that the device needs is not installed.
         statement: the file of its statement; None: nothing is declared.
-        on_ros: whether it needs ROS, so that a probe can watch it.
-        shows_effects: whether clients can read from the device itself what reached it.
-        once: whether it is judged once, as a variant, in place of once for each seed.
+        on_ros: whether it uses ROS, so that a probe can watch it.
+        shows_effects: whether clients can read from the device which commands reached it.
+        once: whether it is certified once, as a variant, instead of once for each seed.
     """
 
     name: str
@@ -64,11 +65,12 @@ class GoodDevice:
 
 @dataclass(frozen=True)
 class HarmlessChange:
-    """A change between clients and a good device that leaves it conforming.
+    """A change between clients and a good device that keeps it conforming.
 
     Attributes:
-        name: its name; says: what it is, in a few words.
-        make: makes the change for one run.
+        name: its name.
+        says: what it changes, in a few words.
+        make: returns a new instance of the change, for one run.
     """
 
     name: str
@@ -78,13 +80,14 @@ class HarmlessChange:
 
 @dataclass(frozen=True)
 class OpenPlace:
-    """Changes by rule that break no clause, so that they are no mutants.
+    """Generated changes that break no clause of the contract, so that they are not mutants.
 
     Attributes:
-        pattern: of the changes' names (``operator:operation:place[:form]``), a regular expression that matches all.
+        pattern: a regular expression that matches the whole name of such a change
+            (``operator:operation:place[:form]``).
         reason: why they break no clause.
         side: "rest" or "soap"; empty: both.
-        methods: of HTTP; empty: all.
+        methods: HTTP methods; empty: all.
     """
 
     pattern: str
@@ -93,32 +96,31 @@ class OpenPlace:
     methods: tuple[str, ...] = ()
 
     def covers(self, name: str, side: str, method: str) -> bool:
-        """Return whether a change of this name, to an operation of this side and method, breaks no clause."""
+        """Return whether a change of this name, side and method breaks no clause."""
         there = self.side in {"", side} and (not self.methods or method in self.methods)
         return there and re.fullmatch(self.pattern, name) is not None
 
 
 def only_publishers(soap: str) -> tuple[str, str]:
-    """Return the WSDLs of a device with one SOAP service: that of the publishers, and none."""
+    """Return the WSDLs of a device with only one SOAP service, the publishers: its URL and an empty text."""
     return soap, ""
 
 
 @dataclass(frozen=True)
 class SelfTest:
-    """What a pack's self-test needs.
+    """Everything that a pack declares for its self-test.
 
     Attributes:
-        devices: good devices; the first one is behind mutants where ``--target`` names no other.
-        mutants: mutants made by hand.
+        devices: good devices; the first one is the default of ``--target``.
+        mutants: hand-written mutants.
         short: names of the mutants that ``--short`` judges, the slowest first; empty: the first fifteen.
-        quick: the device that starts fastest: it is behind mutants by rule, and in variants; empty: the first one.
-        device_for: the device in a variant or behind a web server, by the variant's or server's name, if not ``quick``.
-        wsdls: returns the WSDLs of publishers and subscribers, from the URL that a device prints as ``soap=``.
-        variants: circumstances in which a good device stays one, beside those that the suite knows.
-        classes: classes of the pack that can see a change in an operation, its own class first, by a regular expression
-            of the operation's name; the first that matches counts. Without one: all of the pack that judge its
-            interface.
-        open_places: what the contract leaves open.
+        quick: the device that starts fastest, used for generated mutants and variants; empty: the first one.
+        device_for: the device for a variant or behind a web server, by the name of that, if not ``quick``.
+        wsdls: returns the WSDLs of publishers and subscribers from the URL that a device prints as ``soap=``.
+        variants: harmless changes of this pack, beside those of the suite.
+        classes: the classes that can detect a change in an operation, its own class first, by a regular expression of
+            the operation's name; the first match counts. Default: all classes of the pack that judge its interface.
+        open_places: generated changes that break no clause.
     """
 
     devices: tuple[GoodDevice, ...] = ()
@@ -132,30 +134,30 @@ class SelfTest:
     open_places: tuple[OpenPlace, ...] = ()
 
     def device(self, name: str) -> GoodDevice:
-        """Return the device of a name.
+        """Return the device with a name.
 
         Raises:
-            KeyError: there is none.
+            KeyError: there is no such device.
         """
         return {device.name: device for device in self.devices}[name]
 
     def device_in(self, variant: str) -> GoodDevice:
-        """Return the device that is judged in a variant, or behind a web server; of any other name, the quick one.
+        """Return the device for a variant or web server, by its name; by default the quick one.
 
         Raises:
-            KeyError: the pack names no device.
+            KeyError: the pack names a device that it does not have.
         """
         name = self.device_for.get(variant) or self.quick
         return self.device(name) if name or not self.devices else self.devices[0]
 
     def classes_of(self, operation: str) -> tuple[str, ...]:
-        """Return the pack's classes that can see a change in an operation; empty: the pack does not say."""
+        """Return the pack's classes that can detect a change in an operation; empty: not declared."""
         return next((found for pattern, found in self.classes.items() if re.fullmatch(pattern, operation)), ())
 
 
 @cache
 def self_test_of(contract: Contract) -> SelfTest:
-    """Return what a pack says for its self-test; of a pack that says nothing, the defaults.
+    """Return what a pack declares for its self-test, or the defaults.
 
     Raises:
         ContractError: its module cannot be imported, or has no ``SELFTEST``.

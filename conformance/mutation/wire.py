@@ -1,4 +1,4 @@
-"""Talking: a client's requests are read off its connection, and exchanged with the robot over another one."""
+"""The two connections of a proxy: from a client and to the device."""
 
 import select
 import socket
@@ -17,7 +17,7 @@ _CONTINUE = b"HTTP/1.1 100 Continue\r\n\r\n"
 
 
 class IncompleteMessageError(Exception):
-    """A connection ended before a message did; ``octets`` is what had come of it."""
+    """Raised when a connection ends in the middle of a message; ``octets`` are the bytes received of it."""
 
     def __init__(self, octets: bytes = b"") -> None:
         super().__init__(f"{len(octets)} octets, and no more")
@@ -25,7 +25,7 @@ class IncompleteMessageError(Exception):
 
 
 class ClientConnection:
-    """A connection from a client, read request by request."""
+    """A connection from a client, which yields its requests one by one."""
 
     def __init__(self, sock: socket.socket, side: str) -> None:
         self._sock, self._side = sock, side
@@ -33,19 +33,19 @@ class ClientConnection:
 
     @property
     def has_more(self) -> bool:
-        """Whether something of the next request has come with the last one."""
+        """Whether bytes of the next request have already been received."""
         return bool(self._waiting)
 
     def wait(self) -> bool:
-        """Wait until something of the next request has come. Returns False when the connection has ended."""
+        """Wait for bytes of the next request; return False if the connection ended."""
         self._waiting = self._waiting or _received(self._sock)
         return bool(self._waiting)
 
     def request(self) -> Request | None:
-        """The next request, or None at the end of the connection.
+        """Return the next request, or None at the end of the connection.
 
         Raises:
-            IncompleteMessageError: the client went away in the middle of it.
+            IncompleteMessageError: the client disconnected in the middle of it.
             OSError: the connection broke.
         """
         parser = RequestParser(self._side)
@@ -64,24 +64,25 @@ class ClientConnection:
         return None
 
     def respond(self, response: Response, *, last: bool) -> None:
-        """Send a response; after the ``last`` one, let the client read it before the connection is reset."""
+        """Send a response; after the ``last`` one, wait until the client has read it before closing."""
         self._sock.sendall(response.octets())
         if last:
             _linger(self._sock)
 
 
 class RobotConnection:
-    """A connection to the robot, opened again when it was closed."""
+    """A connection to the device, which is opened again after it was closed."""
 
     def __init__(self, host: str, port: int) -> None:
         self._address = (host, port)
         self._sock: socket.socket | None = None
 
     def exchange(self, request: Request) -> Response:
-        """Send a request and wait for its response.
+        """Send a request and return its response.
 
         Raises:
-            IncompleteMessageError, OSError: there is none.
+            IncompleteMessageError: the connection ended in the middle of the response.
+            OSError: the connection broke.
         """
         if self._sock is not None:
             try:
@@ -118,7 +119,7 @@ class RobotConnection:
 
 
 def _received(sock: socket.socket) -> bytes:
-    """What comes next; nothing at the end of the connection."""
+    """Return the next bytes, empty at the end of the connection."""
     try:
         return sock.recv(_PIECE)
     except ConnectionResetError:
@@ -126,7 +127,7 @@ def _received(sock: socket.socket) -> bytes:
 
 
 def _send(sock: socket.socket, data: bytes) -> None:
-    """Send until all is sent, or the robot answers in the middle of a large body, or it closes."""
+    """Send all bytes; stop early if the device responds in the middle of a large body or closes the connection."""
     left = memoryview(data)
     try:
         if len(data) <= _LARGE:
@@ -144,7 +145,7 @@ def _send(sock: socket.socket, data: bytes) -> None:
 
 
 def _linger(sock: socket.socket) -> None:
-    """Let the client read the response before the connection is reset over what it still sends."""
+    """Give the client time to read the response before the connection is reset."""
     try:
         sock.shutdown(socket.SHUT_WR)
         sock.settimeout(0.2)

@@ -5,8 +5,8 @@ from lxml import etree
 
 from conformance.mutation.changes import SOAP, becomes, page
 from conformance.mutation.messages import Request
+from conformance.mutation.xml_trees import each, named, says, tree
 from conformance.packs.table1.mutants import soap_responses as edits
-from conformance.packs.table1.mutants.xml_trees import each, named, says, tree
 
 ASKED = Request("soap", "POST", "/")
 

@@ -1,4 +1,4 @@
-"""Every mutant, by subject."""
+"""All mutants of this pack, collected from one table per subject."""
 
 from conformance.mutation.mutant import Mutant
 from conformance.packs.table1.mutants import (
@@ -9,6 +9,7 @@ from conformance.packs.table1.mutants import (
     equivalence,
     formats,
     goal,
+    goal_memory,
     holding,
     http_forms,
     http_messages,
@@ -35,6 +36,7 @@ _SUBJECTS = (
     velocity,
     lists,
     goal,
+    goal_memory,
     plan,
     delivery,
     formats,

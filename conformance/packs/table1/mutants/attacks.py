@@ -1,4 +1,4 @@
-"""Robots that fall for attacks by XML."""
+"""Mutants that are vulnerable to XML attacks: entities, deep nesting, XInclude, SOAPAction spoofing."""
 
 import re
 import socket
@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
-from conformance.mutation.changes import Where, instead, plain, posted, rewritten
+from conformance.mutation.changes import Where, plain, posted
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import TNS
 from conformance.packs.table1.mutants.soap_responses import enveloped, fault
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("xml-security", "soap")
 
 _DOCTYPE = re.compile(rb"<!DOCTYPE[^\[>]*(\[.*?\]\s*)?>", re.DOTALL)
 _INTERNAL = re.compile(rb"<!ENTITY\s+([\w.-]+)\s+[\"']([^\"']*)[\"']\s*>")
@@ -43,7 +46,7 @@ def _plain_doctype(request: Request) -> None:
 
 
 def _expanded(request: Request) -> None:
-    """Internal entities, a few of them and not nested, are put in their places."""
+    """Expand up to a few internal entities that are not nested."""
     entities = dict(_INTERNAL.findall(request.body))
     if not entities or len(request.body) > 20_000 or any(b"&" in value for value in entities.values()):
         return
@@ -71,7 +74,7 @@ def _leaked(text: str) -> Callable[[Request], Response]:
 
 
 def _quoting(urls: Callable[[bytes], list[bytes]]) -> Callable[[], Any]:
-    """The first file that a message refers to, and that can be read, is quoted in the fault."""
+    """Return a change that quotes the first readable file named by a message in a fault; ``urls`` finds the names."""
 
     def change(request: Request, forward: Forward) -> Response:
         for url in urls(request.body) if posted(request) else ():
@@ -83,12 +86,13 @@ def _quoting(urls: Callable[[bytes], list[bytes]]) -> Callable[[], Any]:
     return lambda: change
 
 
+@_mutant("attack-included", "xinclude", "XInclude elements are processed.").through(_quoting)
 def _included(body: bytes) -> list[bytes]:
     return re.findall(rb"href=[\"']([^\"']*)[\"']", body) if b"XInclude" in body else []
 
 
 def _call(url: bytes) -> None:
-    """Open a connection to an address that a message names."""
+    """Open a connection to the address in a URL."""
     parts = urlsplit(url.decode("utf-8", "replace"))
     try:
         with socket.create_connection((parts.hostname or "127.0.0.1", parts.port or 80), timeout=1) as sock:
@@ -108,6 +112,7 @@ def _calling(find: Callable[[bytes], list[bytes]]) -> Callable[[], Any]:
     return lambda: change
 
 
+@_mutant("attack-entity-fetched", "no-callback", "An external entity is fetched from the network.").through(_calling)
 def _entity_urls(body: bytes) -> list[bytes]:
     return [url for _, url in _EXTERNAL.findall(body) if url.startswith(b"http")] + _doctype_urls(body)
 
@@ -117,6 +122,9 @@ def _doctype_urls(body: bytes) -> list[bytes]:
     return [url for url in found if url.startswith(b"http")]
 
 
+@_mutant(
+    "attack-reply-elsewhere", "addressing-spoofing", "The robot sends a request to the address in wsa:ReplyTo."
+).through(_calling)
 def _addressing_urls(body: bytes) -> list[bytes]:
     return _URL.findall(body) if b"addressing" in body else []
 
@@ -131,12 +139,12 @@ def _nested(request: Request) -> bool:
 
 
 def _posting(holds: Callable[[bytes], bool]) -> Where:
-    """SOAP requests of whose body something holds."""
+    """Return a condition for SOAP requests whose body fulfils ``holds``."""
     return lambda request: posted(request) and holds(request.body)
 
 
+@_mutant("attack-action-chooses", "soapaction-spoofing", "SOAPAction selects the operation, whatever is in Body.")
 def _spoofed(request: Request, forward: Forward) -> Response:
-    """SOAPAction chooses what is run, whatever the body says."""
     action = (request.field("SOAPAction") or "").strip('"')
     for name in ("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"):
         if posted(request) and name in action and name.encode() not in request.body:
@@ -149,15 +157,13 @@ def _rest_xml(request: Request) -> bool:
     return request.side == "rest" and request.method == "PUT" and b"<!DOCTYPE" in request.body
 
 
+@_mutant("attack-exhausted", "responsive", "After an attack, the next responses take 1.6 s.", interface="both")
 class _Exhausted:
-    """After each of the first attacks the robot needs a while for everything."""
-
     def __init__(self) -> None:
         self._attacks = 6
         self._left = 0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         if self._left:
             self._left -= 1
             time.sleep(1.6)
@@ -167,88 +173,38 @@ class _Exhausted:
         return forward(request)
 
 
-_mutant = of_class("xml-security", "soap")
-
-MUTANTS = (
-    _mutant(
-        "attack-doctype-fine",
-        "A Document Type Declaration is passed over.",
-        "doctype",
-        rewritten(_declared, _plain_doctype),
-    ),
-    _mutant(
-        "attack-entity-expanded", "Internal entities are expanded.", "internal-entity", rewritten(_declared, _expanded)
-    ),
-    _mutant(
-        "attack-file-leaked",
-        "An external entity's file appears in the fault.",
-        "external-entity",
-        _quoting(lambda body: [url for _, url in _EXTERNAL.findall(body)]),
-    ),
-    _mutant(
-        "attack-entity-fetched",
-        "An external entity is fetched from the network.",
-        "no-callback",
-        _calling(_entity_urls),
-    ),
-    _mutant(
-        "attack-dtd-fetched",
-        "An external DTD or parameter entity is fetched.",
-        "parameter-entity",
-        _calling(_doctype_urls),
-    ),
-    _mutant(
-        "attack-expansion-fine",
-        "Entities that expand exponentially are answered like any others.",
-        "expansion",
-        rewritten(_posting(lambda body: body.count(b"<!ENTITY") > 2), _undeclared),
-    ),
-    _mutant(
-        "attack-quadratic-fine",
-        "One long entity many times is answered like any other.",
-        "quadratic",
-        rewritten(_posting(lambda body: 0 < body.count(b"<!ENTITY") <= 2 and body.count(b"&") > 50), _undeclared),
-    ),
-    _mutant("attack-depth-fine", "XML nested without end is answered 200.", "depth", instead(_nested, _DONE)),
-    _mutant(
-        "attack-attributes-fine",
-        "Thousands of attributes are passed over.",
-        "attributes",
-        instead(_posting(lambda body: body.count(b'="') > 5000), _DONE),
-    ),
-    _mutant(
-        "attack-long-name-fine",
-        "A name of a million characters is passed over.",
-        "long-name",
-        instead(_posting(lambda body: bool(re.search(rb"<[\w:.-]{5000,}", body))), _DONE),
-    ),
-    _mutant(
-        "attack-size-fine",
-        "A message over 10 MiB is answered 200.",
-        "size",
-        instead(_posting(lambda body: len(body) > _LARGE), _DONE),
-    ),
-    _mutant(
-        "attack-bomb-unpacked",
-        "A compressed message is unpacked, however large it becomes.",
-        "compressed",
-        instead(lambda request: posted(request) and bool(request.field("Content-Encoding")), _DONE),
-    ),
-    _mutant(
-        "attack-instruction-fine",
-        "Processing instructions are passed over.",
-        "processing-instruction",
-        rewritten(posted, lambda request: setattr(request, "body", _INSTRUCTION.sub(b"", request.body))),
-    ),
-    _mutant("attack-included", "XInclude is processed.", "xinclude", _quoting(_included)),
-    _mutant("attack-action-chooses", "SOAPAction chooses what is run.", "soapaction-spoofing", lambda: _spoofed),
-    _mutant("attack-reply-elsewhere", "ReplyTo is called.", "addressing-spoofing", _calling(_addressing_urls)),
-    _mutant(
-        "attack-rest-fine",
-        "A Document Type Declaration in a REST body is passed over.",
-        "rest",
-        instead(_rest_xml, plain(204)),
-        interface="rest",
-    ),
-    _mutant("attack-exhausted", "After an attack everything takes 1.6 s.", "responsive", _Exhausted, interface="both"),
+_mutant("attack-doctype-fine", "doctype", "A document type declaration is ignored.").rewritten(
+    _declared, _plain_doctype
+)
+_mutant("attack-entity-expanded", "internal-entity", "Internal entities are expanded.").rewritten(_declared, _expanded)
+_mutant("attack-file-leaked", "external-entity", "The file of an external entity appears in the fault.").made(
+    _quoting(lambda body: [url for _, url in _EXTERNAL.findall(body)])
+)
+_mutant("attack-dtd-fetched", "parameter-entity", "An external DTD or parameter entity is fetched.").made(
+    _calling(_doctype_urls)
+)
+_mutant("attack-expansion-fine", "expansion", "Exponentially expanding entities return a normal response.").rewritten(
+    _posting(lambda body: body.count(b"<!ENTITY") > 2), _undeclared
+)
+_mutant(
+    "attack-quadratic-fine", "quadratic", "A long entity that is used many times returns a normal response."
+).rewritten(_posting(lambda body: 0 < body.count(b"<!ENTITY") <= 2 and body.count(b"&") > 50), _undeclared)
+_mutant("attack-depth-fine", "depth", "Deeply nested XML returns 200.").instead(_nested, _DONE)
+_mutant("attack-attributes-fine", "attributes", "Thousands of attributes return 200.").instead(
+    _posting(lambda body: body.count(b'="') > 5000), _DONE
+)
+_mutant("attack-long-name-fine", "long-name", "An element name of a million characters returns 200.").instead(
+    _posting(lambda body: bool(re.search(rb"<[\w:.-]{5000,}", body))), _DONE
+)
+_mutant("attack-size-fine", "size", "A message over 10 MiB returns 200.").instead(
+    _posting(lambda body: len(body) > _LARGE), _DONE
+)
+_mutant("attack-bomb-unpacked", "compressed", "A compressed message of any size is unpacked.").instead(
+    lambda request: posted(request) and bool(request.field("Content-Encoding")), _DONE
+)
+_mutant("attack-instruction-fine", "processing-instruction", "Processing instructions are ignored.").rewritten(
+    posted, lambda request: setattr(request, "body", _INSTRUCTION.sub(b"", request.body))
+)
+_mutant("attack-rest-fine", "rest", "A document type declaration in a REST body is ignored.", interface="rest").instead(
+    _rest_xml, plain(204)
 )

@@ -1,4 +1,4 @@
-"""Robots that are right as long as one client asks one thing at a time."""
+"""Mutants that are wrong only while several clients send requests concurrently."""
 
 from __future__ import annotations
 
@@ -8,23 +8,30 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from conformance.mutation.changes import Make, Where, inputs, instead, parsed, plain, posted, problem, rest, soap
+from conformance.mutation.changes import Make, Where, inputs, parsed, plain, posted, problem, rest, soap
 from conformance.mutation.messages import Change, Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.crowd import COMPANY_S, Crowd, when_crowded
 from conformance.packs.table1.mutants.paths import GOAL, TNS, VELOCITY, deliveries
 from conformance.packs.table1.mutants.soap_responses import enveloped
+
+MUTANTS = Table()
+_order = MUTANTS.of_class("soap-delivery", "soap")
+_resource = MUTANTS.of_class("rest-resources", "rest")
+_mutant = MUTANTS.of_class("http", "rest")
+_message = MUTANTS.of_class("equivalence", "both", observer=True)
+_state = MUTANTS.of_class("soap-subscribers", "soap")
 
 # How long an answer waits for another one to be mixed up with, s.
 _MEETS_S: Final = 0.05
 
 
 class _Mixed:
-    """Two answers that are made at one moment are mixed up, each nth time.
+    """A change that mixes up two concurrent responses, every ``nth`` time.
 
     Args:
-        where: which requests' answers.
-        mix: makes of the first and the second answer what the first client gets, and then the second one.
+        where: chooses the requests whose responses are mixed up.
+        mix: takes the first and the second response, and returns what the first and the second client get.
         nth: how often.
     """
 
@@ -37,7 +44,6 @@ class _Mixed:
         self._seen = 0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         if not self._where(request):
             return forward(request)
         with self._crowd.joined() as others:
@@ -59,7 +65,7 @@ class _Mixed:
             return mine[-1]
 
     def _meet(self, response: Response) -> Response:
-        """Give the one who waits what becomes of its answer."""
+        """Mix this response with the one that is waiting, release the waiting client, and return this client's part."""
         first, second = self._mix(self._first[0].copy(), response.copy())
         self._first.append(first)
         self._first = []
@@ -78,15 +84,19 @@ def _exchanged(one: Response, two: Response) -> tuple[Response, Response]:
     return two, one
 
 
+@_mutant(
+    "clients-spliced",
+    "concurrent-answers",
+    "Two concurrent responses are spliced: one ends with the second half of the other.",
+).through(_mixed)
 def _spliced(one: Response, two: Response) -> tuple[Response, Response]:
-    """The second client gets its own beginning and the other one's end."""
     half = len(two.body) // 2
     two.body = two.body[:half] + one.body[half:]
     return one, two
 
 
 def _repeated(one: Response, two: Response) -> tuple[Response, Response]:
-    """Both get the first one's body."""
+    """Give both clients the body of the first response."""
     two.body = one.body
     return one, two
 
@@ -97,7 +107,7 @@ def _twice(request: Request, forward: Forward) -> Response:
 
 
 def _with_another_source(request: Request, forward: Forward) -> Response:
-    """A coordinate is another client's, as from a field that all share."""
+    """Forward a delivery with another client's source_y, as if all clients shared a variable."""
     head, _, _ = request.target.rpartition("/")
     return forward(request.copy(target=f"{head}/1.5"))
 
@@ -109,15 +119,17 @@ def _created(response: Response) -> Response:
     return response
 
 
+@_resource(
+    "clients-goal-doubled",
+    "goal-concurrent",
+    "A goal that two clients send concurrently becomes two goals; one continues after the other is cancelled.",
+)
 class _GoalOfTwo:
-    """A goal that came while another one did is put again, under another id, when it is cancelled."""
-
     def __init__(self) -> None:
         self._crowd = Crowd()
         self._second: Request | None = None
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         if _PUT_GOAL(request):
             with self._crowd.joined() as others:
                 time.sleep(COMPANY_S)
@@ -134,7 +146,7 @@ class _GoalOfTwo:
 
 
 class _Blended:
-    """Requests that come at one moment have one field in common: the one that came first."""
+    """A change that gives concurrent requests the same value of one JSON member: that of the first request."""
 
     def __init__(self, where: Where, field: str) -> None:
         self._where, self._field = where, field
@@ -142,7 +154,6 @@ class _Blended:
         self._last: object = None
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         if not self._where(request):
             return forward(request)
         with self._crowd.joined() as others:
@@ -157,128 +168,65 @@ class _Blended:
 
 _PUT_GOAL, _PUT_VELOCITY = rest("PUT", GOAL), rest("PUT", VELOCITY)
 _SMALL: Final = 32 * 1024
-_order = of_class("soap-delivery", "soap")
-_resource = of_class("rest-resources", "rest")
-_mutant = of_class("http", "rest")
-_message = of_class("equivalence", "both", observer=True)
 _EMPTY = plain(204)
 _SOAP_DELIVERY = soap("ExecuteDeliveryRequest")
 _ACCEPTED = enveloped(f'<t:ExecuteDeliveryRequestResponse xmlns:t="{TNS}"/>')
 
-MUTANTS = (
-    _mutant(
-        "clients-crossed",
-        "Two clients that ask at one moment get each other's answers.",
-        "concurrent-answers",
-        _mixed(_exchanged),
-    ),
-    _mutant(
-        "clients-crossed-seldom",
-        "One time in fifty, two clients that ask at one moment get each other's answers.",
-        "concurrent-answers",
-        _mixed(_exchanged, 50),
-    ),
-    _mutant(
-        "clients-spliced",
-        "An answer ends as another one does that is made at the same moment.",
-        "concurrent-answers",
-        _mixed(_spliced),
-    ),
-    _mutant(
-        "clients-one-buffer",
-        "Answers that are made at one moment have one body.",
-        "concurrent-answers",
-        _mixed(_repeated, 10),
-    ),
-    _mutant(
-        "http-pipelining-backwards",
-        "Of two requests that were sent at once, the second is answered first.",
-        "pipelining",
-        lambda: lambda request, forward: forward(request),
-        backwards=True,
-    ),
-    _message(
-        "clients-delivery-lost",
-        "A REST delivery that comes while another one is being answered is accepted and forgotten.",
-        "delivery-concurrent",
-        when_crowded(deliveries, lambda request, _: _EMPTY(request)),
-    ),
-    _message(
-        "clients-delivery-lost-seldom",
-        "Of the REST deliveries that come while another one is being answered, each 50th is forgotten.",
-        "delivery-concurrent",
-        when_crowded(deliveries, lambda request, _: _EMPTY(request), 50),
-    ),
-    _message(
-        "clients-delivery-doubled",
-        "A REST delivery that comes while another one is being answered is published twice.",
-        "delivery-concurrent",
-        when_crowded(deliveries, _twice),
-    ),
-    _message(
-        "clients-delivery-shared-field",
-        "Deliveries that come at one moment have one source_y.",
-        "delivery-concurrent",
-        when_crowded(deliveries, _with_another_source),
-    ),
-    _message(
-        "clients-soap-delivery-lost",
-        "A SOAP delivery that comes while another one is being answered is accepted and forgotten.",
-        "delivery-concurrent",
-        when_crowded(_SOAP_DELIVERY, lambda request, _: _ACCEPTED(request)),
-    ),
-    _resource(
-        "clients-goal-new-to-all",
-        "Each client that puts the same new goal at one moment is told that it is new.",
-        "goal-concurrent",
-        when_crowded(_PUT_GOAL, lambda request, forward: _created(forward(request))),
-    ),
-    _resource(
-        "clients-goal-conflict",
-        "A goal that is put while another client puts the same one is a conflict.",
-        "goal-concurrent",
-        when_crowded(_PUT_GOAL, lambda request, _: problem(409, "goal_id.id: in use")(request), 2),
-    ),
-    _resource(
-        "clients-goal-doubled",
-        "A goal that two clients put at one moment is two goals: one goes on when the other is cancelled.",
-        "goal-concurrent",
-        _GoalOfTwo,
-    ),
-    _resource(
-        "clients-goal-of-two",
-        "Of goals that come at one moment, one has the pose of another.",
-        "concurrent-puts",
-        lambda: _Blended(_PUT_GOAL, "goal"),
-    ),
-    _resource(
-        "clients-velocity-lost",
-        "Of velocities that come at one moment, none is carried out.",
-        "concurrent-puts",
-        when_crowded(_PUT_VELOCITY, lambda request, _: _EMPTY(request)),
-    ),
-    _resource(
-        "clients-velocity-of-two",
-        "Of velocities that come at one moment, the robot turns by one and drives by another.",
-        "concurrent-puts",
-        lambda: _Blended(_PUT_VELOCITY, "angular"),
-    ),
-    _order(
-        "clients-soap-crossed",
-        "Two clients that order at one moment get each other's answers.",
-        "concurrent-answers",
-        lambda: _Mixed(posted, _exchanged, 1),
-    ),
-    of_class("soap-subscribers", "soap")(
-        "clients-soap-states-crossed",
-        "Two clients that ask at one moment get each other's answers.",
-        "concurrent-answers",
-        lambda: _Mixed(posted, _exchanged, 1),
-    ),
-    _order(
-        "soap-small-messages",
-        "A message over 32 KiB is 413.",
-        "size",
-        instead(lambda request: posted(request) and len(request.body) > _SMALL, problem(413, "too large")),
-    ),
+_mutant("clients-crossed", "concurrent-answers", "Two concurrent clients get each other's responses.").made(
+    _mixed(_exchanged)
+)
+_mutant(
+    "clients-crossed-seldom",
+    "concurrent-answers",
+    "In one case of fifty, two concurrent clients get each other's responses.",
+).made(_mixed(_exchanged, 50))
+_mutant("clients-one-buffer", "concurrent-answers", "Concurrent responses get the same body.").made(
+    _mixed(_repeated, 10)
+)
+_mutant(
+    "http-pipelining-backwards",
+    "pipelining",
+    "Of two pipelined requests, the robot answers the second first.",
+    backwards=True,
+)(lambda request, forward: forward(request))
+_message(
+    "clients-delivery-lost", "delivery-concurrent", "A REST delivery during another one returns 204 and is lost."
+).made(when_crowded(deliveries, lambda request, _: _EMPTY(request)))
+_message("clients-delivery-lost-seldom", "delivery-concurrent", "Every 50th concurrent REST delivery is lost.").made(
+    when_crowded(deliveries, lambda request, _: _EMPTY(request), 50)
+)
+_message(
+    "clients-delivery-doubled", "delivery-concurrent", "A REST delivery during another one is published twice."
+).made(when_crowded(deliveries, _twice))
+_message("clients-delivery-shared-field", "delivery-concurrent", "Concurrent deliveries share one source_y.").made(
+    when_crowded(deliveries, _with_another_source)
+)
+_message(
+    "clients-soap-delivery-lost", "delivery-concurrent", "A SOAP delivery during another one succeeds and is lost."
+).made(when_crowded(_SOAP_DELIVERY, lambda request, _: _ACCEPTED(request)))
+_resource(
+    "clients-goal-new-to-all", "goal-concurrent", "Every client that sends the same new goal concurrently gets 201."
+).made(when_crowded(_PUT_GOAL, lambda request, forward: _created(forward(request))))
+_resource("clients-goal-conflict", "goal-concurrent", "Two clients that send the same goal concurrently get 409.").made(
+    when_crowded(_PUT_GOAL, lambda request, _: problem(409, "goal_id.id: in use")(request), 2)
+)
+_resource("clients-goal-of-two", "concurrent-puts", "Two goals that are sent concurrently get the same pose.").made(
+    lambda: _Blended(_PUT_GOAL, "goal")
+)
+_resource("clients-velocity-lost", "concurrent-puts", "Concurrent velocity commands are lost.").made(
+    when_crowded(_PUT_VELOCITY, lambda request, _: _EMPTY(request))
+)
+_resource(
+    "clients-velocity-of-two",
+    "concurrent-puts",
+    "Of concurrent velocity commands, the robot uses the linear part of one and the angular part of another.",
+).made(lambda: _Blended(_PUT_VELOCITY, "angular"))
+_order("clients-soap-crossed", "concurrent-answers", "Two concurrent SOAP deliveries get each other's responses.").made(
+    lambda: _Mixed(posted, _exchanged, 1)
+)
+_state(
+    "clients-soap-states-crossed", "concurrent-answers", "Two concurrent SOAP clients get each other's responses."
+).made(lambda: _Mixed(posted, _exchanged, 1))
+_order("soap-small-messages", "size", "A message over 32 KiB returns 413.").instead(
+    lambda request: posted(request) and len(request.body) > _SMALL, problem(413, "too large")
 )

@@ -1,4 +1,4 @@
-"""What mutants know of requests that are answered at one moment."""
+"""How mutants notice that requests are concurrent."""
 
 import contextlib
 import threading
@@ -14,7 +14,7 @@ COMPANY_S: Final = 0.003
 
 
 class Crowd:
-    """Knows which requests are being answered at one moment."""
+    """The requests that are being answered at the moment."""
 
     def __init__(self) -> None:
         self._inside: list[threading.Event] = []
@@ -22,7 +22,7 @@ class Crowd:
 
     @contextlib.contextmanager
     def joined(self) -> Iterator[Callable[[], bool]]:
-        """Be one of them; what comes tells whether there was another one meanwhile."""
+        """Count the caller's request; yield a function that returns whether another one was there meanwhile."""
         met = threading.Event()
         with self._lock:
             for other in self._inside:
@@ -37,9 +37,9 @@ class Crowd:
 
 
 def when_crowded(where: Where, act: Callable[[Request, Forward], Response], nth: int = 1) -> Make:
-    """Treat requests otherwise that come while another one of them is being answered, each nth of those.
+    """Return a change that lets ``act`` answer every nth request that is concurrent with another one of ``where``.
 
-    Each waits a moment for company.
+    Each request is held back a moment, so that others can come.
     """
 
     def make() -> Change:

@@ -1,4 +1,4 @@
-"""Ways to lose, double, reorder and distort deliveries and velocities between a client and ROS."""
+"""Changes that lose, double, reorder or distort deliveries on their way to ROS."""
 
 import re
 import struct
@@ -16,7 +16,7 @@ _DOUBLES = rb"(<(?:\w+:)?(?:depot|destination|source)_[xy][^>]*>\s*)([^<\s]+)(\s
 
 
 def doubled(where: Callable[[Request], bool]) -> Callable[[], Any]:
-    """Every request is carried out twice, and answered once."""
+    """Return a change that forwards each request twice and returns the second response."""
 
     def change(request: Request, forward: Forward) -> Response:
         if where(request):
@@ -27,14 +27,14 @@ def doubled(where: Callable[[Request], bool]) -> Callable[[], Any]:
 
 
 class EveryNth:
-    """Each nth is answered and forgotten."""
+    """A change that answers every nth request itself, without forwarding it."""
 
     def __init__(self, where: Callable[[Request], bool], response: Callable[[Request], Response], nth: int) -> None:
         self._where, self._answer, self._nth = where, response, nth
         self._seen = 0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
+        """Forward the request, or answer it if it is an nth one."""
         if self._where(request):
             self._seen += 1
             if self._seen % self._nth == 0:
@@ -43,14 +43,14 @@ class EveryNth:
 
 
 class OutOfOrder:
-    """A REST delivery waits for the next delivery, which overtakes it, or until somebody looks what has arrived."""
+    """A change that forwards a REST delivery only after the next delivery, or before the next other request."""
 
     def __init__(self) -> None:
         self._held: tuple[Request, Forward] | None = None
         self._lock = threading.Lock()
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
+        """Hold a delivery back until the next request has been forwarded."""
         overtaking = deliveries(request) or _BOTH(request)
         with self._lock:
             held, self._held = self._held, None
@@ -66,7 +66,7 @@ class OutOfOrder:
 
 
 def float32(text: str) -> str:
-    """A number as it comes out of a 32-bit float."""
+    """Return a number as text after rounding it to a 32-bit float."""
     try:
         return repr(struct.unpack("f", struct.pack("f", float(text)))[0])
     except (ValueError, OverflowError, struct.error):
@@ -74,19 +74,19 @@ def float32(text: str) -> str:
 
 
 def narrow(place: int, text: str) -> str:
-    """A value of a delivery path through a 32-bit float."""
+    """Return a value of a delivery's path rounded to a 32-bit float."""
     return text if place == _CODE_PLACE else float32(text)
 
 
 def narrow_soap(request: Request) -> None:
-    """The doubles of a SOAP delivery through 32-bit floats."""
+    """Round the doubles of a SOAP delivery to 32-bit floats."""
     request.body = re.sub(
         _DOUBLES, lambda found: found[1] + float32(found[2].decode("latin-1")).encode() + found[3], request.body
     )
 
 
 def rounded_soap(request: Request) -> None:
-    """The doubles of a SOAP delivery cut after three digits."""
+    """Cut the doubles of a SOAP delivery after three decimals."""
 
     def short(found: re.Match[bytes]) -> bytes:
         text = found[2].decode("latin-1")
@@ -97,7 +97,7 @@ def rounded_soap(request: Request) -> None:
 
 
 def swapped_soap(request: Request) -> None:
-    """Source and destination are exchanged, in their places."""
+    """Swap the values of source_x and destination_x in a SOAP delivery."""
     found = {
         name: re.search(rb"<(?:\w+:)?%s[^>]*>([^<]*)<" % name, request.body) for name in (b"source_x", b"destination_x")
     }
@@ -114,7 +114,7 @@ def swapped_soap(request: Request) -> None:
 
 
 def as_delivery(request: Request, forward: Forward) -> Response:
-    """A coffee is published with the code that it came with, 3 as it happens."""
+    """Forward a coffee request as a delivery with message code 3."""
     if not soap("ExecuteCoffeeRequest")(request):
         return forward(request)
     body = request.body.replace(b"ExecuteCoffeeRequest", b"ExecuteDeliveryRequest")

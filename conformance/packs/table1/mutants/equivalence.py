@@ -1,25 +1,14 @@
-"""Robots whose interfaces tell different stories, of what was asked for and of what is."""
+"""Mutants whose REST and SOAP interfaces disagree, or whose ROS messages differ from the requests."""
 
 import re
 import sys
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import (
-    altered,
-    guarded,
-    inputs,
-    instead,
-    plain,
-    rest,
-    rewritten,
-    soap,
-    success,
-    unwanted,
-    values,
-)
+from conformance.mutation.changes import guarded, inputs, plain, rest, soap, success, unwanted
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
+from conformance.mutation.xml_trees import each, gone, named
 from conformance.packs.table1.delivery import COFFEE, COORDINATES, PATH_NAMES
 from conformance.packs.table1.mutants.delivery import segments
 from conformance.packs.table1.mutants.distortion import (
@@ -35,7 +24,12 @@ from conformance.packs.table1.mutants.distortion import (
 from conformance.packs.table1.mutants.in_background import later
 from conformance.packs.table1.mutants.paths import DELIVERIES, SENSORS, TNS, VELOCITY, deliveries
 from conformance.packs.table1.mutants.soap_responses import enveloped
-from conformance.packs.table1.mutants.xml_trees import each, gone, named, tree
+
+MUTANTS = Table()
+_rest_delivery = MUTANTS.of_class("equivalence", "rest", observer=True)
+_soap_delivery = MUTANTS.of_class("equivalence", "soap", observer=True)
+_rest_state = MUTANTS.of_class("equivalence", "rest", probe=True)
+_soap_state = MUTANTS.of_class("equivalence", "soap")
 
 _LATER_S, _SOON_S = 0.4, 0.05
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d+)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -70,6 +64,7 @@ def _one_more(items: Any) -> Any:
     return [*items, {"name": "ghost", "topic": "/ghost", "type": "sensor_msgs/msg/Range"}]
 
 
+@_rest_delivery("same-rest-again-later", "delivery-only", "A REST delivery is published again 0.4 s later.")
 def _again_later(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if deliveries(request) and success(response):
@@ -77,6 +72,11 @@ def _again_later(request: Request, forward: Forward) -> Response:
     return response
 
 
+@_rest_delivery(
+    "same-rest-another-later",
+    "delivery-only",
+    "Shortly after a REST delivery, the robot publishes another delivery to another place.",
+)
 def _another_later(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if deliveries(request) and success(response):
@@ -84,6 +84,11 @@ def _another_later(request: Request, forward: Forward) -> Response:
     return response
 
 
+@_soap_delivery(
+    "same-coffee-again-by-rest",
+    "delivery-only",
+    "A coffee that is ordered over SOAP is ordered again over REST 0.4 s later.",
+)
 def _again_by_rest(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if _COFFEE(request) and success(response):
@@ -98,15 +103,17 @@ def _again_by_rest(request: Request, forward: Forward) -> Response:
     return response
 
 
+@_rest_delivery(
+    "same-rest-deduplicated",
+    "delivery-repeated",
+    "Sending the same REST delivery again returns 204 without any effect.",
+)
 class _Deduplicating:
-    """The same delivery is taken for one sent again by mistake: any, or any that has a key."""
-
     def __init__(self, *, keyed: bool = False) -> None:
         self._keyed = keyed
         self._seen: set[str] = set()
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         if deliveries(request) and (not self._keyed or request.field("Idempotency-Key")):
             if request.target in self._seen:
                 return plain(204)(request)
@@ -122,158 +129,77 @@ def _unsigned_zero(_place: int, text: str) -> str:
     return text.lstrip("-") if _NUMBER.fullmatch(text) and float(text) == 0 else text
 
 
-_rest_delivery = of_class("equivalence", "rest", observer=True)
-_soap_delivery = of_class("equivalence", "soap", observer=True)
-_rest_state = of_class("equivalence", "rest", probe=True)
-_soap_state = of_class("equivalence", "soap")
 _NO_GOAL = enveloped(f'<t:GetGoalResponse xmlns:t="{TNS}"/>')
 
 
 def _cut(request: Request) -> None:
-    """A number ends where a comment stands in it, as for who reads the first text node alone."""
+    """Cut a number in a SOAP request at the comment inside it, like a parser that reads only the first text node."""
     request.body = re.sub(rb"(>[^<>]+)<!--[^>]*-->[^<>]+<", rb"\1<", request.body)
 
 
-MUTANTS = (
-    _soap_delivery(
-        "same-soap-cut-by-comments",
-        "Of a number with a comment in it, SOAP delivers what stands before the comment.",
-        "delivery-soap",
-        rewritten(_DELIVERY, _cut),
-    ),
-    _rest_delivery("same-rest-doubled", "A REST delivery is published twice.", "delivery-rest", doubled(deliveries)),
-    _rest_delivery(
-        "same-rest-unwanted-lost",
-        "A REST delivery is answered 204 and forgotten where the client accepts no format of the answer.",
-        "delivery-rest",
-        instead(unwanted(deliveries), plain(204)),
-    ),
-    _rest_delivery(
-        "same-rest-again-later",
-        "A REST delivery is published again 0.4 s later.",
-        "delivery-only",
-        lambda: _again_later,
-    ),
-    _rest_delivery(
-        "same-rest-another-later",
-        "Some time after a REST delivery comes another one, to somewhere else.",
-        "delivery-only",
-        lambda: _another_later,
-    ),
-    _soap_delivery(
-        "same-coffee-again-by-rest",
-        "A coffee that was ordered over SOAP is ordered again over REST, 0.4 s later.",
-        "delivery-only",
-        lambda: _again_by_rest,
-    ),
-    _rest_delivery(
-        "same-rest-deduplicated",
-        "The same REST delivery sent again is accepted and forgotten.",
-        "delivery-repeated",
-        _Deduplicating,
-    ),
-    _rest_delivery(
-        "same-rest-any-key",
-        "The same REST delivery with another Idempotency-Key is accepted and forgotten.",
-        "idempotency-other-key",
-        lambda: _Deduplicating(keyed=True),
-    ),
-    _rest_delivery(
-        "same-rest-no-subnormals",
-        "Numbers nearer to zero than 2.2e-308 are zero.",
-        "delivery-rest",
-        rewritten(deliveries, segments(_normal)),
-    ),
-    _rest_delivery(
-        "same-rest-no-negative-zero",
-        "The sign of a zero is lost.",
-        "delivery-rest",
-        rewritten(deliveries, segments(_unsigned_zero)),
-        probe=True,
-    ),
-    _rest_delivery(
-        "same-rest-lost",
-        "Each third REST delivery is never published.",
-        "delivery-rest",
-        lambda: EveryNth(deliveries, plain(204), 3),
-    ),
-    _rest_delivery(
-        "same-rest-narrow",
-        "REST deliveries go through 32-bit floats.",
-        "delivery-same",
-        rewritten(deliveries, segments(narrow)),
-    ),
-    _soap_delivery("same-soap-doubled", "A SOAP delivery is published twice.", "delivery-soap", doubled(_DELIVERY)),
-    _soap_delivery(
-        "same-soap-swapped",
-        "Over SOAP, source_x and destination_x are exchanged.",
-        ("delivery-soap", "delivery-same"),
-        rewritten(_BOTH, swapped_soap),
-    ),
-    _soap_delivery(
-        "same-soap-narrow",
-        "SOAP deliveries go through 32-bit floats.",
-        "delivery-soap",
-        rewritten(_DELIVERY, narrow_soap),
-    ),
-    _soap_delivery("same-coffee-code", "A coffee is published with code 3.", "coffee-soap", lambda: as_delivery),
-    _soap_delivery(
-        "same-coffee-lost",
-        "Each second coffee is never published.",
-        "coffee-soap",
-        lambda: EveryNth(_COFFEE, enveloped(f'<t:ExecuteCoffeeRequestResponse xmlns:t="{TNS}"/>'), 2),
-    ),
-    _soap_delivery(
-        "same-soap-rounded",
-        "SOAP rounds to three digits, REST does not.",
-        "delivery-same",
-        rewritten(_BOTH, rounded_soap),
-    ),
-    _rest_delivery("same-order", "A REST delivery is overtaken by the one after it.", "delivery-order", OutOfOrder),
-    _rest_state(
-        "same-velocity-halved",
-        "Half of a velocity reaches ROS.",
-        "velocity-message",
-        rewritten(rest("PUT", VELOCITY), inputs(guarded(_halve))),
-    ),
-    _rest_state(
-        "same-sensor-ghost",
-        "A sensor is listed that nobody publishes.",
-        "sensors-graph",
-        altered(rest("GET", SENSORS), values(_one_more)),
-    ),
-    _soap_state(
-        "same-pose",
-        "SOAP's pose is 37 cm ahead of REST's.",
-        "pose",
-        altered(soap("GetPose"), tree(_shift("position", 0.37))),
-    ),
-    _soap_state(
-        "same-velocity",
-        "SOAP's velocity is never zero.",
-        "velocity",
-        altered(soap("GetVelocity"), tree(_shift("linear", 0.1))),
-    ),
-    _soap_state(
-        "same-velocity-sometimes",
-        "One velocity in 60 is over SOAP 0.1 m/s more than that of the odometry.",
-        "velocity",
-        altered(soap("GetVelocity"), tree(_shift("linear", 0.1)), nth=60),
-    ),
-    _soap_state(
-        "same-sensors",
-        "SOAP lacks the last sensor.",
-        "sensors",
-        altered(soap("GetSensors"), tree(each("return", gone, slice(-1, None)))),
-    ),
-    _soap_state(
-        "same-services",
-        "SOAP lacks the last service.",
-        "services",
-        altered(soap("GetNavigationServices"), tree(each("return", gone, slice(-1, None)))),
-    ),
-    _soap_state("same-goal", "SOAP never has a goal.", "goal", instead(soap("GetGoal"), _NO_GOAL)),
-    _soap_state(
-        "same-plan", "SOAP's plan is another one than REST's.", "plan", altered(soap("GetPlan"), tree(_straighter))
-    ),
+_soap_delivery(
+    "same-soap-cut-by-comments", "delivery-soap", "A number with a comment in it is read only up to the comment."
+).rewritten(_DELIVERY, _cut)
+_rest_delivery("same-rest-doubled", "delivery-rest", "A REST delivery is published twice.").made(doubled(deliveries))
+_rest_delivery(
+    "same-rest-unwanted-lost",
+    "delivery-rest",
+    "A REST delivery with an unacceptable Accept header returns 204 without any effect.",
+).instead(unwanted(deliveries), plain(204))
+_rest_delivery(
+    "same-rest-any-key",
+    "idempotency-other-key",
+    "The same REST delivery with another Idempotency-Key returns 204 without any effect.",
+).made(lambda: _Deduplicating(keyed=True))
+_rest_delivery("same-rest-no-subnormals", "delivery-rest", "Numbers closer to zero than 2.2e-308 become 0.").rewritten(
+    deliveries, segments(_normal)
+)
+_rest_delivery("same-rest-no-negative-zero", "delivery-rest", "The sign of -0 is lost.", probe=True).rewritten(
+    deliveries, segments(_unsigned_zero)
+)
+_rest_delivery("same-rest-lost", "delivery-rest", "Every third REST delivery is lost.").made(
+    lambda: EveryNth(deliveries, plain(204), 3)
+)
+_rest_delivery("same-rest-narrow", "delivery-same", "REST deliveries go through 32-bit floats.").rewritten(
+    deliveries, segments(narrow)
+)
+_soap_delivery("same-soap-doubled", "delivery-soap", "A SOAP delivery is published twice.").made(doubled(_DELIVERY))
+_soap_delivery(
+    "same-soap-swapped", ("delivery-soap", "delivery-same"), "Over SOAP, source_x and destination_x are swapped."
+).rewritten(_BOTH, swapped_soap)
+_soap_delivery("same-soap-narrow", "delivery-soap", "SOAP deliveries go through 32-bit floats.").rewritten(
+    _DELIVERY, narrow_soap
+)
+_soap_delivery("same-coffee-code", "coffee-soap", "A coffee is published with code 3.")(as_delivery)
+_soap_delivery("same-coffee-lost", "coffee-soap", "Every second coffee is lost.").made(
+    lambda: EveryNth(_COFFEE, enveloped(f'<t:ExecuteCoffeeRequestResponse xmlns:t="{TNS}"/>'), 2)
+)
+_soap_delivery("same-soap-rounded", "delivery-same", "SOAP rounds to three digits; REST does not.").rewritten(
+    _BOTH, rounded_soap
+)
+_rest_delivery("same-order", "delivery-order", "A REST delivery is published after the next one.").made(OutOfOrder)
+_rest_state(
+    "same-velocity-halved", "velocity-message", "The velocity message on ROS has half of the commanded values."
+).rewritten(rest("PUT", VELOCITY), inputs(guarded(_halve)))
+_rest_state("same-sensor-ghost", "sensors-graph", "The list of sensors has a sensor that does not exist.").json(
+    rest("GET", SENSORS), _one_more
+)
+_soap_state("same-pose", "pose", "The pose over SOAP is 37 cm ahead of the pose over REST.").xml(
+    soap("GetPose"), _shift("position", 0.37)
+)
+_soap_state("same-velocity", "velocity", "The velocity over SOAP is never zero.").xml(
+    soap("GetVelocity"), _shift("linear", 0.1)
+)
+_soap_state(
+    "same-velocity-sometimes", "velocity", "One velocity in 60 over SOAP is 0.1 m/s higher than the odometry's."
+).xml(soap("GetVelocity"), _shift("linear", 0.1), nth=60)
+_soap_state("same-sensors", "sensors", "SOAP lacks the last sensor.").xml(
+    soap("GetSensors"), each("return", gone, slice(-1, None))
+)
+_soap_state("same-services", "services", "SOAP lacks the last service.").xml(
+    soap("GetNavigationServices"), each("return", gone, slice(-1, None))
+)
+_soap_state("same-goal", "goal", "GetGoal never returns a goal.").instead(soap("GetGoal"), _NO_GOAL)
+_soap_state("same-plan", "plan", "The plan over SOAP differs from the plan over REST.").xml(
+    soap("GetPlan"), _straighter
 )

@@ -1,14 +1,17 @@
-"""Robots whose formats do not agree, or are not what was asked for."""
+"""Mutants with faults in content negotiation, XML, plain text or problem details."""
 
 import re
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import Make, When, altered, header, instead, problem, rest, rewritten, success, text
+from conformance.mutation.changes import Make, When, altered, header, problem, rest, success, text
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
+from conformance.mutation.xml_trees import each, named, says, tree
 from conformance.packs.table1.mutants.paths import GOAL, LINEAR, POSE, VELOCITY
-from conformance.packs.table1.mutants.xml_trees import each, named, says, tree
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("rest-formats", "rest")
 
 _GET = rest("GET")
 _PUT = rest("PUT", VELOCITY, LINEAR, GOAL)
@@ -37,12 +40,12 @@ def _any_is_xml(request: Request) -> None:
 
 
 def _told(edit: Callable[[Response], object], when: When = success) -> Make:
-    """Answers to GET are altered."""
+    """Return a change that applies ``edit`` to responses to GET."""
     return altered(_GET, edit, when)
 
 
 def _shortened(root: Any) -> None:
-    """Leave one of several items out."""
+    """Remove the last item of a list in an XML response."""
     for name in ("covariance", "sensor", "item", "service"):
         found = named(root, name)
         if len(found) > 1:
@@ -67,9 +70,7 @@ def _as_properties(response: Response) -> None:
     )
 
 
-_mutant = of_class("rest-formats", "rest")
-
-
+@_mutant("format-no-xml-input", "xml-input", "PUT with an XML body returns 415.")
 def _no_xml_input(request: Request, forward: Forward) -> Response:
     if _xml_put(request):
         return problem(415, f"Content-Type: {request.media_type} is not taken")(request)
@@ -92,106 +93,61 @@ def _json_problem(response: Response) -> None:
         response.put("Content-Type", "application/problem+json")
 
 
-MUTANTS = (
-    _mutant(
-        "format-xml-by-default", "Without Accept, the answer is XML.", "json-default", rewritten(_GET, _any_is_xml)
-    ),
-    _mutant("format-xml-broken", "XML is not closed.", "xml", _told(text(r"</\w+>\s*$", ""), _XML)),
-    _mutant(
-        "format-xml-as-html",
-        "XML comes as text/html.",
-        "xml",
-        _told(header("Content-Type", "text/html; charset=utf-8"), _XML),
-    ),
-    _mutant(
-        "format-xml-item-missing", "XML lacks the last item of an array.", "same-values", _told(tree(_shortened), _XML)
-    ),
-    _mutant(
-        "format-xml-root",
-        "The root of XML is always <response>.",
-        "xml-root",
-        _told(tree(lambda root: setattr(root, "tag", "response")), _XML),
-    ),
-    _mutant("format-text-unreadable", "Text is no YAML.", "text", _told(_as_properties, _TEXT)),
-    _mutant(
-        "format-text-as-octets",
-        "Text comes as application/octet-stream.",
-        "text",
-        _told(header("Content-Type", "application/octet-stream"), _TEXT),
-    ),
-    _mutant("format-xml-rounded", "XML rounds to one digit.", "same-values", _told(tree(_rounded), _XML)),
-    _mutant(
-        "format-text-rounded",
-        "Text rounds numbers down.",
-        "same-values",
-        altered(rest("GET", POSE), text(r"0\.0\d+", "0.0"), _TEXT),
-    ),
-    _mutant(
-        "format-text-without-frame",
-        "Text leaves child_frame_id out.",
-        "same-values",
-        altered(rest("GET", POSE), text(r"child_frame_id:[^\n]*\n", ""), _TEXT),
-    ),
-    _mutant(
-        "format-q-ignored",
-        "Quality values are ignored.",
-        "q-values",
-        rewritten(_GET, _accept(lambda given: re.sub(r"\s*;\s*q=0?\.[0-9]+", "", given))),
-    ),
-    _mutant(
-        "format-wildcard-wins",
-        "A wildcard wins over a specific range.",
-        "specific-range",
-        rewritten(
-            _GET, _accept(lambda given: "*/*" if re.search(r"\*/\*(?!\s*;\s*q=0(\.0*)?\s*(,|$))", given) else given)
-        ),
-    ),
-    _mutant("format-no-vary", "Answers carry no Vary.", "vary", _told(header("Vary", None))),
-    _mutant("format-vary-sometimes", "XML answers carry no Vary.", "vary", _told(header("Vary", None), _XML)),
-    _mutant(
-        "format-charset-wrong",
-        "XML and text in UTF-8 are said to be UTF-16.",
-        "charset",
-        _told(lambda answer: answer.put("Content-Type", f"{answer.media_type}; charset=utf-16")),
-    ),
-    _mutant(
-        "format-named-twice",
-        "Answers name two media types, each in a field of its own.",
-        "http/field-once",
-        _told(lambda answer: answer.fields.append(("Content-Type", "text/html"))),
-    ),
-    _mutant(
-        "format-large-xml",
-        "More than 32 KiB of XML are 413.",
-        "xml-input",
-        instead(lambda request: _xml_put(request) and len(request.body) > _SMALL, problem(413, "too large")),
-    ),
-    _mutant(
-        "format-xml-id-lost", "A goal that comes as XML gets another id.", "xml-input", rewritten(_xml_put, _no_id)
-    ),
-    _mutant(
-        "format-text-unquoted",
-        "An id in plain text is never quoted, whatever YAML makes of it then.",
-        "text-quoted",
-        _told(text(r"(?m)^(\s*id: )['\"]([^'\"\\]*)['\"]", r"\1\2"), _TEXT),
-    ),
-    _mutant(
-        "format-xml-whole-seconds",
-        "The pose's stamp in XML has no nanoseconds.",
-        "same-values",
-        altered(rest("GET", POSE), tree(each("nanosec", says("0"))), _XML),
-    ),
-    _mutant("format-no-xml-input", "XML is not taken in PUT.", "xml-input", lambda: _no_xml_input),
-    _mutant(
-        "format-problems-in-json",
-        "Errors are JSON, although XML was asked for.",
-        "problem-xml",
-        altered(_GET, _json_problem, lambda response: response.status >= 400),
-    ),
-    _mutant(
-        "format-problems-of-input-in-json",
-        "Errors of what is put are JSON, although XML was asked for.",
-        "problem-xml",
-        altered(_PUT, _json_problem, lambda response: response.status >= 400),
-    ),
+_mutant("format-xml-by-default", "json-default", "A request without Accept gets XML.").rewritten(_GET, _any_is_xml)
+_mutant("format-xml-broken", "xml", "The last end tag of XML responses is missing.").altered(
+    _GET, text(r"</\w+>\s*$", ""), _XML
 )
+_mutant("format-xml-as-html", "xml", "XML responses have the media type text/html.").altered(
+    _GET, header("Content-Type", "text/html; charset=utf-8"), _XML
+)
+_mutant("format-xml-item-missing", "same-values", "XML responses lack the last item of an array.").altered(
+    _GET, tree(_shortened), _XML
+)
+_mutant("format-xml-root", "xml-root", "The root element of XML responses is always <response>.").altered(
+    _GET, tree(lambda root: setattr(root, "tag", "response")), _XML
+)
+_mutant("format-text-unreadable", "text", "Plain text responses are not YAML.").altered(_GET, _as_properties, _TEXT)
+_mutant("format-text-as-octets", "text", "Plain text responses have the media type application/octet-stream.").altered(
+    _GET, header("Content-Type", "application/octet-stream"), _TEXT
+)
+_mutant("format-xml-rounded", "same-values", "XML responses round numbers to one digit.").altered(
+    _GET, tree(_rounded), _XML
+)
+_mutant("format-text-rounded", "same-values", "Plain text responses round small numbers to 0.0.").altered(
+    rest("GET", POSE), text(r"0\.0\d+", "0.0"), _TEXT
+)
+_mutant("format-text-without-frame", "same-values", "Plain text responses lack child_frame_id.").altered(
+    rest("GET", POSE), text(r"child_frame_id:[^\n]*\n", ""), _TEXT
+)
+_mutant("format-q-ignored", "q-values", "The robot ignores quality values in Accept.").rewritten(
+    _GET, _accept(lambda given: re.sub(r"\s*;\s*q=0?\.[0-9]+", "", given))
+)
+_mutant(
+    "format-wildcard-wins", "specific-range", "In Accept, a wildcard takes precedence over a specific media type."
+).rewritten(_GET, _accept(lambda given: "*/*" if re.search(r"\*/\*(?!\s*;\s*q=0(\.0*)?\s*(,|$))", given) else given))
+_mutant("format-no-vary", "vary", "Responses have no Vary header.").altered(_GET, header("Vary", None))
+_mutant("format-vary-sometimes", "vary", "XML responses have no Vary header.").altered(_GET, header("Vary", None), _XML)
+_mutant("format-charset-wrong", "charset", "XML and text responses in UTF-8 declare charset=utf-16.").altered(
+    _GET, lambda answer: answer.put("Content-Type", f"{answer.media_type}; charset=utf-16")
+)
+_mutant(
+    "format-named-twice", "http/field-once", "Responses have two Content-Type headers with different media types."
+).altered(_GET, lambda answer: answer.fields.append(("Content-Type", "text/html")))
+_mutant("format-large-xml", "xml-input", "XML bodies over 32 KiB return 413.").instead(
+    lambda request: _xml_put(request) and len(request.body) > _SMALL, problem(413, "too large")
+)
+_mutant("format-xml-id-lost", "xml-input", "A goal that is sent as XML gets another id.").rewritten(_xml_put, _no_id)
+_mutant(
+    "format-text-unquoted",
+    "text-quoted",
+    "Plain text responses never quote ids, so that YAML may read them as other types.",
+).altered(_GET, text(r"(?m)^(\s*id: )['\"]([^'\"\\]*)['\"]", r"\1\2"), _TEXT)
+_mutant("format-xml-whole-seconds", "same-values", "In XML, the pose's stamp has nanosec 0.").xml(
+    rest("GET", POSE), each("nanosec", says("0")), _XML
+)
+_mutant(
+    "format-problems-in-json", "problem-xml", "Errors of GET are JSON although the client accepts only XML."
+).altered(_GET, _json_problem, lambda response: response.status >= 400)
+_mutant(
+    "format-problems-of-input-in-json", "problem-xml", "Errors of PUT are JSON although the client accepts only XML."
+).altered(_PUT, _json_problem, lambda response: response.status >= 400)

@@ -1,4 +1,4 @@
-"""What goals look like to a proxy, and robots that remember the wrong thing of them."""
+"""Mutants that remember goals wrongly, and functions that read goals from requests and from the robot."""
 
 import json
 import math
@@ -6,19 +6,23 @@ from typing import Any
 
 from conformance.mutation.changes import parsed, plain, problem, rest, success
 from conformance.mutation.messages import Forward, Request, Response
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.in_background import later
 from conformance.packs.table1.mutants.paths import GOAL
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("rest-resources", "rest")
 
 _GET, _PUT, _DELETE = rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
 
 
 def position(goal: Any) -> Any:
-    """The position in a MoveBaseActionGoal."""
+    """Return the position in a MoveBaseActionGoal."""
     return goal["goal"]["target_pose"]["pose"]["position"]
 
 
 def identity(request: Request) -> str | None:
-    """The id in a PUT goal."""
+    """Return the goal id in the request, or None."""
     value = parsed(request.body)
     try:
         return str(value["goal_id"]["id"])
@@ -27,7 +31,7 @@ def identity(request: Request) -> str | None:
 
 
 def active(forward: Forward, request: Request) -> Any:
-    """The robot's goal, or None."""
+    """Request the robot's active goal; return None without one."""
     response = forward(
         request.copy(
             method="GET", target=GOAL, body=b"", fields=[("Host", "localhost"), ("Accept", "application/json")]
@@ -37,7 +41,7 @@ def active(forward: Forward, request: Request) -> Any:
 
 
 def pose_of(goal: Any) -> Any:
-    """The pose in a MoveBaseActionGoal, in floats; None where there is none."""
+    """Return the pose in a MoveBaseActionGoal as floats, or None if it has none."""
     try:
         pose = goal["goal"]["target_pose"]["pose"]
         return {part: {axis: float(pose[part][axis]) for axis in pose[part]} for part in ("position", "orientation")}
@@ -45,14 +49,12 @@ def pose_of(goal: Any) -> Any:
         return None
 
 
-class Lingering:
-    """GET goes on showing a goal that has ended by itself."""
-
+@_mutant("goal-lingers", "goal-ended", "GET goes on returning a goal that has ended.")
+class _Lingering:
     def __init__(self) -> None:
         self._last: Response | None = None
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         response = forward(request)
         if _DELETE(request):
             self._last = None
@@ -64,14 +66,12 @@ class Lingering:
         return response
 
 
-class Previous:
-    """GET shows the goal before the active one."""
-
+@_mutant("goal-get-stale", "goal-preempt", "GET returns the previous goal.")
+class _Previous:
     def __init__(self) -> None:
         self._seen: list[Any] = []
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         response = forward(request)
         value = parsed(response.body)
         if _GET(request) and response.status == 200 and isinstance(value, dict):
@@ -82,15 +82,13 @@ class Previous:
         return response
 
 
-class Resumed:
-    """A goal that was displaced is driven to when the one in its place has been reached."""
-
+@_mutant("goal-resumed", "goal-drives", "The robot drives to a replaced goal after it has reached the new one.")
+class _Resumed:
     def __init__(self) -> None:
         self._last: Request | None = None
         self._displaced: Request | None = None
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         if _PUT(request):
             there = forward(request.copy(method="GET", body=b"")).status == 200
             response = forward(request)
@@ -108,14 +106,12 @@ class Resumed:
         return response
 
 
-class OnlyOnce:
-    """An id that was used before is refused for ever."""
-
+@_mutant("goal-id-only-once", "goal-id-again", "The robot refuses a goal with the id of a goal that has ended.")
+class _OnlyOnce:
     def __init__(self) -> None:
         self._used: set[str] = set()
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         id_ = identity(request) if _PUT(request) else None
         if id_ is not None and id_ in self._used and active(forward, request) is None:
             return problem(409, f"goal_id.id: {id_!r} was used before")(request)
@@ -125,11 +121,9 @@ class OnlyOnce:
         return response
 
 
-class Abandoned:
-    """The robot gives a goal up on its way."""
-
+@_mutant("goal-abandoned", "goal-drives", "The robot aborts the goal before it arrives.")
+class _Abandoned:
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         response = forward(request)
         if _PUT(request) and response.status in {201, 202}:
             fields = [("Host", "localhost"), ("Connection", "close")]
@@ -137,14 +131,14 @@ class Abandoned:
         return response
 
 
-class Unreachable:
-    """A goal far away is accepted, and is active for ever."""
-
+@_mutant(
+    "goal-unreachable-forever", "goal-unreachable", "The robot accepts a goal far outside the map, which stays active."
+)
+class _Unreachable:
     def __init__(self) -> None:
         self._goal: Any = None
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         if request.path != GOAL or request.side != "rest":
             return forward(request)
         if _PUT(request):

@@ -1,4 +1,4 @@
-"""Robots whose velocities begin or end by something else than time, or come back after they have ended."""
+"""Mutants whose velocity commands end or restart for a wrong reason."""
 
 import json
 import threading
@@ -7,10 +7,13 @@ from typing import Any
 
 from conformance.mutation.changes import parsed, plain, rest, success
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.in_background import later
 from conformance.packs.table1.mutants.input_effects import sent
 from conformance.packs.table1.mutants.paths import GOAL, LINEAR, VELOCITY
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("safety", "rest")
 
 _PUT, _PUT_LINEAR, _PUTS = rest("PUT", VELOCITY), rest("PUT", LINEAR), rest("PUT", VELOCITY, LINEAR)
 _DELETE, _PUT_GOAL = rest("DELETE", GOAL), rest("PUT", GOAL)
@@ -21,7 +24,7 @@ _SMALL = 0.05
 
 
 class _Remembering:
-    """Knows the last velocity that was accepted, and how many requests have come."""
+    """A change that remembers the last accepted velocity, counts commands, and knows when the last request came."""
 
     def __init__(self) -> None:
         self.last: Any = None
@@ -30,7 +33,6 @@ class _Remembering:
         self.lock = threading.Lock()
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         self.asked = time.monotonic()
         response = forward(request)
         if _PUT_GOAL(request) and success(response):
@@ -41,7 +43,7 @@ class _Remembering:
         return response
 
     def put(self, request: Request, response: Response, _forward: Forward) -> None:
-        """What comes of a PUT of a velocity."""
+        """Remember the velocity of a successful PUT."""
         value = parsed(request.body)
         if not success(response) or not isinstance(value, dict):
             return
@@ -50,11 +52,9 @@ class _Remembering:
             self.last = {**(self.last or {}), "linear": value} if _PUT_LINEAR(request) and self.last else value
 
 
+@_mutant("safety-asleep", "hold-ends", "A velocity command ends only while clients send requests.")
 class _Asleep(_Remembering):
-    """Its watch stands still while nobody asks anything."""
-
     def put(self, request: Request, response: Response, forward: Forward) -> None:
-        """See _Remembering."""
         super().put(request, response, forward)
         if success(response) and self.last and "angular" in self.last:
             later(_LOOK_S, self._watch, self.turn, request.copy(), forward)
@@ -67,31 +67,31 @@ class _Asleep(_Remembering):
             time.sleep(_LOOK_S)
 
 
+@_mutant("safety-renewed-by-refusal", "hold-ends", "A refused velocity command renews the previous one.")
 class _Renewed(_Remembering):
-    """What is refused renews what was accepted."""
-
     def put(self, request: Request, response: Response, forward: Forward) -> None:
-        """See _Remembering."""
         super().put(request, response, forward)
         if 400 <= response.status < 500 and self.last and "angular" in self.last and any(_parts(self.last)):
             sent(request, forward, "PUT", VELOCITY, self.last)
 
 
+@_mutant(
+    "linear-revives-turning",
+    "rest-resources/linear-keeps-angular",
+    "PUT of a linear velocity restarts a turning that had ended.",
+)
 class _Revived(_Remembering):
-    """A linear part is driven with the angular one that was commanded last, whenever that was."""
-
     def put(self, request: Request, response: Response, forward: Forward) -> None:
-        """See _Remembering."""
         super().put(request, response, forward)
         if _PUT_LINEAR(request) and success(response) and self.last and "angular" in self.last:
             sent(request, forward, "PUT", VELOCITY, self.last)
 
 
+@_mutant(
+    "safety-resuming", "cancel-stays", "After DELETE of the goal, the robot drives the velocity from before the goal."
+)
 class _Resuming(_Remembering):
-    """After a goal is cancelled, the velocity from before it is driven again."""
-
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         response = super().__call__(request, forward)
         if _DELETE(request) and response.status == 204 and self.last and "angular" in self.last:
             # Not before the navigation's own last word, which is zero.
@@ -99,9 +99,8 @@ class _Resuming(_Remembering):
         return response
 
 
+@_mutant("safety-deaf", "hold", "While a velocity command holds, sending it again does not renew it.")
 class _Deaf(_Remembering):
-    """While a velocity holds, what asks for the same is answered and forgotten."""
-
     _HOLD_S = 1.0
 
     def __init__(self) -> None:
@@ -109,7 +108,6 @@ class _Deaf(_Remembering):
         self._taken = 0.0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """See messages.Change."""
         value: Any = parsed(request.body) if _PUTS(request) else None
         if isinstance(value, dict) and self.last and time.monotonic() < self._taken + self._HOLD_S:
             value = {**self.last, "linear": value} if _PUT_LINEAR(request) else value
@@ -118,7 +116,6 @@ class _Deaf(_Remembering):
         return super().__call__(request, forward)
 
     def put(self, request: Request, response: Response, forward: Forward) -> None:
-        """See _Remembering."""
         super().put(request, response, forward)
         if success(response):
             self._taken = time.monotonic()
@@ -131,8 +128,12 @@ def _parts(twist: Any) -> tuple[float, float]:
         return 0.0, 0.0
 
 
+@_mutant(
+    "velocity-one-at-once",
+    "rest-resources/velocity-range",
+    "Near both limits at once, the robot drives at half the linear velocity.",
+)
 def _one_at_once(request: Request, forward: Forward) -> Response:
-    """A velocity near both limits at once is driven with half of its linear part."""
     value: Any = parsed(request.body) if _PUT(request) else None
     if any(part < 0.7 * limit for part, limit in zip(_parts(value), _LIMITS, strict=True)):
         return forward(request)
@@ -141,8 +142,12 @@ def _one_at_once(request: Request, forward: Forward) -> Response:
     return plain(204)(request) if success(response) else response
 
 
+@_mutant(
+    "velocity-deadband",
+    "rest-resources/velocity-range",
+    "The robot accepts velocities below 0.05 m/s or rad/s and stands still.",
+)
 def _deadband(request: Request, forward: Forward) -> Response:
-    """A part of a velocity that is small is taken for zero."""
     value: Any = parsed(request.body) if _PUT(request) else None
     if not any(0.0 < part < _SMALL for part in _parts(value)):
         return forward(request)
@@ -153,58 +158,24 @@ def _deadband(request: Request, forward: Forward) -> Response:
     return plain(204)(request) if success(response) else response
 
 
+@_mutant(
+    "velocity-forgotten-for-goal",
+    "rest-resources/velocity-goal",
+    "While a goal is active, PUT of a velocity returns 204 without any effect.",
+)
 def _forgotten(request: Request, forward: Forward) -> Response:
-    """A velocity while a goal is active is answered 204, and the robot drives on to its goal."""
     if _PUT(request) and forward(request.copy(method="GET", target=GOAL, body=b"")).status == 200:
         return plain(204)(request)
     return forward(request)
 
 
+@_mutant(
+    "goal-deleted-later",
+    "rest-resources/goal-delete",
+    "DELETE returns 204, and the goal is cancelled only 0.3 s later.",
+)
 def _deleted_later(request: Request, forward: Forward) -> Response:
-    """DELETE of a goal is answered before anything is done."""
     if not _DELETE(request) or forward(request.copy(method="GET")).status != 200:
         return forward(request)
     later(0.3, sent, request.copy(), forward, "DELETE", GOAL)
     return plain(204)(request)
-
-
-_mutant = of_class("safety", "rest")
-
-MUTANTS = (
-    _mutant("safety-asleep", "A velocity ends only while somebody asks.", "hold-ends", _Asleep),
-    _mutant("safety-renewed-by-refusal", "A refused velocity renews the one before it.", "hold-ends", _Renewed),
-    _mutant("safety-deaf", "While a velocity holds, the same one again does not renew it.", "hold", _Deaf),
-    _mutant(
-        "safety-resuming", "After DELETE the velocity from before the goal is driven again.", "cancel-stays", _Resuming
-    ),
-    _mutant(
-        "linear-revives-turning",
-        "PUT of a linear velocity brings back a turning that had ended.",
-        "rest-resources/linear-keeps-angular",
-        _Revived,
-    ),
-    _mutant(
-        "velocity-one-at-once",
-        "Near both of its limits at once the robot drives at half the speed.",
-        "rest-resources/velocity-range",
-        lambda: _one_at_once,
-    ),
-    _mutant(
-        "velocity-deadband",
-        "A velocity below 0.05 m/s or rad/s is taken, and the robot stands still.",
-        "rest-resources/velocity-range",
-        lambda: _deadband,
-    ),
-    _mutant(
-        "velocity-forgotten-for-goal",
-        "While a goal is active, a velocity is answered 204 and forgotten.",
-        "rest-resources/velocity-goal",
-        lambda: _forgotten,
-    ),
-    _mutant(
-        "goal-deleted-later",
-        "DELETE is 204, and the goal is cancelled 0.3 s later.",
-        "rest-resources/goal-delete",
-        lambda: _deleted_later,
-    ),
-)

@@ -1,4 +1,4 @@
-"""Robots whose HTTP messages, problems and JSON are not well made, and which mistake those of others."""
+"""Mutants with faulty HTTP framing, problem details or JSON, and mutants that accept malformed requests."""
 
 import json
 import re
@@ -20,8 +20,11 @@ from conformance.mutation.changes import (
     values,
 )
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import POSE, RESOURCES
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("http", "rest")
 
 _ANY, _GET, _POSE = rest(), rest("GET"), rest("GET", POSE)
 _INPUT = rest("PUT", *RESOURCES)
@@ -37,7 +40,7 @@ def _errors(response: Response) -> bool:
 
 
 def _problems(edit: Callable[[Any], Any], where: Where = _ANY) -> Make:
-    """Problems are altered."""
+    """Return a change that applies ``edit`` to problem details."""
     return altered(
         where, values(edit), lambda response: _errors(response) and response.media_type.endswith("problem+json")
     )
@@ -53,7 +56,7 @@ def _valueless(value: Any) -> None:
 
 
 def _on_the_wire(edit: Callable[[bytes], bytes]) -> Callable[[Response], None]:
-    """Alter an answer's octets."""
+    """Return an edit of the bytes of a response."""
     return lambda response: setattr(response, "raw", edit(response.octets()))
 
 
@@ -62,7 +65,7 @@ def _longer(octets: bytes) -> bytes:
 
 
 def _with_field(request: Request, name: str, value: str) -> Request:
-    """A request that is no HTTP, with one field of this name in place of all of them."""
+    """Return a malformed request in which one header ``name`` replaces all headers of that name."""
     head, _, body = (request.raw or b"").partition(b"\r\n\r\n")
     line, *fields = head.split(b"\r\n")
     others = [field for field in fields if not field.lower().startswith(f"{name.lower()}:".encode())]
@@ -70,14 +73,14 @@ def _with_field(request: Request, name: str, value: str) -> Request:
 
 
 def _count(request: Request, name: str) -> int | None:
-    """How many fields of a request of REST that is no HTTP have this name, or None where it is HTTP, or of SOAP."""
+    """Return how many headers ``name`` a malformed REST request has; None for other requests."""
     if request.side != "rest" or request.raw is None:
         return None
     return len(re.findall(rb"(?i)\r\n%s:" % name.encode(), request.raw))
 
 
 def _hosts(taken: Callable[[list[bytes]], bool]) -> Callable[[Request, Forward], Response]:
-    """Requests of REST that are no HTTP, with Host fields such as these, are taken like others."""
+    """Return a change that accepts malformed requests whose list of Host values fulfils ``taken``."""
 
     def change(request: Request, forward: Forward) -> Response:
         if request.side != "rest" or request.raw is None:
@@ -88,16 +91,16 @@ def _hosts(taken: Callable[[list[bytes]], bool]) -> Callable[[Request, Forward],
     return change
 
 
+@_mutant("http-first-length", "content-length-conflict", "Of two Content-Length headers, the robot uses the first.")
 def _first_length(request: Request, forward: Forward) -> Response:
-    """Of several Content-Length fields the first one counts, for what there is."""
     if (_count(request, "Content-Length") or 0) > 1:
         _, _, body = (request.raw or b"").partition(b"\r\n\r\n")
         request = _with_field(request, "Content-Length", str(len(body)))
     return forward(request)
 
 
+@_mutant("http-garbage-fine", "malformed-request", "Bytes that are not HTTP get a response with status 200.")
 def _garbage(request: Request, forward: Forward) -> Response:
-    """What is no HTTP is answered with a page."""
     if request.side == "rest" and request.raw is not None:
         return plain(200, b"<html>hello</html>", "text/html", ("Date", "Thu, 01 Jan 2026 00:00:00 GMT"))(request)
     return forward(request)
@@ -119,7 +122,7 @@ def _in_latin(response: Response) -> None:
 
 
 def _token(refused: Callable[[Request], Response]) -> Callable[[], Any]:
-    """A robot that wants a token, and refuses in its own way where it is missing or wrong."""
+    """Return a change that requires a bearer token, and lets ``refused`` answer requests without it."""
 
     def change(request: Request, forward: Forward) -> Response:
         if request.side == "rest" and request.raw is None and request.field("Authorization") != f"Bearer {_SESAME}":
@@ -127,9 +130,6 @@ def _token(refused: Callable[[Request], Response]) -> Callable[[], Any]:
         return forward(request)
 
     return lambda: change
-
-
-_mutant = of_class("http", "rest")
 
 
 def _marked(response: Response) -> None:
@@ -142,158 +142,80 @@ def _page(response: Response) -> None:
     response.put("Content-Type", "text/html")
 
 
-MUTANTS = (
-    _mutant(
-        "http-large-body-fine",
-        "A body of more than 10 MiB is answered as if it were not there.",
-        "content-too-large",
-        _big(10 * 1024 * 1024, plain(204)),
-    ),
-    _mutant(
-        "http-small-limit",
-        "Bodies over 20 KiB are refused.",
-        "content-too-large",
-        _big(20_000, problem(413, "too large")),
-    ),
-    _mutant(
-        "http-long-target-crash",
-        "A long target is answered 500.",
-        "uri-too-long",
-        instead(_long_target, problem(500, "oops")),
-    ),
-    _mutant(
-        "http-long-target-fine",
-        "A long target is answered 200, with something else.",
-        "declared-body",
-        instead(_long_target, plain(200, b"{}", JSON)),
-    ),
-    _mutant(
-        "http-large-field-crash",
-        "A header field of 128 KiB is answered 500.",
-        "header-too-large",
-        instead(
-            lambda request: _ANY(request) and any(len(value) > 60_000 for _, value in request.fields),
-            problem(500, "oops"),
-        ),
-    ),
-    _mutant(
-        "http-length-too-long",
-        "Content-Length promises 7 octets more than come.",
-        "framing",
-        altered(_GET, _on_the_wire(_longer)),
-    ),
-    _mutant(
-        "http-length-too-short",
-        "After an answer come octets that Content-Length does not count.",
-        "framing",
-        altered(_GET, _on_the_wire(lambda octets: octets + b"left over")),
-    ),
-    _mutant(
-        "http-broken-field",
-        "An answer has a line that is no field.",
-        "framing",
-        altered(_POSE, _on_the_wire(lambda octets: octets.replace(b"\r\n", b"\r\nThis is no field\r\n", 1))),
-    ),
-    _mutant(
-        "http-two-lengths",
-        "An answer has two different Content-Length fields.",
-        "framing",
-        altered(_POSE, _on_the_wire(lambda octets: octets.replace(b"\r\n\r\n", b"\r\nContent-Length: 3\r\n\r\n", 1))),
-    ),
-    _mutant(
-        "http-host-optional",
-        "A request without Host is served.",
-        "host-missing",
-        lambda: _hosts(lambda hosts: not hosts),
-    ),
-    _mutant(
-        "http-host-twice",
-        "A request with two Host fields is served.",
-        "host-twice",
-        lambda: _hosts(lambda hosts: len(hosts) > 1),
-    ),
-    _mutant(
-        "http-host-repeated",
-        "A request with the same Host field twice is served.",
-        "host-repeated",
-        lambda: _hosts(lambda hosts: len(hosts) > 1 and len(set(hosts)) == 1),
-    ),
-    _mutant(
-        "http-first-length",
-        "Of two Content-Length fields the first one counts.",
-        "content-length-conflict",
-        lambda: _first_length,
-    ),
-    _mutant("http-garbage-fine", "What is no HTTP is answered 200.", "malformed-request", lambda: _garbage),
-    _mutant(
-        "http-problem-as-json",
-        "Problems come as application/json.",
-        "problem-type",
-        altered(_ANY, header("Content-Type", JSON), _errors),
-    ),
-    _mutant(
-        "http-problem-as-page",
-        "Errors come as a page.",
-        ("problem-type", "problem-type-server"),
-        altered(_ANY, _page, _errors),
-    ),
-    _mutant(
-        "http-problem-other-status",
-        "A problem's status is always 400.",
-        "problem-status",
-        _problems(lambda value: value.update(status=400 if value["status"] != 400 else 422)),
-    ),
-    _mutant(
-        "http-problem-vague",
-        "A problem's detail is always 'invalid input'.",
-        "problem-detail",
-        _problems(lambda value: value.update(detail="invalid input"), _INPUT),
-    ),
-    _mutant(
-        "http-problem-mute",
-        "Problems have no detail.",
-        "problem-detail",
-        _problems(lambda value: value.pop("detail", None) and None),
-    ),
-    _mutant(
-        "http-problem-valueless",
-        "A problem names the field, but never the value.",
-        "problem-value",
-        _problems(_valueless, _INPUT),
-    ),
-    _mutant(
-        "http-traceback",
-        "A problem's detail is a traceback.",
-        "no-traceback",
-        _problems(lambda value: value.update(detail=value["detail"] + "\n" + _TRACE), _INPUT),
-    ),
-    _mutant("http-nan", "JSON holds NaN.", "json-finite", altered(_POSE, text(r'("y"\s*:\s*)[-+.\deE]+', r"\1NaN", 1))),
-    _mutant(
-        "http-infinity-sometimes",
-        "One pose in 50 holds Infinity.",
-        "json-finite",
-        altered(_POSE, text(r'("z"\s*:\s*)[-+.\deE]+', r"\1-Infinity", 1), nth=50),
-    ),
-    _mutant("http-byte-order-mark", "JSON begins with a byte order mark.", "json-encoding", altered(_GET, _marked)),
-    _mutant("http-latin", "JSON is ISO 8859-1.", "json-encoding", altered(_POSE, _in_latin)),
-    _mutant(
-        "http-name-twice",
-        "A name is there twice in one object.",
-        "json-unique-names",
-        altered(_POSE, text(r'"child_frame_id"', '"child_frame_id": "base", "child_frame_id"', 1)),
-    ),
-    _mutant(
-        "http-token-forbidden",
-        "Without the token, the answer is 403.",
-        "authentication-asked",
-        _token(problem(403, "no token")),
-        token=_SESAME,
-    ),
-    _mutant(
-        "http-token-unnamed",
-        "Without the token, the answer is 401 without WWW-Authenticate.",
-        "authentication",
-        _token(problem(401, "no token")),
-        token=_SESAME,
-    ),
+_mutant("http-large-body-fine", "content-too-large", "Bodies over 10 MiB return 204.").made(
+    _big(10 * 1024 * 1024, plain(204))
 )
+_mutant("http-small-limit", "content-too-large", "Bodies over 20 KiB return 413.").made(
+    _big(20_000, problem(413, "too large"))
+)
+_mutant("http-long-target-crash", "uri-too-long", "A long request target returns 500.").instead(
+    _long_target, problem(500, "oops")
+)
+_mutant("http-long-target-fine", "declared-body", "A long request target returns 200 with an empty object.").instead(
+    _long_target, plain(200, b"{}", JSON)
+)
+_mutant("http-large-field-crash", "header-too-large", "A header of 128 KiB returns 500.").instead(
+    lambda request: _ANY(request) and any(len(value) > 60_000 for _, value in request.fields), problem(500, "oops")
+)
+_mutant("http-length-too-long", "framing", "Content-Length is 7 bytes longer than the body.").altered(
+    _GET, _on_the_wire(_longer)
+)
+_mutant("http-length-too-short", "framing", "The body is longer than Content-Length.").altered(
+    _GET, _on_the_wire(lambda octets: octets + b"left over")
+)
+_mutant("http-broken-field", "framing", "A response contains a line that is not a header.").altered(
+    _POSE, _on_the_wire(lambda octets: octets.replace(b"\r\n", b"\r\nThis is no field\r\n", 1))
+)
+_mutant("http-two-lengths", "framing", "A response has two different Content-Length headers.").altered(
+    _POSE, _on_the_wire(lambda octets: octets.replace(b"\r\n\r\n", b"\r\nContent-Length: 3\r\n\r\n", 1))
+)
+_mutant("http-host-optional", "host-missing", "The robot accepts a request without Host.")(
+    _hosts(lambda hosts: not hosts)
+)
+_mutant("http-host-twice", "host-twice", "The robot accepts a request with two Host headers.")(
+    _hosts(lambda hosts: len(hosts) > 1)
+)
+_mutant("http-host-repeated", "host-repeated", "The robot accepts a request with the same Host header twice.")(
+    _hosts(lambda hosts: len(hosts) > 1 and len(set(hosts)) == 1)
+)
+_mutant("http-problem-as-json", "problem-type", "Problem details have the media type application/json.").altered(
+    _ANY, header("Content-Type", JSON), _errors
+)
+_mutant("http-problem-as-page", ("problem-type", "problem-type-server"), "Errors are HTML pages.").altered(
+    _ANY, _page, _errors
+)
+_mutant("http-problem-other-status", "problem-status", "The status member of problem details is wrong.").made(
+    _problems(lambda value: value.update(status=400 if value["status"] != 400 else 422))
+)
+_mutant("http-problem-vague", "problem-detail", "The detail of problem details is always 'invalid input'.").made(
+    _problems(lambda value: value.update(detail="invalid input"), _INPUT)
+)
+_mutant("http-problem-mute", "problem-detail", "Problem details have no detail.").made(
+    _problems(lambda value: value.pop("detail", None) and None)
+)
+_mutant(
+    "http-problem-valueless", "problem-value", "The detail of problem details never contains the offending value."
+).made(_problems(_valueless, _INPUT))
+_mutant("http-traceback", "no-traceback", "The detail of problem details contains a traceback.").made(
+    _problems(lambda value: value.update(detail=value["detail"] + "\n" + _TRACE), _INPUT)
+)
+_mutant("http-nan", "json-finite", "JSON responses contain NaN.").altered(
+    _POSE, text(r'("y"\s*:\s*)[-+.\deE]+', r"\1NaN", 1)
+)
+_mutant("http-infinity-sometimes", "json-finite", "One pose in 50 contains Infinity.").altered(
+    _POSE, text(r'("z"\s*:\s*)[-+.\deE]+', r"\1-Infinity", 1), nth=50
+)
+_mutant("http-byte-order-mark", "json-encoding", "JSON responses begin with a byte order mark.").altered(_GET, _marked)
+_mutant("http-latin", "json-encoding", "JSON responses are encoded in ISO 8859-1.").altered(_POSE, _in_latin)
+_mutant("http-name-twice", "json-unique-names", "A JSON object has the same member name twice.").altered(
+    _POSE, text(r'"child_frame_id"', '"child_frame_id": "base", "child_frame_id"', 1)
+)
+_mutant("http-token-forbidden", "authentication-asked", "A request without the token returns 403.", token=_SESAME).made(
+    _token(problem(403, "no token"))
+)
+_mutant(
+    "http-token-unnamed",
+    "authentication",
+    "A request without the token returns 401 without WWW-Authenticate.",
+    token=_SESAME,
+).made(_token(problem(401, "no token")))

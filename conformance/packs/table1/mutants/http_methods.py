@@ -1,34 +1,33 @@
-"""Robots that break HTTP's rules of methods, negotiation and statuses."""
+"""Mutants that break HTTP's rules for methods, content negotiation and status codes."""
 
 from collections.abc import Callable
 
 from conformance.mutation.changes import (
     JSON,
-    altered,
     anything,
     becomes,
     header,
-    instead,
     page,
     plain,
     problem,
     refusal,
     rest,
-    rewritten,
     status,
     success,
-    values,
 )
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import GOAL, POSE, RESOURCES, SENSORS, SERVICES, VELOCITY
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("http", "rest")
 
 _ANY, _GET, _HEAD, _OPTIONS = rest(), rest("GET"), rest("HEAD"), rest("OPTIONS")
 _INPUT = rest("PUT", *RESOURCES)
 
 
+@_mutant("http-head-with-body", "head-no-body", "A response to HEAD has a body.")
 def _with_body(request: Request, forward: Forward) -> Response:
-    """HEAD is answered with the body of GET."""
     response = forward(request)
     if _HEAD(request) and success(response):
         body = forward(request.copy(method="GET")).body
@@ -69,8 +68,8 @@ def _missing_slash(request: Request) -> bool:
     return request.side == "rest" and not request.path.endswith("/") and f"{request.path}/" in RESOURCES
 
 
+@_mutant("http-unsafe-head", "safe", "HEAD and OPTIONS of the goal cancel the goal.")
 def _cancelling(request: Request, forward: Forward) -> Response:
-    """HEAD and OPTIONS of the goal cancel it."""
     response = forward(request)
     if request.side == "rest" and request.path == GOAL and request.method in {"HEAD", "OPTIONS"}:
         forward(request.copy(method="DELETE"))
@@ -78,7 +77,7 @@ def _cancelling(request: Request, forward: Forward) -> Response:
 
 
 class _SecondTime:
-    """The same request right after itself is answered otherwise."""
+    """A change that answers a request itself when it repeats the previous one."""
 
     def __init__(self, method: str, response: Callable[[Request], Response]) -> None:
         self._method, self._answer = method, response
@@ -95,8 +94,8 @@ class _SecondTime:
         return response
 
 
+@_mutant("http-unknown-path-405", "not-found", "PUT to an unknown path returns 405.")
 def _not_found(request: Request, forward: Forward) -> Response:
-    """Unknown paths are 405 for what is not GET."""
     response = forward(request)
     if (
         response.status == 404
@@ -108,188 +107,101 @@ def _not_found(request: Request, forward: Forward) -> Response:
     return response
 
 
-_mutant = of_class("http", "rest")
-
-
-MUTANTS = (
-    _mutant("http-203", "The sensors come with 203.", "declared-status", altered(rest("GET", SENSORS), becomes(203))),
-    _mutant(
-        "http-202-delete", "DELETE of a goal is 202.", "declared-status", altered(rest("DELETE", GOAL), becomes(202))
-    ),
-    _mutant(
-        "http-wrapped",
-        "Lists are wrapped in an object.",
-        "declared-body",
-        altered(rest("GET", SERVICES), values(lambda items: {"services": items})),
-    ),
-    _mutant(
-        "http-html",
-        "The services come as text/html.",
-        "declared-body",
-        altered(rest("GET", SERVICES), header("Content-Type", "text/html")),
-    ),
-    _mutant(
-        "http-crash-on-input",
-        "What is refused is refused with 500.",
-        "no-server-error",
-        altered(_INPUT, becomes(500), refusal),
-    ),
-    _mutant(
-        "http-crash-on-query",
-        "A bad query is answered 500.",
-        "no-server-error",
-        altered(rest("GET", "/robot/navigation/service/plan"), becomes(500), refusal),
-    ),
-    _mutant(
-        "http-crash-sometimes",
-        "One answer in 50 is 502.",
-        "declared-status",
-        altered(_GET, becomes(502), anything, nth=50),
-    ),
-    _mutant(
-        "http-post-reads",
-        "POST is answered like GET.",
-        "method-not-allowed",
-        lambda: (
-            lambda request, forward: forward(
-                request.copy(method="GET") if _ANY(request) and request.method == "POST" else request
-            )
-        ),
-    ),
-    _mutant(
-        "http-404-for-405",
-        "A method that is not there is 404.",
-        "method-not-allowed",
-        altered(_ANY, becomes(404), status(405)),
-    ),
-    _mutant(
-        "http-unknown-method-404",
-        "A method that nobody knows is 404.",
-        "unknown-method",
-        altered(_strange, becomes(404), anything),
-    ),
-    _mutant(
-        "http-unknown-method-reads",
-        "A method that nobody knows is taken for GET.",
-        "unknown-method-refused",
-        lambda: lambda request, forward: forward(request.copy(method="GET") if _strange(request) else request),
-    ),
-    _mutant(
-        "http-405-without-allow", "405 comes without Allow.", "allow", altered(_ANY, header("Allow", None), status(405))
-    ),
-    _mutant("http-no-head", "HEAD is 405.", "head", instead(_HEAD, plain(405, b"", "", ("Allow", "GET, OPTIONS")))),
-    _mutant(
-        "http-head-other-type",
-        "HEAD says text/html.",
-        "head-content-type",
-        altered(_HEAD, header("Content-Type", "text/html")),
-    ),
-    _mutant("http-head-with-body", "HEAD is answered with a body.", "head-no-body", lambda: _with_body),
-    _mutant(
-        "http-no-options",
-        "OPTIONS is 405.",
-        "options",
-        instead(_OPTIONS, problem(405, "no OPTIONS", ("Allow", "GET, HEAD"))),
-    ),
-    _mutant("http-options-mute", "OPTIONS comes without Allow.", "options", altered(_OPTIONS, header("Allow", None))),
-    _mutant(
-        "http-allow-get-only",
-        "Allow names GET alone.",
-        "allow-agrees",
-        altered(_ANY, _allow(lambda _: ["GET", "HEAD", "OPTIONS"]), anything),
-    ),
-    _mutant(
-        "http-allow-too-much",
-        "Allow names DELETE everywhere.",
-        "allow-agrees",
-        altered(_ANY, _allow(lambda methods: sorted({*methods, "DELETE", "PATCH"})), anything),
-    ),
-    _mutant(
-        "http-unknown-path-page",
-        "An unknown path is answered with a page.",
-        "not-found",
-        altered(
-            lambda request: _ANY(request) and request.path not in RESOURCES,
-            page(200, b"<html><body>Welcome</body></html>", "text/html"),
-            status(404),
-        ),
-    ),
-    _mutant("http-unknown-path-405", "An unknown path is 405 for PUT.", "not-found", lambda: _not_found),
-    _mutant(
-        "http-slash-served",
-        "A path without its slash is served.",
-        "trailing-slash",
-        lambda: (
-            lambda request, forward: forward(
-                request.copy(target=request.target.replace(request.path, f"{request.path}/", 1))
-                if _missing_slash(request)
-                else request
-            )
-        ),
-    ),
-    _mutant(
-        "http-slash-lost",
-        "A path without its slash leads to the front page.",
-        "trailing-slash",
-        instead(_missing_slash, plain(302, b"", "", ("Location", "/"))),
-    ),
-    _mutant(
-        "http-accepts-anything",
-        "Accept is not looked at.",
-        "not-acceptable",
-        rewritten(_GET, lambda request: request.put("Accept", JSON)),
-    ),
-    _mutant(
-        "http-406-as-400",
-        "Where nothing is acceptable, the answer is 400.",
-        "not-acceptable",
-        altered(_GET, becomes(400), status(406)),
-    ),
-    _mutant(
-        "http-q-zero-ignored", "JSON is sent although its quality is 0.", "q-zero", rewritten(_GET, _q_zero_ignored)
-    ),
-    _mutant(
-        "http-any-type",
-        "A body of any type is read as JSON.",
-        "unsupported-media-type",
-        rewritten(_INPUT, _typed_as_json),
-    ),
-    _mutant(
-        "http-415-as-400",
-        "An unknown media type is 400.",
-        "unsupported-media-type",
-        altered(_ANY, becomes(400), status(415)),
-    ),
-    _mutant(
-        "http-no-charset",
-        "A charset parameter is refused.",
-        "charset",
-        instead(_charset, problem(415, "Content-Type: parameters are not taken")),
-    ),
-    _mutant("http-unsafe-head", "HEAD and OPTIONS of the goal cancel it.", "safe", lambda: _cancelling),
-    _mutant(
-        "http-put-once",
-        "The same PUT right after itself is 409.",
-        "put-idempotent",
-        lambda: _SecondTime("PUT", problem(409, "linear.x: that is so already")),
-    ),
-    _mutant(
-        "http-delete-crash",
-        "A second DELETE is 500.",
-        "delete-idempotent",
-        lambda: _SecondTime("DELETE", problem(500, "no goal")),
-    ),
-    _mutant(
-        "http-no-content-type",
-        "Answers have no Content-Type.",
-        "content-type",
-        altered(_ANY, header("Content-Type", None), anything),
-    ),
-    _mutant(
-        "http-no-content-type-sometimes",
-        "One answer in 50 has no Content-Type.",
-        "content-type",
-        altered(rest("GET", POSE, VELOCITY), header("Content-Type", None), nth=50),
-    ),
-    _mutant("http-no-date", "Answers have no Date.", "date", altered(_ANY, header("Date", None), anything)),
+_mutant("http-203", "declared-status", "GET of the sensors returns 203.").altered(rest("GET", SENSORS), becomes(203))
+_mutant("http-202-delete", "declared-status", "DELETE of a goal returns 202.").altered(
+    rest("DELETE", GOAL), becomes(202)
 )
+_mutant("http-wrapped", "declared-body", "Lists are wrapped in an object.").json(
+    rest("GET", SERVICES), lambda items: {"services": items}
+)
+_mutant("http-html", "declared-body", "The list of services has the media type text/html.").altered(
+    rest("GET", SERVICES), header("Content-Type", "text/html")
+)
+_mutant("http-crash-on-input", "no-server-error", "Invalid request bodies return 500.").altered(
+    _INPUT, becomes(500), refusal
+)
+_mutant("http-crash-on-query", "no-server-error", "Invalid queries return 500.").altered(
+    rest("GET", "/robot/navigation/service/plan"), becomes(500), refusal
+)
+_mutant("http-crash-sometimes", "declared-status", "One GET in 50 returns 502.").altered(
+    _GET, becomes(502), anything, nth=50
+)
+_mutant("http-post-reads", "method-not-allowed", "POST is handled like GET.")(
+    lambda request, forward: forward(
+        request.copy(method="GET") if _ANY(request) and request.method == "POST" else request
+    )
+)
+_mutant("http-404-for-405", "method-not-allowed", "Unsupported methods return 404.").altered(
+    _ANY, becomes(404), status(405)
+)
+_mutant("http-unknown-method-404", "unknown-method", "Unknown methods return 404.").altered(
+    _strange, becomes(404), anything
+)
+_mutant("http-unknown-method-reads", "unknown-method-refused", "Unknown methods are handled like GET.")(
+    lambda request, forward: forward(request.copy(method="GET") if _strange(request) else request)
+)
+_mutant("http-405-without-allow", "allow", "405 responses have no Allow header.").altered(
+    _ANY, header("Allow", None), status(405)
+)
+_mutant("http-no-head", "head", "HEAD returns 405.").instead(_HEAD, plain(405, b"", "", ("Allow", "GET, OPTIONS")))
+_mutant("http-head-other-type", "head-content-type", "HEAD returns Content-Type text/html.").altered(
+    _HEAD, header("Content-Type", "text/html")
+)
+_mutant("http-no-options", "options", "OPTIONS returns 405.").instead(
+    _OPTIONS, problem(405, "no OPTIONS", ("Allow", "GET, HEAD"))
+)
+_mutant("http-options-mute", "options", "Responses to OPTIONS have no Allow header.").altered(
+    _OPTIONS, header("Allow", None)
+)
+_mutant("http-allow-get-only", "allow-agrees", "Allow lists only GET, HEAD and OPTIONS.").altered(
+    _ANY, _allow(lambda _: ["GET", "HEAD", "OPTIONS"]), anything
+)
+_mutant("http-allow-too-much", "allow-agrees", "Allow lists DELETE and PATCH everywhere.").altered(
+    _ANY, _allow(lambda methods: sorted({*methods, "DELETE", "PATCH"})), anything
+)
+_mutant("http-unknown-path-page", "not-found", "An unknown path returns 200 with a page.").altered(
+    lambda request: _ANY(request) and request.path not in RESOURCES,
+    page(200, b"<html><body>Welcome</body></html>", "text/html"),
+    status(404),
+)
+_mutant("http-slash-served", "trailing-slash", "The robot serves paths without their trailing slash.")(
+    lambda request, forward: forward(
+        request.copy(target=request.target.replace(request.path, f"{request.path}/", 1))
+        if _missing_slash(request)
+        else request
+    )
+)
+_mutant("http-slash-lost", "trailing-slash", "A path without its trailing slash redirects to the front page.").instead(
+    _missing_slash, plain(302, b"", "", ("Location", "/"))
+)
+_mutant("http-accepts-anything", "not-acceptable", "The robot ignores Accept.").rewritten(
+    _GET, lambda request: request.put("Accept", JSON)
+)
+_mutant("http-406-as-400", "not-acceptable", "The robot returns 400 where it should return 406.").altered(
+    _GET, becomes(400), status(406)
+)
+_mutant("http-q-zero-ignored", "q-zero", "The robot returns JSON although Accept has q=0 for it.").rewritten(
+    _GET, _q_zero_ignored
+)
+_mutant("http-any-type", "unsupported-media-type", "The robot reads a body of any media type as JSON.").rewritten(
+    _INPUT, _typed_as_json
+)
+_mutant("http-415-as-400", "unsupported-media-type", "Unsupported media types return 400.").altered(
+    _ANY, becomes(400), status(415)
+)
+_mutant("http-no-charset", "charset", "Content-Type with a charset parameter returns 415.").instead(
+    _charset, problem(415, "Content-Type: parameters are not taken")
+)
+_mutant("http-put-once", "put-idempotent", "Repeating a PUT returns 409.").made(
+    lambda: _SecondTime("PUT", problem(409, "linear.x: that is so already"))
+)
+_mutant("http-delete-crash", "delete-idempotent", "Repeating a DELETE returns 500.").made(
+    lambda: _SecondTime("DELETE", problem(500, "no goal"))
+)
+_mutant("http-no-content-type", "content-type", "Responses have no Content-Type.").altered(
+    _ANY, header("Content-Type", None), anything
+)
+_mutant("http-no-content-type-sometimes", "content-type", "One response in 50 has no Content-Type.").altered(
+    rest("GET", POSE, VELOCITY), header("Content-Type", None), nth=50
+)
+_mutant("http-no-date", "date", "Responses have no Date.").altered(_ANY, header("Date", None), anything)

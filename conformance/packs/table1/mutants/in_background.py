@@ -1,4 +1,4 @@
-"""What a mutant does by itself, after the response: in a thread, and for as long as the run lasts."""
+"""What a mutant does after its response, in a daemon thread."""
 
 import threading
 from collections.abc import Callable
@@ -8,7 +8,7 @@ from conformance.mutation.wire import IncompleteMessageError
 
 
 def later(delay_s: float, act: Callable[..., object], *arguments: Any) -> None:
-    """Do something after a delay, s; that the robot or the run is gone by then is nobody's business."""
+    """Call ``act`` in a thread after a delay, s; ignore errors, because the robot may have stopped by then."""
 
     def quietly() -> None:
         try:

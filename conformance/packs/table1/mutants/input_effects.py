@@ -1,4 +1,4 @@
-"""Robots that refuse what is invalid, and do it all the same."""
+"""Mutants that return an error and carry the request out nevertheless."""
 
 import json
 from collections.abc import Callable, Container
@@ -6,16 +6,19 @@ from typing import Any
 
 from conformance.mutation.changes import Make, parsed, problem, rest, success, unwanted
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import DELIVERIES, GOAL, LINEAR, POSE, TNS, VELOCITY, deliveries
 from conformance.packs.table1.mutants.soap_responses import enveloped
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("strict-input", "rest")
 
 _ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
 _INVALID = {400, 415, 422}
 
 
 def sent(request: Request, forward: Forward, method: str, target: str, value: Any = None) -> Response:
-    """A request of the proxy's own to the robot."""
+    """Send a request of the mutant's own to the robot."""
     fields = [("Host", "localhost"), ("Accept", "application/json")]
     body = b"" if value is None else json.dumps(value).encode()
     if body:
@@ -26,12 +29,12 @@ def sent(request: Request, forward: Forward, method: str, target: str, value: An
 
 
 def drive(request: Request, forward: Forward, speed: float) -> None:
-    """Set the robot in motion, or stop it."""
+    """Send the robot a velocity of ``speed``, m/s; 0 stops it."""
     sent(request, forward, "PUT", VELOCITY, {"linear": {**_ZERO, "x": speed}, "angular": _ZERO})
 
 
 def goal_ahead(request: Request, forward: Forward, distance: float) -> None:
-    """Send a goal beside where the robot stands, in the odometry's frame, on the side on which it takes one."""
+    """Send a goal ``distance`` m beside the robot, in the odometry's frame, where the robot accepts one."""
     odometry = parsed(sent(request, forward, "GET", POSE).body)
     at = odometry["pose"]["pose"]["position"]
     for away in (distance, -distance):
@@ -50,7 +53,7 @@ def after_refusal(
     act: Callable[[Request, Forward], None],
     statuses: Container[int] = frozenset(_INVALID),
 ) -> Make:
-    """A request is refused, as invalid or with one of other statuses, and something is done."""
+    """Return a change that calls ``act`` after the robot has refused a request with one of the statuses."""
 
     def change(request: Request, forward: Forward) -> Response:
         response = forward(request)
@@ -66,15 +69,17 @@ def _deliver(request: Request, forward: Forward) -> None:
     sent(request, forward, "PUT", path)
 
 
+@_mutant(
+    "http-406-and-delivered", "http/not-acceptable-undone", "A delivery returns 406 and is published.", observer=True
+)
 def _delivered_in_vain(request: Request, forward: Forward) -> Response:
-    """A delivery is made, and its answer is lost because nothing that could be said is acceptable."""
     response = forward(request)
     in_vain = unwanted(deliveries)(request) and success(response)
     return problem(406, "nothing that you would have")(request) if in_vain else response
 
 
 def _ordered_by(method: str) -> Make:
-    """A delivery by a method that the resource does not have is answered as ever, and made."""
+    """Return a change that publishes a delivery when its path is requested with ``method``."""
 
     def change(request: Request, forward: Forward) -> Response:
         if deliveries(request.copy(method="PUT")) and request.method == method:
@@ -84,8 +89,14 @@ def _ordered_by(method: str) -> Make:
     return lambda: change
 
 
+@_mutant(
+    "input-soap-refused-and-made",
+    "delivery-refused",
+    "An invalid SOAP delivery returns a fault and is published.",
+    observer=True,
+    interface="soap",
+)
 def _soap_refusal(request: Request, forward: Forward) -> Response:
-    """What is refused over SOAP is delivered all the same."""
     response = forward(request)
     if request.side == "soap" and b"Execute" in request.body and b"Fault" in response.body:
         # Only SOAP's side is at hand here: a valid message in place of the refused one.
@@ -98,73 +109,40 @@ def _soap_refusal(request: Request, forward: Forward) -> Response:
     return response
 
 
-_mutant = of_class("strict-input", "rest")
-
-MUTANTS = (
-    _mutant(
-        "input-velocity-refused-and-driven",
-        "An invalid velocity is refused, and the robot drives.",
-        "velocity-refused",
-        after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2)),
-    ),
-    _mutant(
-        "http-406-and-driven",
-        "A velocity is answered 406, and the robot drives.",
-        "http/not-acceptable-undone",
-        after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2), {406}),
-    ),
-    _mutant(
-        "http-406-and-goal",
-        "A goal is answered 406, and the robot has a goal.",
-        "http/not-acceptable-undone",
-        after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5), {406}),
-    ),
-    _mutant(
-        "http-406-and-delivered",
-        "A delivery is answered 406, and published.",
-        "http/not-acceptable-undone",
-        lambda: _delivered_in_vain,
-        observer=True,
-    ),
-    _mutant(
-        "input-goal-refused-and-taken",
-        "An invalid goal is refused, and the robot has a goal.",
-        "goal-refused",
-        after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5)),
-    ),
-    _mutant(
-        "input-goal-refused-and-ended",
-        "An invalid goal is refused, and the active one is cancelled.",
-        "goal-refused",
-        after_refusal(rest("PUT", GOAL), _give_up),
-    ),
-    _mutant(
-        "input-delivery-refused-and-made",
-        "An invalid delivery is refused, and published.",
-        "delivery-refused",
-        after_refusal(deliveries, _deliver),
-        observer=True,
-    ),
-    _mutant(
-        "input-delivery-by-get",
-        "GET of what PUT orders is 405, and orders it.",
-        "delivery-refused",
-        _ordered_by("GET"),
-        observer=True,
-    ),
-    _mutant(
-        "input-delivery-by-options",
-        "OPTIONS of what PUT orders is answered, and orders it.",
-        "delivery-refused",
-        _ordered_by("OPTIONS"),
-        observer=True,
-    ),
-    _mutant(
-        "input-soap-refused-and-made",
-        "An invalid SOAP delivery is refused, and published.",
-        "delivery-refused",
-        lambda: _soap_refusal,
-        observer=True,
-        interface="soap",
-    ),
+_mutant(
+    "input-velocity-refused-and-driven",
+    "velocity-refused",
+    "An invalid velocity returns an error, and the robot drives.",
+).made(after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2)))
+_mutant("http-406-and-driven", "http/not-acceptable-undone", "A velocity returns 406, and the robot drives.").made(
+    after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2), {406})
 )
+_mutant("http-406-and-goal", "http/not-acceptable-undone", "A goal returns 406, and the robot has a goal.").made(
+    after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5), {406})
+)
+_mutant(
+    "input-goal-refused-and-taken", "goal-refused", "An invalid goal returns an error, and the robot has a goal."
+).made(after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5)))
+_mutant(
+    "input-goal-refused-and-ended",
+    "goal-refused",
+    "An invalid goal returns an error, and the active goal is cancelled.",
+).made(after_refusal(rest("PUT", GOAL), _give_up))
+_mutant(
+    "input-delivery-refused-and-made",
+    "delivery-refused",
+    "An invalid delivery returns an error and is published.",
+    observer=True,
+).made(after_refusal(deliveries, _deliver))
+_mutant(
+    "input-delivery-by-get",
+    "delivery-refused",
+    "GET of a delivery's path returns 405 and publishes the delivery.",
+    observer=True,
+).made(_ordered_by("GET"))
+_mutant(
+    "input-delivery-by-options",
+    "delivery-refused",
+    "OPTIONS of a delivery's path publishes the delivery.",
+    observer=True,
+).made(_ordered_by("OPTIONS"))

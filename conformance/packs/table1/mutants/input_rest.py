@@ -1,4 +1,4 @@
-"""Robots that take garbage over REST: what is invalid is repaired before it is looked at."""
+"""Mutants that repair or accept invalid REST input instead of refusing it."""
 
 import json
 import math
@@ -7,22 +7,14 @@ from collections.abc import Callable
 from typing import Any
 from urllib.parse import parse_qsl
 
-from conformance.mutation.changes import (
-    altered,
-    becomes,
-    parsed,
-    plain,
-    query,
-    refusal,
-    rest,
-    rewritten,
-    status,
-    success,
-)
+from conformance.mutation.changes import becomes, parsed, plain, query, refusal, rest, rewritten, status, success
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.delivery import any_code, finite, lenient, segments
 from conformance.packs.table1.mutants.paths import GOAL, LINEAR, PLAN, VELOCITY, deliveries
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("strict-input", "rest")
 
 _PUT = rest("PUT", VELOCITY, LINEAR, GOAL)
 _ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
@@ -42,7 +34,7 @@ def _is_json(request: Request) -> bool:
 
 
 def _repairing(repair: Callable[[Any, Any], Any]) -> Callable[[], Any]:
-    """JSON that is well-formed is made to fit by ``repair(value, pattern)``."""
+    """Return a change that replaces a JSON request body by ``repair(value, pattern)``."""
 
     def edit(request: Request) -> None:
         value = parsed(request.body)
@@ -53,14 +45,14 @@ def _repairing(repair: Callable[[Any, Any], Any]) -> Callable[[], Any]:
 
 
 def _filled(value: Any, pattern: Any) -> Any:
-    """Missing fields become zero."""
+    """Fill in missing members with those of the pattern."""
     if not isinstance(pattern, dict) or not isinstance(value, dict):
         return value
     return {**value, **{key: _filled(value.get(key, pattern[key]), pattern[key]) for key in pattern}}
 
 
 def _known(value: Any, pattern: Any) -> Any:
-    """Unknown fields are left out."""
+    """Remove members that the pattern does not have."""
     if not isinstance(pattern, dict) or not isinstance(value, dict):
         return value
     parts = {**_OPTIONAL, **pattern} if "goal" in pattern or "frame_id" in pattern or "id" in pattern else pattern
@@ -68,7 +60,7 @@ def _known(value: Any, pattern: Any) -> Any:
 
 
 def _typed(value: Any, pattern: Any) -> Any:
-    """Values of another type are made numbers, as a lenient language does."""
+    """Convert values of another type to numbers, as a loosely typed language does."""
     if isinstance(pattern, dict):
         given = value if isinstance(value, dict) else pattern
         return {key: _typed(part, pattern[key]) if key in pattern else part for key, part in given.items()}
@@ -82,14 +74,14 @@ def _typed(value: Any, pattern: Any) -> Any:
 
 
 def _finite(value: Any, pattern: Any) -> Any:
-    """Numbers that are not finite become zero."""
+    """Replace NaN and infinite numbers by 0."""
     if isinstance(value, dict):
         return {key: _finite(part, pattern) for key, part in value.items()}
     return 0.0 if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _bounded(value: Any, pattern: Any) -> Any:
-    """Values beyond the contract's bounds are cut to them."""
+    """Clamp values to the contract's bounds."""
     if isinstance(value, dict):
         made = {key: _bounded(part, pattern) for key, part in value.items()}
         if isinstance(made.get("id"), str):
@@ -102,7 +94,7 @@ def _bounded(value: Any, pattern: Any) -> Any:
 
 
 def _swallowed(where: Callable[[Request], bool]) -> Callable[[], Any]:
-    """What is refused there is answered as if it were fine."""
+    """Return a change that answers 204 where the robot refuses a request of ``where``."""
 
     def change(request: Request, forward: Forward) -> Response:
         response = forward(request)
@@ -111,6 +103,7 @@ def _swallowed(where: Callable[[Request], bool]) -> Callable[[], Any]:
     return lambda: change
 
 
+@_mutant("input-malformed-fine", "json-malformed", "Malformed JSON returns 204.").through(_swallowed)
 def _malformed(request: Request) -> bool:
     return (
         _is_json(request)
@@ -125,10 +118,14 @@ def _deep(request: Request) -> bool:
     return _is_json(request) and (request.body.count(b"[") > 1000 or request.body.count(b"{") > 1000)
 
 
+@_mutant("input-huge-fine", "json-huge-number", "A JSON integer of thousands of digits returns 204.").through(
+    _swallowed
+)
 def _huge(request: Request) -> bool:
     return _is_json(request) and bool(re.search(rb"\d{1000}", request.body))
 
 
+@_mutant("input-any-encoding", "json-encoding", "A JSON body that is not UTF-8 returns 204.").through(_swallowed)
 def _other_encoding(request: Request) -> bool:
     if not _is_json(request):
         return False
@@ -139,6 +136,7 @@ def _other_encoding(request: Request) -> bool:
     return request.body.startswith(b"\xef\xbb\xbf") or b"\x00" in request.body
 
 
+@_mutant("input-any-root", "json-root", "A JSON body that is not an object returns 204.").through(_swallowed)
 def _no_object(request: Request) -> bool:
     return (
         _is_json(request)
@@ -154,6 +152,7 @@ def _twice(request: Request) -> None:
         request.body = json.dumps(value).encode()
 
 
+@_mutant("input-xml-fine", "xml-body", "XML of the wrong shape returns 204.").through(_swallowed)
 def _xml(request: Request) -> bool:
     return _PUT(request) and request.media_type.endswith("xml")
 
@@ -164,9 +163,8 @@ def _numbers(given: dict[str, str]) -> None:
             given[name] = "0"
 
 
+@_mutant("input-query-complete", "query-missing", "A missing x or y in a query takes the value of the query before.")
 class _Remembered:
-    """A missing x or y is the one of the query before."""
-
     def __init__(self) -> None:
         self._last = {"x": "0", "y": "0"}
 
@@ -188,65 +186,30 @@ def _path(request: Request) -> None:
         segments(edit)(request)
 
 
-_mutant = of_class("strict-input", "rest")
-
-MUTANTS = (
-    _mutant("input-malformed-fine", "JSON that is none is answered 204.", "json-malformed", _swallowed(_malformed)),
-    _mutant("input-missing-is-zero", "A missing field counts as zero.", "json-missing", _repairing(_filled)),
-    _mutant("input-unknown-ignored", "Unknown fields are ignored.", "json-unknown", _repairing(_known)),
-    _mutant(
-        "input-last-wins",
-        "Of a name that is there twice, the last one counts.",
-        "json-duplicate",
-        rewritten(_is_json, _twice),
-    ),
-    _mutant("input-coerced", "Strings, null and booleans count as numbers.", "json-type", _repairing(_typed)),
-    _mutant("input-nan-is-zero", "NaN and what overflows count as zero.", "json-non-finite", _repairing(_finite)),
-    _mutant("input-any-root", "A body that is no object is answered 204.", "json-root", _swallowed(_no_object)),
-    _mutant("input-deep-fine", "JSON nested deep is answered 204.", "json-depth", _swallowed(_deep)),
-    _mutant(
-        "input-huge-fine", "An integer of thousands of digits is answered 204.", "json-huge-number", _swallowed(_huge)
-    ),
-    _mutant(
-        "input-any-encoding", "A body that is not UTF-8 is answered 204.", "json-encoding", _swallowed(_other_encoding)
-    ),
-    _mutant(
-        "input-empty-fine",
-        "An empty body is answered 204.",
-        "json-empty",
-        _swallowed(lambda request: _is_json(request) and not request.body.strip()),
-    ),
-    _mutant("input-bounds-cut", "Values beyond their bounds are cut to them.", "json-bounds", _repairing(_bounded)),
-    _mutant(
-        "input-path-lenient",
-        "Whatever stands in a path counts as a number.",
-        "path-parameter",
-        rewritten(deliveries, _path),
-    ),
-    _mutant(
-        "input-query-lenient",
-        "What is no number in a query counts as 0.",
-        "query-parameter",
-        rewritten(rest("GET", PLAN), query(_numbers)),
-    ),
-    _mutant("input-query-complete", "A missing x or y is the one of the query before.", "query-missing", _Remembered),
-    _mutant("input-xml-fine", "XML of the wrong shape is answered 204.", "xml-body", _swallowed(_xml)),
-    _mutant(
-        "input-malformed-422",
-        "JSON that is none is 422.",
-        "status-malformed",
-        altered(_is_json, becomes(422), status(400)),
-    ),
-    _mutant(
-        "input-invalid-400",
-        "JSON of the wrong shape is 400.",
-        "status-invalid",
-        altered(_is_json, becomes(400), status(422)),
-    ),
-    _mutant(
-        "input-crash-sometimes",
-        "One refused body in 20 is answered 500.",
-        "json-type",
-        altered(_is_json, becomes(500), refusal, nth=20),
-    ),
+_mutant("input-missing-is-zero", "json-missing", "A missing JSON member counts as 0.").made(_repairing(_filled))
+_mutant("input-unknown-ignored", "json-unknown", "Unknown JSON members are ignored.").made(_repairing(_known))
+_mutant("input-last-wins", "json-duplicate", "Of a duplicate JSON member, the last one counts.").rewritten(
+    _is_json, _twice
+)
+_mutant("input-coerced", "json-type", "Strings, null and booleans count as numbers.").made(_repairing(_typed))
+_mutant("input-nan-is-zero", "json-non-finite", "NaN and numbers that overflow count as 0.").made(_repairing(_finite))
+_mutant("input-deep-fine", "json-depth", "Deeply nested JSON returns 204.").made(_swallowed(_deep))
+_mutant("input-empty-fine", "json-empty", "An empty body returns 204.").made(
+    _swallowed(lambda request: _is_json(request) and not request.body.strip())
+)
+_mutant("input-bounds-cut", "json-bounds", "Values beyond their bounds are clamped.").made(_repairing(_bounded))
+_mutant("input-path-lenient", "path-parameter", "Invalid values in a path count as numbers.").rewritten(
+    deliveries, _path
+)
+_mutant("input-query-lenient", "query-parameter", "Invalid numbers in a query count as 0.").rewritten(
+    rest("GET", PLAN), query(_numbers)
+)
+_mutant("input-malformed-422", "status-malformed", "Malformed JSON returns 422.").altered(
+    _is_json, becomes(422), status(400)
+)
+_mutant("input-invalid-400", "status-invalid", "JSON of the wrong shape returns 400.").altered(
+    _is_json, becomes(400), status(422)
+)
+_mutant("input-crash-sometimes", "json-type", "One invalid body in 20 returns 500.").altered(
+    _is_json, becomes(500), refusal, nth=20
 )

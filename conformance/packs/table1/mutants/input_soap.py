@@ -1,4 +1,4 @@
-"""Robots that take garbage over SOAP: each repairs one kind of it before it is looked at."""
+"""Mutants that repair or accept invalid SOAP input instead of refusing it."""
 
 import re
 from collections.abc import Callable
@@ -6,23 +6,24 @@ from typing import Any
 
 from lxml import etree
 
-from conformance.mutation.changes import SOAP, altered, becomes, page, rewritten, soap
+from conformance.mutation.changes import SOAP, Make, becomes, page, rewritten, soap
 from conformance.mutation.messages import Request
-from conformance.mutation.mutant import Mutant, of_class
+from conformance.mutation.table import Table
+from conformance.mutation.xml_trees import named, xml
 from conformance.packs.table1.delivery import XSD_FIELDS
 from conformance.packs.table1.mutants.paths import TNS
 from conformance.packs.table1.mutants.soap_responses import is_fault
-from conformance.packs.table1.mutants.xml_trees import named, xml
 
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("strict-input", "soap")
 _ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
-_ANY = soap()
 _XSI = "http://www.w3.org/2001/XMLSchema-instance"
 _DOUBLE = re.compile(r"\s*([+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?INF|NaN)\s*", re.ASCII)
 _INT = re.compile(r"\s*[+-]?\d+\s*", re.ASCII)
 
 
 def _repaired(edit: Callable[[Any, Any], None]) -> Callable[[Request], None]:
-    """``edit`` gets the Body and the deliveryRequestMessage (or None)."""
+    """Return an edit of requests; ``edit`` takes the Body element and the deliveryRequestMessage, or None."""
 
     def apply(request: Request) -> None:
         root = xml(request.body)
@@ -38,6 +39,10 @@ def _repaired(edit: Callable[[Any, Any], None]) -> Callable[[Request], None]:
     return apply
 
 
+def _repairing(edit: Callable[[Any, Any], None]) -> Make:
+    return rewritten(soap("Execute[A-Z][A-Za-z]+", "Body"), _repaired(edit))
+
+
 def _children(message: Any) -> list[Any]:
     return [child for child in message if isinstance(child.tag, str)] if message is not None else []
 
@@ -46,6 +51,9 @@ def _neutral(name: str) -> str:
     return "3" if name == "message_code" else "0"
 
 
+@_mutant("input-soap-missing-is-zero", "soap-missing", "A missing element counts as 0, as in JAX-WS RI.").through(
+    _repairing
+)
 def _filled(body: Any, message: Any) -> None:
     for wrapper in body if message is None else ():
         if isinstance(wrapper.tag, str) and etree.QName(wrapper).localname.startswith("Execute") and not len(wrapper):
@@ -60,6 +68,9 @@ def _filled(body: Any, message: Any) -> None:
             message.insert(place, made)
 
 
+@_mutant("input-soap-unknown-ignored", "soap-unknown", "Unknown elements are ignored, as in JAX-WS RI.").through(
+    _repairing
+)
 def _known(body: Any, message: Any) -> None:
     for child in _children(message):
         if etree.QName(child).localname not in XSD_FIELDS:
@@ -70,6 +81,7 @@ def _known(body: Any, message: Any) -> None:
                 wrapper.remove(child)
 
 
+@_mutant("input-soap-first-wins", "soap-duplicate", "Of a duplicate element, the first one counts.").through(_repairing)
 def _once(_body: Any, message: Any) -> None:
     seen: set[str] = set()
     for child in _children(message):
@@ -82,6 +94,7 @@ def _once(_body: Any, message: Any) -> None:
             parent.remove(twin)
 
 
+@_mutant("input-soap-any-order", "soap-order", "Elements may come in any order.").through(_repairing)
 def _ordered(_body: Any, message: Any) -> None:
     if message is not None:
         message[:] = sorted(
@@ -89,6 +102,7 @@ def _ordered(_body: Any, message: Any) -> None:
         )
 
 
+@_mutant("input-soap-any-namespace", "soap-namespace", "The robot ignores namespaces.").through(_repairing)
 def _renamed(body: Any, _message: Any) -> None:
     for wrapper in body:
         if isinstance(wrapper.tag, str):
@@ -98,6 +112,9 @@ def _renamed(body: Any, _message: Any) -> None:
                     node.tag = etree.QName(node).localname
 
 
+@_mutant("input-soap-text-is-zero", "soap-lexical", "Text in place of a number counts as 0, as in JAX-WS RI.").through(
+    _repairing
+)
 def _lexical(_body: Any, message: Any) -> None:
     for child in _children(message):
         good = _INT if child.tag == "message_code" else _DOUBLE
@@ -106,12 +123,14 @@ def _lexical(_body: Any, message: Any) -> None:
             child.text = _neutral(child.tag)
 
 
+@_mutant("input-soap-overflow", "soap-range", "An integer beyond its type is replaced.").through(_repairing)
 def _wrapped(_body: Any, message: Any) -> None:
     for child in _children(message):
         if child.tag == "message_code" and _INT.fullmatch(child.text or "") and abs(int(child.text)) >= 2**31:
             child.text = "3"
 
 
+@_mutant("input-soap-inf-is-zero", "soap-non-finite", "INF and NaN count as 0.").through(_repairing)
 def _finite(_body: Any, message: Any) -> None:
     for child in _children(message):
         text = (child.text or "").strip()
@@ -119,6 +138,7 @@ def _finite(_body: Any, message: Any) -> None:
             child.text = "0"
 
 
+@_mutant("input-soap-nil-is-zero", "soap-nil", "Elements with xsi:nil count as 0.").through(_repairing)
 def _not_nil(_body: Any, message: Any) -> None:
     for child in [message, *_children(message)] if message is not None else []:
         if child.attrib.pop(f"{{{_XSI}}}nil", None) and child is not message and not (child.text or "").strip():
@@ -127,6 +147,9 @@ def _not_nil(_body: Any, message: Any) -> None:
         _filled(None, message)
 
 
+@_mutant(
+    "input-soap-first-child", "soap-body", "Only the first child of Body counts, and an empty Body is a coffee."
+).through(_repairing)
 def _alone(body: Any, _message: Any) -> None:
     for child in list(body)[1:]:
         body.remove(child)
@@ -135,6 +158,7 @@ def _alone(body: Any, _message: Any) -> None:
         _filled(None, etree.SubElement(wrapper, "arg0"))
 
 
+@_mutant("input-soap-any-code", "soap-code", "Every code counts as 3.").through(_repairing)
 def _coded(_body: Any, message: Any) -> None:
     for child in _children(message):
         text = (child.text or "").strip()
@@ -142,49 +166,9 @@ def _coded(_body: Any, message: Any) -> None:
             child.text = "3"
 
 
-_of_class = of_class("strict-input", "soap")
-
-
-def _mutant(name: str, says: str, id_: str, edit: Callable[[Any, Any], None]) -> Mutant:
-    return _of_class(name, says, id_, rewritten(soap("Execute[A-Z][A-Za-z]+", "Body"), _repaired(edit)))
-
-
-MUTANTS = (
-    _mutant(
-        "input-soap-missing-is-zero", "A missing element counts as zero, as JAX-WS RI has it.", "soap-missing", _filled
-    ),
-    _mutant("input-soap-unknown-ignored", "Unknown elements are ignored, as JAX-WS RI has it.", "soap-unknown", _known),
-    _mutant(
-        "input-soap-first-wins", "Of an element that is there twice, the first one counts.", "soap-duplicate", _once
-    ),
-    _mutant("input-soap-any-order", "Elements may come in any order.", "soap-order", _ordered),
-    _mutant("input-soap-any-namespace", "Namespaces are not looked at.", "soap-namespace", _renamed),
-    _mutant(
-        "input-soap-text-is-zero",
-        "Text in place of a number counts as zero, as JAX-WS RI has it.",
-        "soap-lexical",
-        _lexical,
-    ),
-    _mutant("input-soap-overflow", "An integer beyond its type is cut.", "soap-range", _wrapped),
-    _mutant("input-soap-inf-is-zero", "INF and NaN count as zero.", "soap-non-finite", _finite),
-    _mutant("input-soap-nil-is-zero", "What is nil counts as zero.", "soap-nil", _not_nil),
-    _mutant(
-        "input-soap-first-child",
-        "Of Body's children the first one counts, and an empty Body is a coffee.",
-        "soap-body",
-        _alone,
-    ),
-    _mutant("input-soap-any-code", "Every code counts as 3.", "soap-code", _coded),
-    _of_class(
-        "input-soap-fault-200",
-        "What is refused over SOAP is refused with status 200.",
-        "soap-fault",
-        altered(_ANY, becomes(200), is_fault),
-    ),
-    _of_class(
-        "input-soap-no-fault",
-        "What is refused over SOAP is 500 without a fault.",
-        "soap-fault",
-        altered(_ACT, page(500, b"refused", "text/plain"), is_fault),
-    ),
+_mutant("input-soap-fault-200", "soap-fault", "Faults for invalid input have status 200.").altered(
+    soap(), becomes(200), is_fault
+)
+_mutant("input-soap-no-fault", "soap-fault", "Invalid SOAP input returns 500 without a fault.").altered(
+    _ACT, page(500, b"refused", "text/plain"), is_fault
 )

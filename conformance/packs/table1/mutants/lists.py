@@ -1,59 +1,29 @@
-"""Robots whose lists of sensors and services are not what they should be."""
+"""Mutants with faults in the lists of sensors and services."""
 
 import re
-from typing import Any
 
-from conformance.mutation.changes import altered, rest, values
-from conformance.mutation.mutant import Mutant, of_class
+from conformance.mutation.changes import rest
+from conformance.mutation.fields import field, without
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import SENSORS, SERVICES
 
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("rest-resources", "rest")
+_KIND = re.compile("/(msg|srv|action)/")
 
-def _first(edit: Any) -> Any:
-    def apply(items: Any) -> None:
-        if items:
-            edit(items[0])
-
-    return values(apply)
-
-
-_mutant = of_class("rest-resources", "rest")
-
-
-def _both(name: str, path: str) -> tuple[Mutant, ...]:
-    at = rest("GET", path)
-    in_full = re.compile("/(msg|srv|action)/")
-    return (
-        _mutant(
-            f"{name}-without-type",
-            f"An entry of the {name} has no type.",
-            f"{name}-type",
-            altered(at, _first(lambda item: item.pop("type"))),
-        ),
-        _mutant(
-            f"{name}-in-an-object",
-            f"The {name} are an object with a list in it.",
-            f"{name}-type",
-            altered(at, values(lambda items: {"items": items})),
-        ),
-        _mutant(
-            f"{name}-twice",
-            f"The first of the {name} is listed twice.",
-            f"{name}-unique",
-            altered(at, values(lambda items: [*items, *items[:1]])),
-        ),
-        _mutant(
-            f"{name}-short-names",
-            f"Types of the {name} are not named in full.",
-            f"{name}-named-in-full",
-            altered(at, _first(lambda item: item.update(type=in_full.sub("/", item["type"])))),
-        ),
-        _mutant(
-            f"{name}-flicker",
-            f"Every other time the last of the {name} is missing.",
-            f"{name}-stable",
-            altered(at, values(lambda items: items[:-1]), nth=2),
-        ),
+for _name, _at in (("sensors", rest("GET", SENSORS)), ("services", rest("GET", SERVICES))):
+    _mutant(f"{_name}-without-type", f"{_name}-type", f"The first entry of the {_name} has no type.").json(
+        _at, without("0.type")
     )
-
-
-MUTANTS = (*_both("sensors", SENSORS), *_both("services", SERVICES))
+    _mutant(f"{_name}-in-an-object", f"{_name}-type", f"The {_name} are an object that holds the list.").json(
+        _at, lambda items: {"items": items}
+    )
+    _mutant(f"{_name}-twice", f"{_name}-unique", f"The first of the {_name} is listed twice.").json(
+        _at, lambda items: [*items, *items[:1]]
+    )
+    _mutant(f"{_name}-short-names", f"{_name}-named-in-full", f"Types of the {_name} lack msg, srv or action.").json(
+        _at, field("0.type", lambda type_: _KIND.sub("/", type_))
+    )
+    _mutant(f"{_name}-flicker", f"{_name}-stable", f"Every other response lacks the last of the {_name}.").json(
+        _at, lambda items: items[:-1], nth=2
+    )

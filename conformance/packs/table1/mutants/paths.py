@@ -1,4 +1,4 @@
-"""The resources and the namespace that this pack's mutants alter."""
+"""The paths of the resources, and the SOAP namespace, that this pack's mutants change."""
 
 from conformance.mutation.messages import Request
 
@@ -10,7 +10,7 @@ TNS = "http://soap.turtlebot.mybot.org/"
 
 
 def deliveries(request: Request) -> bool:
-    """Delivery PUTs."""
+    """Return whether a request is PUT of a delivery."""
     return (
         request.side == "rest"
         and request.method == "PUT"

@@ -1,24 +1,27 @@
-"""Robots whose plans lead elsewhere."""
+"""Mutants that return wrong plans."""
 
 import math
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import JSON, Make, altered, becomes, page, query, rest, rewritten, status, values
-from conformance.mutation.mutant import of_class
+from conformance.mutation.changes import JSON, Make, altered, becomes, page, query, rest, status, values
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import PLAN
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("rest-resources", "rest")
 
 _EMPTY = b'{"plan":{"header":{"stamp":{"sec":1,"nanosec":0},"frame_id":"map"},"poses":[]}}'
 _GET = rest("GET", PLAN)
 
 
 def _told(edit: Callable[[Any], Any]) -> Make:
-    """The plan is altered on its way to the client."""
+    """Return a change that applies ``edit`` to plans."""
     return altered(_GET, values(edit))
 
 
 def _led(edit: Callable[[list[Any]], list[Any]], nth: int = 1) -> Make:
-    """The plan has other poses."""
+    """Return a change that applies ``edit`` to the list of poses of every nth plan."""
     return altered(_GET, values(lambda value: value["plan"].update(poses=edit(value["plan"]["poses"]))), nth=nth)
 
 
@@ -32,13 +35,16 @@ def _detour(poses: list[Any]) -> list[Any]:
     return [*poses[:middle], _moved(poses[middle], 25.0, -25.0), *poses[middle:]]
 
 
+@_mutant(
+    "plan-frame-in-name-only", ("plan-start", "plan-end"), "A plan in the odometry's frame is shifted by (1.5, -1.0) m."
+).through(_told)
 def _aside(value: Any) -> None:
-    """A path in the odometry's frame has the numbers of another one."""
     path = value["plan"]
     if path["header"]["frame_id"] == "odom":
         path["poses"] = [_moved(pose, 1.5, -1.0) for pose in path["poses"]]
 
 
+@_mutant("plan-heading-ignored", "plan-yaw", "The last pose of a plan has a heading that is 1 rad off.").through(_led)
 def _turned(poses: list[Any]) -> list[Any]:
     last = poses[-1]
     q = last["pose"]["orientation"]
@@ -56,73 +62,40 @@ def _quarter(given: dict[str, str]) -> None:
     given.setdefault("yaw", "1.5707963")
 
 
+@_mutant(
+    "plan-mixed-frames", "plan-frame", "Only the first pose of a plan is in the frame of the path's header."
+).through(_told)
 def _frame(value: Any) -> None:
     for pose in value["plan"]["poses"][1:]:
         pose["header"]["frame_id"] = "base_link"
 
 
-_mutant = of_class("rest-resources", "rest")
-
-MUTANTS = (
-    _mutant(
-        "plan-without-stamps",
-        "Poses of a plan have no header.",
-        "plan-type",
-        _led(lambda poses: [{"pose": one["pose"]} for one in poses]),
-    ),
-    _mutant(
-        "plan-bare",
-        "The answer is the path, not a response that holds it.",
-        "plan-type",
-        _told(lambda value: value["plan"]),
-    ),
-    _mutant(
-        "plan-from-elsewhere",
-        "A plan begins 60 cm beside the robot.",
-        "plan-start",
-        _led(lambda poses: [_moved(poses[0], -0.36, 0.48), *poses]),
-    ),
-    _mutant(
-        "plan-ignores-start", "A given start is not looked at.", "plan-given-start", rewritten(_GET, query(_no_start))
-    ),
-    _mutant(
-        "plan-falls-short",
-        "A plan ends 50 cm before the pose that was asked for.",
-        "plan-end",
-        _led(lambda poses: [*poses[:-1], _moved(poses[-1], 0.3, 0.4)]),
-    ),
-    _mutant("plan-heading-ignored", "A plan ends with a heading that is one radian off.", "plan-yaw", _led(_turned)),
-    _mutant("plan-jumps", "In the middle of a plan there is a leap of 35 m.", "plan-continuous", _led(_detour)),
-    _mutant("plan-jumps-sometimes", "One plan in 50 has a leap in it.", "plan-continuous", _led(_detour, nth=50)),
-    _mutant("plan-mixed-frames", "Only the first pose is in the frame of the path.", "plan-frame", _told(_frame)),
-    _mutant(
-        "plan-frame-in-name-only",
-        "A plan in the odometry's frame is off as if that lay elsewhere on the map.",
-        ("plan-start", "plan-end"),
-        _told(_aside),
-    ),
-    _mutant(
-        "plan-frameless",
-        "The path's header has no frame.",
-        "plan-frame",
-        _told(lambda value: value["plan"]["header"].update(frame_id="")),
-    ),
-    _mutant(
-        "plan-other-defaults",
-        "A yaw that is left out counts as a quarter turn.",
-        "plan-defaults",
-        rewritten(_GET, query(_quarter)),
-    ),
-    _mutant(
-        "plan-none-empty",
-        "Where there is no plan, an empty one is sent.",
-        "plan-none",
-        altered(_GET, page(200, _EMPTY, JSON), status(404, 422)),
-    ),
-    _mutant(
-        "plan-none-crash",
-        "Where there is no plan, the answer is 500.",
-        "plan-none",
-        altered(_GET, becomes(500), status(404, 422)),
-    ),
+_mutant("plan-without-stamps", "plan-type", "Poses of a plan have no header.").made(
+    _led(lambda poses: [{"pose": one["pose"]} for one in poses])
+)
+_mutant("plan-bare", "plan-type", "The response is the path itself, without the object around it.").json(
+    _GET, lambda value: value["plan"]
+)
+_mutant("plan-from-elsewhere", "plan-start", "A plan begins 60 cm from the robot.").made(
+    _led(lambda poses: [_moved(poses[0], -0.36, 0.48), *poses])
+)
+_mutant("plan-ignores-start", "plan-given-start", "The robot ignores the start in the query.").rewritten(
+    _GET, query(_no_start)
+)
+_mutant("plan-falls-short", "plan-end", "A plan ends 50 cm before the requested pose.").made(
+    _led(lambda poses: [*poses[:-1], _moved(poses[-1], 0.3, 0.4)])
+)
+_mutant("plan-jumps", "plan-continuous", "A plan contains a jump of 35 m.").made(_led(_detour))
+_mutant("plan-jumps-sometimes", "plan-continuous", "One plan in 50 contains a jump of 35 m.").made(
+    _led(_detour, nth=50)
+)
+_mutant("plan-frameless", "plan-frame", "The path's header has an empty frame_id.").json(
+    _GET, lambda value: value["plan"]["header"].update(frame_id="")
+)
+_mutant("plan-other-defaults", "plan-defaults", "The default yaw is a quarter turn.").rewritten(_GET, query(_quarter))
+_mutant("plan-none-empty", "plan-none", "Where no plan exists, the robot returns 200 with an empty plan.").altered(
+    _GET, page(200, _EMPTY, JSON), status(404, 422)
+)
+_mutant("plan-none-crash", "plan-none", "Where no plan exists, the robot returns 500.").altered(
+    _GET, becomes(500), status(404, 422)
 )

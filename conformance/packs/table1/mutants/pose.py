@@ -1,4 +1,4 @@
-"""Robots that do not know, or do not say, where they are."""
+"""Mutants that return a wrong pose, stamp or odometry."""
 
 import copy
 import math
@@ -6,10 +6,13 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import JSON, Make, altered, instead, parsed, plain, problem, rest, values
+from conformance.mutation.changes import JSON, Make, altered, parsed, plain, problem, rest, values
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import LINEAR, POSE, VELOCITY
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("rest-resources", "rest")
 
 _AT = rest("GET", POSE)
 
@@ -23,7 +26,7 @@ def _orientation(odometry: Any) -> Any:
 
 
 def _told(edit: Callable[[Any], Any], nth: int = 1) -> Make:
-    """The odometry is altered on its way to the client."""
+    """Return a change that applies ``edit`` to every nth odometry."""
     return altered(_AT, values(edit), nth=nth)
 
 
@@ -44,17 +47,21 @@ def _turned(change: Callable[[float], float]) -> Callable[[Any], None]:
     return edit
 
 
+@_mutant("pose-mirrored", "pose-motion", "The position's x and y are swapped.").through(_told)
 def _swapped(odometry: Any) -> None:
     at = _position(odometry)
     at["x"], at["y"] = at["y"], at["x"]
 
 
+@_mutant("odometry-in-degrees", "velocity-odometry", "The odometry's turning rate is in degrees per second.").through(
+    _told
+)
 def _in_degrees(odometry: Any) -> None:
     odometry["twist"]["twist"]["angular"]["z"] = math.degrees(odometry["twist"]["twist"]["angular"]["z"])
 
 
 class _Frozen:
-    """Keeps parts of the first pose for ever."""
+    """A change that returns some parts of the first odometry for ever."""
 
     def __init__(self, *parts: str) -> None:
         self._parts = parts
@@ -69,9 +76,8 @@ class _Frozen:
         return response
 
 
+@_mutant("odometry-lost", "pose-fresh", "When the odometry stops, GET returns the last pose and velocity for ever.")
 class _Lost:
-    """From the sixtieth reading on there is no new odometry, and the last one is shown for ever."""
-
     def __init__(self) -> None:
         self._left = 60
         self._last: dict[str, Response] = {}
@@ -92,9 +98,8 @@ def _is_json(request: Request) -> bool:
     return (request.field("Accept") or JSON) == JSON
 
 
+@_mutant("pose-clock-fast", "pose-clock", "The clock of the odometry stamps runs 10 % fast.")
 class _FastClock:
-    """The robot's clock goes a tenth too fast."""
-
     def __init__(self) -> None:
         self._begun = time.monotonic()
 
@@ -110,11 +115,15 @@ class _FastClock:
         stamp["sec"], stamp["nanosec"] = divmod(ahead, 10**9)
 
 
+@_mutant(
+    "pose-nanosec-carried", "pose-type", "The stamp's sec is 1 too small and its nanosec 1,000,000,000 too large."
+).through(_told)
 def _carried(odometry: Any) -> None:
     odometry["header"]["stamp"]["sec"] -= 1
     odometry["header"]["stamp"]["nanosec"] += 10**9
 
 
+@_mutant("pose-clock-milliseconds", "pose-clock", "The stamp's nanosec counts milliseconds.").through(_told)
 def _in_milliseconds(odometry: Any) -> None:
     odometry["header"]["stamp"]["nanosec"] //= 10**6
 
@@ -123,9 +132,12 @@ def _earlier(odometry: Any) -> None:
     odometry["header"]["stamp"]["sec"] -= 1
 
 
+@_mutant(
+    "pose-without-retry-after",
+    "pose-unavailable",
+    "Before the first odometry, GET of the pose returns 503 without Retry-After.",
+)
 class _NotYet:
-    """The first times there is no odometry: more often than anybody looks before the checks begin."""
-
     def __init__(self) -> None:
         self._left = 40
 
@@ -136,96 +148,42 @@ class _NotYet:
         return forward(request)
 
 
-_mutant = of_class("rest-resources", "rest")
-
-MUTANTS = (
-    _mutant(
-        "pose-short-covariance",
-        "The pose's covariance has 35 values.",
-        "pose-type",
-        _told(lambda value: value["pose"].update(covariance=value["pose"]["covariance"][:35])),
-    ),
-    _mutant(
-        "pose-without-child-frame",
-        "The pose lacks child_frame_id.",
-        "pose-type",
-        _told(lambda value: value.pop("child_frame_id") and None),
-    ),
-    _mutant(
-        "pose-numbers-as-text",
-        "One pose in 50 has its x as a string.",
-        "pose-type",
-        _told(lambda value: _position(value).update(x=str(_position(value)["x"])), nth=50),
-    ),
-    _mutant(
-        "pose-without-retry-after",
-        "Before the first odometry, the pose is 503 without Retry-After.",
-        "pose-unavailable",
-        _NotYet,
-    ),
-    _mutant(
-        "pose-quaternion-long",
-        "The orientation's quaternion is 1 percent too long.",
-        "pose-quaternion",
-        _told(
-            lambda value: _orientation(value).update({axis: 1.01 * part for axis, part in _orientation(value).items()})
-        ),
-    ),
-    _mutant(
-        "pose-quaternion-zero",
-        "The orientation is four zeros.",
-        "pose-quaternion",
-        _told(lambda value: value["pose"]["pose"].update(orientation=dict.fromkeys("xyzw", 0.0))),
-    ),
-    _mutant(
-        "pose-stamp-frozen", "The pose's header is for ever the first one's.", "pose-stamp", lambda: _Frozen("header")
-    ),
-    _mutant("pose-stamp-backwards", "Each fifth pose has a stamp a second back.", "pose-stamp", _told(_earlier, nth=5)),
-    _mutant(
-        "pose-stale",
-        "The pose is for ever the first one, with a new stamp.",
-        ("pose-motion", "pose-rotation"),
-        lambda: _Frozen("pose", "twist"),
-    ),
-    _mutant(
-        "pose-aside-sometimes",
-        "One pose in 60 is a metre aside.",
-        "pose-sample",
-        _told(lambda value: _position(value).update(x=_position(value)["x"] + 1.0), nth=60),
-    ),
-    _mutant(
-        "velocity-off-sometimes",
-        "One measured velocity in 60 is 0.1 m/s more than that of the odometry.",
-        "velocity-odometry",
-        altered(
-            rest("GET", VELOCITY), values(lambda twist: twist["linear"].update(x=twist["linear"]["x"] + 0.1)), nth=60
-        ),
-    ),
-    _mutant("pose-in-centimetres", "The position is in centimetres.", "pose-motion", _told(_scaled(100))),
-    _mutant("pose-mirrored", "The position's x and y are swapped.", "pose-motion", _told(_swapped)),
-    _mutant("pose-clockwise", "The heading counts clockwise.", "pose-rotation", _told(_turned(lambda yaw: -yaw))),
-    _mutant(
-        "pose-half-turn", "The heading turns at half the rate.", "pose-rotation", _told(_turned(lambda yaw: yaw / 2))
-    ),
-    _mutant(
-        "odometry-in-degrees",
-        "The odometry's turning rate is in degrees per second.",
-        "velocity-odometry",
-        _told(_in_degrees),
-    ),
-    _mutant(
-        "odometry-lost", "When the odometry ceases, pose and velocity are the last ones for ever.", "pose-fresh", _Lost
-    ),
-    _mutant(
-        "pose-clock-milliseconds", "The stamp's nanoseconds are milliseconds.", "pose-clock", _told(_in_milliseconds)
-    ),
-    _mutant("pose-clock-fast", "The stamps' clock goes a tenth too fast.", "pose-clock", _FastClock),
-    _mutant(
-        "pose-nanosec-carried",
-        "The stamp has a second less, and as many nanoseconds more.",
-        "pose-type",
-        _told(_carried),
-    ),
-    _mutant("pose-gone", "There is no pose: 404.", "pose-type", instead(_AT, problem(404, "there is no pose"))),
-    _mutant("pose-no-content", "The pose is 204.", "pose-type", instead(_AT, plain(204))),
+_mutant("pose-short-covariance", "pose-type", "The pose's covariance has 35 values.").json(
+    _AT, lambda value: value["pose"].update(covariance=value["pose"]["covariance"][:35])
 )
+_mutant("pose-without-child-frame", "pose-type", "The pose lacks child_frame_id.").json(
+    _AT, lambda value: value.pop("child_frame_id") and None
+)
+_mutant("pose-numbers-as-text", "pose-type", "In one pose of 50, x is a string.").json(
+    _AT, lambda value: _position(value).update(x=str(_position(value)["x"])), nth=50
+)
+_mutant("pose-quaternion-long", "pose-quaternion", "The orientation quaternion is 1 % too long.").json(
+    _AT, lambda value: _orientation(value).update({axis: 1.01 * part for axis, part in _orientation(value).items()})
+)
+_mutant("pose-quaternion-zero", "pose-quaternion", "The orientation quaternion is four zeros.").json(
+    _AT, lambda value: value["pose"]["pose"].update(orientation=dict.fromkeys("xyzw", 0.0))
+)
+_mutant("pose-stamp-frozen", "pose-stamp", "GET of the pose always returns the header of the first response.").made(
+    lambda: _Frozen("header")
+)
+_mutant("pose-stamp-backwards", "pose-stamp", "Every fifth pose has a stamp that is 1 s too early.").json(
+    _AT, _earlier, nth=5
+)
+_mutant("pose-stale", ("pose-motion", "pose-rotation"), "GET always returns the first pose, with a new stamp.").made(
+    lambda: _Frozen("pose", "twist")
+)
+_mutant("pose-aside-sometimes", "pose-sample", "One pose in 60 is 1 m off.").json(
+    _AT, lambda value: _position(value).update(x=_position(value)["x"] + 1.0), nth=60
+)
+_mutant(
+    "velocity-off-sometimes", "velocity-odometry", "One measured velocity in 60 is 0.1 m/s higher than the odometry's."
+).json(rest("GET", VELOCITY), lambda twist: twist["linear"].update(x=twist["linear"]["x"] + 0.1), nth=60)
+_mutant("pose-in-centimetres", "pose-motion", "The position is in centimetres.").json(_AT, _scaled(100))
+_mutant("pose-clockwise", "pose-rotation", "The heading has the wrong sign: it counts clockwise.").json(
+    _AT, _turned(lambda yaw: -yaw)
+)
+_mutant("pose-half-turn", "pose-rotation", "The heading turns at half the rate.").json(
+    _AT, _turned(lambda yaw: yaw / 2)
+)
+_mutant("pose-gone", "pose-type", "GET of the pose returns 404.").instead(_AT, problem(404, "there is no pose"))
+_mutant("pose-no-content", "pose-type", "GET of the pose returns 204.").instead(_AT, plain(204))

@@ -1,57 +1,45 @@
-"""Robots of which an interface is not there."""
+"""Mutants without one of their interfaces."""
 
 from conformance.mutation.changes import Make, hanging_up, instead, plain, rest
-from conformance.mutation.messages import HangUpError, Request, Response
-from conformance.mutation.mutant import Mutant
+from conformance.mutation.messages import Forward, HangUpError, Request, Response
+from conformance.mutation.table import Table
 
-_REST_CLASSES = ("rest-resources", "rest-delivery", "http", "safety", "equivalence", "strict-input")
-_LOST = plain(404, b"<html><body>It works!</body></html>", "text/html")
-
-
-def _lost(service: str) -> Make:
-    """Somebody else's web server answers for a service, or for all."""
-    return instead(lambda request: request.side == "soap" and service in request.path, _LOST)
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("", "soap")
+_OTHER_SERVER = plain(404, b"<html><body>It works!</body></html>", "text/html")
 
 
-def _nothing_there(request: Request) -> Response:
+def _elsewhere(service: str) -> Make:
+    """Return a change that makes a SOAP service (empty: all of them) respond like another web server."""
+    return instead(lambda request: request.side == "soap" and service in request.path, _OTHER_SERVER)
+
+
+for _class in ("rest-resources", "rest-delivery", "http", "safety", "equivalence", "strict-input"):
+    _says = f"REST closes every connection without responding (seen by class {_class})."
+    _mutant(f"rest-silent-{_class}", f"{_class}/reachable", _says, interface="rest").made(hanging_up(rest()))
+
+_mutant(
+    "publishers-elsewhere",
+    ("soap-delivery/reachable", "equivalence/reachable"),
+    "Another web server is at the address of the publishers service.",
+).made(_elsewhere("publisher"))
+_mutant(
+    "subscribers-elsewhere",
+    ("soap-subscribers/reachable", "strict-input/reachable"),
+    "Another web server is at the address of the subscribers service.",
+).made(_elsewhere("subscriber"))
+_mutant("soap-elsewhere", "soap-basic-profile/reachable", "Another web server is at both SOAP addresses.").made(
+    _elsewhere("")
+)
+
+
+@_mutant(
+    "nothing-elsewhere",
+    "xml-security/reachable",
+    "REST closes every connection, and another web server is at both SOAP addresses.",
+    interface="both",
+)
+def _nothing_there(request: Request, _forward: Forward) -> Response:
     if request.side == "rest":
         raise HangUpError
-    return _LOST(request)
-
-
-MUTANTS = (
-    *(
-        Mutant(
-            f"rest-silent-{name}",
-            f"REST closes every connection without an answer (seen by class {name}).",
-            (f"{name}/reachable",),
-            "rest",
-            hanging_up(rest()),
-        )
-        for name in _REST_CLASSES
-    ),
-    Mutant(
-        "publishers-elsewhere",
-        "Nothing is at the address of the publishers service but somebody else's web server.",
-        ("soap-delivery/reachable", "equivalence/reachable"),
-        "soap",
-        _lost("publisher"),
-    ),
-    Mutant(
-        "subscribers-elsewhere",
-        "Nothing is at the address of the subscribers service but somebody else's web server.",
-        ("soap-subscribers/reachable", "strict-input/reachable"),
-        "soap",
-        _lost("subscriber"),
-    ),
-    Mutant(
-        "soap-elsewhere", "No SOAP service is where it should be.", ("soap-basic-profile/reachable",), "soap", _lost("")
-    ),
-    Mutant(
-        "nothing-elsewhere",
-        "REST hangs up, and SOAP is somebody else's web server.",
-        ("xml-security/reachable",),
-        "both",
-        instead(lambda _request: True, _nothing_there),
-    ),
-)
+    return _OTHER_SERVER(request)

@@ -1,26 +1,18 @@
-"""Robots that are dangerous: they go on, go too fast, or start by themselves."""
+"""Mutants that are dangerous: they drive on, drive too fast, or start by themselves."""
 
 import time
 from typing import Any
 
-from conformance.mutation.changes import (
-    altered,
-    guarded,
-    inputs,
-    parsed,
-    plain,
-    problem,
-    rest,
-    rewritten,
-    success,
-    values,
-)
+from conformance.mutation.changes import guarded, inputs, parsed, plain, problem, rest, success
 from conformance.mutation.messages import Forward, Request, Response, unchanged
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.goal_memory import active
 from conformance.packs.table1.mutants.in_background import later
 from conformance.packs.table1.mutants.input_effects import after_refusal, drive, goal_ahead, sent
 from conformance.packs.table1.mutants.paths import GOAL, LINEAR, VELOCITY
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("safety", "rest")
 
 _PUT = rest("PUT", VELOCITY)
 _PUTS = rest("PUT", VELOCITY, LINEAR)
@@ -30,7 +22,7 @@ _AXES = (("linear", "y"), ("linear", "z"), ("angular", "x"), ("angular", "y"))
 
 
 def moving(request: Request) -> bool:
-    """Whether a velocity is asked for that is not zero."""
+    """Return whether a request commands a velocity other than zero."""
     value = parsed(request.body)
     try:
         return bool(value["linear"]["x"] or value["angular"]["z"])
@@ -38,9 +30,8 @@ def moving(request: Request) -> bool:
         return False
 
 
+@_mutant("safety-relentless", "watchdog", "The robot drives on for 10 s after a velocity command.")
 class _Relentless:
-    """A velocity is renewed by the robot itself, for ten seconds, until another one comes."""
-
     def __init__(self) -> None:
         self._turn = 0
 
@@ -60,9 +51,8 @@ class _Relentless:
             time.sleep(0.15)
 
 
+@_mutant("safety-long-winded", "hold-ends", "A velocity command holds 1.5 times as long as declared.")
 class _LongWinded:
-    """A velocity is renewed by the robot itself, once, after half of its hold time."""
-
     def __init__(self) -> None:
         self._turn = 0
 
@@ -79,9 +69,8 @@ class _LongWinded:
             sent(request, forward, "PUT", VELOCITY, parsed(request.body))
 
 
+@_mutant("safety-short-of-breath", "hold", "A velocity command holds for only 0.15 s.")
 class _ShortOfBreath:
-    """A velocity ends after 0.15 s."""
-
     def __init__(self) -> None:
         self._turn = 0
 
@@ -97,9 +86,8 @@ class _ShortOfBreath:
             drive(request, forward, 0.0)
 
 
+@_mutant("safety-no-renewal", "renewal", "Sending the same velocity again does not renew it.")
 class _Once:
-    """The same velocity again is answered, and not passed on."""
-
     def __init__(self) -> None:
         self._last: Any = None
 
@@ -114,9 +102,8 @@ class _Once:
         return response
 
 
+@_mutant("safety-slow-cancel", "cancel", "After DELETE of the goal, the robot drives on for 3 s.")
 class _SlowCancel:
-    """A cancelled goal is gone at once, and the robot drives on for three seconds."""
-
     def __init__(self) -> None:
         self._until = 0.0
 
@@ -131,8 +118,8 @@ class _SlowCancel:
         return forward(request)
 
 
+@_mutant("safety-second-wind", "cancel-stays", "One second after DELETE of the goal, the robot drives again.")
 def _second_wind(request: Request, forward: Forward) -> Response:
-    """A second after its goal was cancelled, the robot drives again."""
     response = forward(request)
     if _DELETE(request) and response.status == 204:
         later(1.0, goal_ahead, request.copy(), forward, 0.8)
@@ -152,15 +139,14 @@ def _two_wheeled(twist: Any) -> None:
 
 
 def _too_fast(twist: Any) -> None:
-    """What is measured is four times what is driven, above a crawl."""
+    """Multiply measured velocities above 0.15 by four."""
     for part, axis in (("linear", "x"), ("angular", "z")):
         if abs(twist[part][axis]) > 0.15:
             twist[part][axis] *= 4
 
 
+@_mutant("safety-no-stop", "stop", "PUT of a zero velocity returns a success, and the robot drives on for 3 s.")
 class _Stubborn:
-    """A velocity of zero is answered, and the velocity before it goes on for three seconds."""
-
     def __init__(self) -> None:
         self._last: Any = None
         self._turn = 0
@@ -194,61 +180,28 @@ def _zero(value: Any) -> bool:
 
 
 def _torn(side: str, _octets: bytes, forward: Forward) -> None:
-    """What had come of a request is carried out."""
+    """Carry out an incomplete request."""
     if side == "rest":
         drive(Request("rest", "PUT", VELOCITY), forward, 0.2)
 
 
-_mutant = of_class("safety", "rest")
-
-MUTANTS = (
-    _mutant("safety-relentless", "A velocity holds for ten seconds.", "watchdog", _Relentless),
-    _mutant("safety-long-winded", "A velocity holds for half as long again.", "hold-ends", _LongWinded),
-    _mutant("safety-short-of-breath", "A velocity holds for 0.15 s.", "hold", _ShortOfBreath),
-    _mutant("safety-no-renewal", "The same velocity again does not renew it.", "renewal", _Once),
-    _mutant(
-        "safety-no-stop", "A velocity of zero is answered, and the robot goes on for three seconds.", "stop", _Stubborn
-    ),
-    _mutant(
-        "safety-clamped",
-        "A velocity beyond the limits is cut to them.",
-        "limits-refused",
-        rewritten(_PUTS, inputs(guarded(_clamped))),
-    ),
-    _mutant(
-        "safety-unactuated-ignored",
-        "Components that the robot does not have are ignored.",
-        "unactuated-refused",
-        rewritten(_PUT, inputs(guarded(_two_wheeled))),
-    ),
-    _mutant(
-        "safety-too-fast",
-        "The robot drives at four times its speed.",
-        "limits-hold",
-        altered(rest("GET", VELOCITY), values(_too_fast)),
-    ),
-    _mutant(
-        "safety-refused-stops",
-        "A refused velocity stops the robot.",
-        "refused-keeps",
-        after_refusal(_PUTS, lambda request, forward: drive(request, forward, 0.0)),
-    ),
-    _mutant("safety-slow-cancel", "After DELETE the robot drives on for three seconds.", "cancel", _SlowCancel),
-    _mutant(
-        "safety-second-wind", "A second after DELETE the robot drives again.", "cancel-stays", lambda: _second_wind
-    ),
-    _mutant(
-        "safety-torn-drives",
-        "A request that ends in the middle moves the robot.",
-        "client-vanished",
-        lambda: unchanged,
-        incomplete_request=lambda: _torn,
-    ),
-    _mutant(
-        "safety-one-at-a-time",
-        "A request that is never completed keeps all others waiting.",
-        "half-request",
-        lambda: unchanged,
-        serial=True,
-    ),
+_mutant("safety-clamped", "limits-refused", "A velocity beyond the limits is clamped instead of refused.").rewritten(
+    _PUTS, inputs(guarded(_clamped))
+)
+_mutant(
+    "safety-unactuated-ignored",
+    "unactuated-refused",
+    "Velocity components that the robot cannot drive are ignored instead of refused.",
+).rewritten(_PUT, inputs(guarded(_two_wheeled)))
+_mutant("safety-too-fast", "limits-hold", "The robot drives at four times its speed.").json(
+    rest("GET", VELOCITY), _too_fast
+)
+_mutant("safety-refused-stops", "refused-keeps", "A refused velocity command stops the robot.").made(
+    after_refusal(_PUTS, lambda request, forward: drive(request, forward, 0.0))
+)
+_mutant(
+    "safety-torn-drives", "client-vanished", "An incomplete request moves the robot.", incomplete_request=lambda: _torn
+)(unchanged)
+_mutant("safety-one-at-a-time", "half-request", "An incomplete request blocks all other requests.", serial=True)(
+    unchanged
 )

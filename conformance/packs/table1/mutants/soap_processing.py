@@ -1,4 +1,4 @@
-"""Robots that process envelopes, headers and encodings as SOAP 1.1 does not have it."""
+"""Mutants that process envelopes, header blocks or encodings against SOAP 1.1."""
 
 import re
 from collections.abc import Callable
@@ -6,12 +6,15 @@ from typing import Any
 
 from lxml import etree
 
-from conformance.mutation.changes import SOAP, altered, anything, instead, page, posted, rewritten, soap
+from conformance.mutation.changes import SOAP, anything, page, posted, soap
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
+from conformance.mutation.xml_trees import xml
 from conformance.packs.table1.mutants.paths import TNS
 from conformance.packs.table1.mutants.soap_responses import coded, enveloped, fault, is_fault
-from conformance.packs.table1.mutants.xml_trees import xml
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("soap-basic-profile", "soap")
 
 _ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 
@@ -36,7 +39,7 @@ def _mandatory(request: Request) -> bool:
 
 
 def without_headers(request: Request) -> Request:
-    """A request without its header blocks."""
+    """Return a copy of a request without its SOAP header blocks."""
     root = xml(request.body)
     made = request.copy()
     if root is not None:
@@ -46,8 +49,13 @@ def without_headers(request: Request) -> Request:
     return made
 
 
+@_mutant(
+    "bp-acts-all-the-same",
+    ("R1025", "R1028"),
+    "The robot returns a MustUnderstand fault and carries the request out.",
+    observer=True,
+)
 def _acts_all_the_same(request: Request, forward: Forward) -> Response:
-    """A request is carried out, and answered with a MustUnderstand fault."""
     response = forward(request)
     if _mandatory(request) and b"MustUnderstand" in response.body:
         forward(without_headers(request))
@@ -66,8 +74,8 @@ def _recode(was: bytes, code: str) -> Callable[[], Any]:
     return lambda: lambda request, forward: _recoded(request, forward, was, code)
 
 
+@_mutant("bp-fault-order", "R2725", "The robot checks Body before it checks mandatory header blocks.")
 def _order(request: Request, forward: Forward) -> Response:
-    """Header blocks are looked at before the envelope's version, and the body before them."""
     if _mandatory(request) and _foreign(request):
         return _recoded(request, forward, b"VersionMismatch", "MustUnderstand")
     response = forward(request)
@@ -78,8 +86,8 @@ def _order(request: Request, forward: Forward) -> Response:
     return response
 
 
+@_mutant("bp-action-dispatch", "R1127", "SOAPAction selects the operation, whatever is in Body.")
 def _by_action(request: Request, forward: Forward) -> Response:
-    """SOAPAction chooses the operation."""
     action = (request.field("SOAPAction") or "").strip('"')
     wanted = next((name for name in ("ExecuteCoffeeRequest", "ExecuteDeliveryRequest") if name in action), None)
     if posted(request) and wanted and b"Execute" in request.body:
@@ -88,7 +96,7 @@ def _by_action(request: Request, forward: Forward) -> Response:
 
 
 def _headed(request: Request) -> bool:
-    """Requests with a header block that is not mandatory and not of WS-Addressing."""
+    """Return whether a request has header blocks, none of them mandatory or of WS-Addressing."""
     root = xml(request.body) if posted(request) else None
     header = root.find(f"{{{SOAP}}}Header") if root is not None else None
     return (
@@ -118,101 +126,43 @@ def _unknown(request: Request) -> bool:
 _NOTHING = f'<t:NothingResponse xmlns:t="{TNS}"/>'
 
 
-_mutant = of_class("soap-basic-profile", "soap")
-
-MUTANTS = (
-    _mutant(
-        "bp-bare-envelope",
-        "An Envelope with an attribute of another namespace is a fault.",
-        "soap-delivery/syntax",
-        instead(
-            lambda request: posted(request) and bool(re.search(rb"Envelope [^>]*:Id=", request.body)),
-            fault("Client", "an attribute that is not known"),
-        ),
-    ),
-    _mutant("bp-any-envelope", "An Envelope of any namespace is taken.", "R1015", rewritten(_foreign, _made_soap11)),
-    _mutant(
-        "bp-version-client",
-        "Another envelope's fault has the code Client.",
-        "version-mismatch",
-        _recode(b"VersionMismatch", "Client"),
-    ),
-    _mutant(
-        "bp-wants-types",
-        "A request without xsi:type is a fault.",
-        "R1017",
-        instead(
-            lambda request: _ACT(request) and b"XMLSchema-instance" not in request.body,
-            fault("Client", "xsi:type is missing"),
-        ),
-    ),
-    _mutant(
-        "bp-ignores-mandatory",
-        "Mandatory header blocks are not looked at.",
-        "R1027",
-        lambda: lambda request, forward: forward(without_headers(request) if _mandatory(request) else request),
-    ),
-    _mutant(
-        "bp-mandatory-client",
-        "The fault for a mandatory header block has the code Client.",
-        "R1027",
-        _recode(b"MustUnderstand", "Client"),
-    ),
-    _mutant(
-        "bp-acts-all-the-same",
-        "A request that is answered MustUnderstand is carried out.",
-        ("R1025", "R1028"),
-        lambda: _acts_all_the_same,
-        observer=True,
-    ),
-    _mutant(
-        "bp-no-empty-action",
-        "An empty SOAPAction is a fault.",
-        "R1109",
-        instead(
-            lambda request: posted(request) and len(request.field("SOAPAction") or "") == 2,
-            fault("Client", "The given SOAPAction does not match an operation."),
-        ),
-    ),
-    _mutant("bp-action-dispatch", "SOAPAction chooses the operation.", "R1127", lambda: _by_action),
-    _mutant("bp-fault-order", "Faults are checked for from the body outwards.", "R2725", lambda: _order),
-    _mutant(
-        "bp-no-headers",
-        "Every header block is a fault.",
-        "R2739",
-        instead(_headed, fault("Client", "no headers, please")),
-    ),
-    _mutant(
-        "bp-no-byte-order-mark",
-        "A byte order mark is malformed.",
-        "R4001",
-        instead(
-            lambda request: posted(request) and request.body.startswith(b"\xef\xbb\xbf"),
-            fault("Client", "content is not allowed in prolog"),
-        ),
-    ),
-    _mutant(
-        "bp-no-utf-16",
-        "UTF-16 is malformed.",
-        "utf-16",
-        instead(
-            lambda request: posted(request) and request.body[:2] in {b"\xff\xfe", b"\xfe\xff"},
-            fault("Client", "not UTF-8"),
-        ),
-    ),
-    _mutant(
-        "bp-unknown-fine", "An unknown operation succeeds.", "unknown-operation", instead(_unknown, enveloped(_NOTHING))
-    ),
-    _mutant(
-        "bp-mandatory-for-others",
-        "A mandatory header block for another actor is a fault.",
-        "mustunderstand-actor",
-        instead(_for_others, fault("MustUnderstand", "not understood")),
-    ),
-    _mutant(
-        "bp-sometimes-a-page",
-        "One answer in 50 is a page with 200.",
-        "content-type",
-        altered(posted, page(200, b"<html><body>OK</body></html>", "text/html"), anything, nth=50),
-    ),
+_mutant(
+    "bp-bare-envelope", "soap-delivery/syntax", "An Envelope with an attribute of another namespace returns a fault."
+).instead(
+    lambda request: posted(request) and bool(re.search(rb"Envelope [^>]*:Id=", request.body)),
+    fault("Client", "an attribute that is not known"),
+)
+_mutant("bp-any-envelope", "R1015", "The robot accepts an Envelope of any namespace.").rewritten(_foreign, _made_soap11)
+_mutant(
+    "bp-version-client", "version-mismatch", "An Envelope of another SOAP version returns the fault code Client."
+).made(_recode(b"VersionMismatch", "Client"))
+_mutant("bp-wants-types", "R1017", "A request without xsi:type returns a fault.").instead(
+    lambda request: _ACT(request) and b"XMLSchema-instance" not in request.body, fault("Client", "xsi:type is missing")
+)
+_mutant("bp-ignores-mandatory", "R1027", "The robot ignores mandatory header blocks.")(
+    lambda request, forward: forward(without_headers(request) if _mandatory(request) else request)
+)
+_mutant(
+    "bp-mandatory-client", "R1027", "A mandatory header block that is not understood returns the fault code Client."
+).made(_recode(b"MustUnderstand", "Client"))
+_mutant("bp-no-empty-action", "R1109", "An empty SOAPAction returns a fault.").instead(
+    lambda request: posted(request) and len(request.field("SOAPAction") or "") == 2,
+    fault("Client", "The given SOAPAction does not match an operation."),
+)
+_mutant("bp-no-headers", "R2739", "Every header block returns a fault.").instead(
+    _headed, fault("Client", "no headers, please")
+)
+_mutant("bp-no-byte-order-mark", "R4001", "A byte order mark returns a fault.").instead(
+    lambda request: posted(request) and request.body.startswith(b"\xef\xbb\xbf"),
+    fault("Client", "content is not allowed in prolog"),
+)
+_mutant("bp-no-utf-16", "utf-16", "A message in UTF-16 returns a fault.").instead(
+    lambda request: posted(request) and request.body[:2] in {b"\xff\xfe", b"\xfe\xff"}, fault("Client", "not UTF-8")
+)
+_mutant("bp-unknown-fine", "unknown-operation", "An unknown operation succeeds.").instead(_unknown, enveloped(_NOTHING))
+_mutant(
+    "bp-mandatory-for-others", "mustunderstand-actor", "A mandatory header block for another actor returns a fault."
+).instead(_for_others, fault("MustUnderstand", "not understood"))
+_mutant("bp-sometimes-a-page", "content-type", "One response in 50 is a page with status 200.").altered(
+    posted, page(200, b"<html><body>OK</body></html>", "text/html"), anything, nth=50
 )

@@ -1,4 +1,4 @@
-"""Robots that break WS-I Basic Profile 1.1 and SOAP 1.1 in their messages and faults."""
+"""Mutants whose messages and faults break WS-I Basic Profile 1.1 or SOAP 1.1."""
 
 from collections.abc import Callable
 
@@ -10,17 +10,16 @@ from conformance.mutation.changes import (
     anything,
     becomes,
     header,
-    instead,
     page,
     posted,
     problem,
-    rewritten,
     soap,
     status,
     text,
 )
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
+from conformance.mutation.xml_trees import each, gone, says, tree
 from conformance.packs.table1.mutants.soap_responses import (
     TRACE,
     coded,
@@ -39,7 +38,9 @@ from conformance.packs.table1.mutants.soap_responses import (
     unqualified,
     wrapper_as_asked,
 )
-from conformance.packs.table1.mutants.xml_trees import each, gone, says, tree
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("soap-basic-profile", "soap")
 
 _PAGE = b"<html><body>Internal Server Error</body></html>"
 _ANY = soap()
@@ -47,12 +48,12 @@ _ACT = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 
 
 def _answers(edit: Callable[[Response], object]) -> Make:
-    """Every answer to an operation is altered, faults too."""
+    """Return a change that applies ``edit`` to every response of an operation, faults too."""
     return altered(_ANY, edit, anything)
 
 
 def _faults(edit: Callable[[Response], object]) -> Make:
-    """Faults are altered."""
+    """Return a change that applies ``edit`` to faults."""
     return altered(posted, edit, is_fault)
 
 
@@ -79,9 +80,7 @@ def _not_post(request: Request) -> bool:
     )
 
 
-_mutant = of_class("soap-basic-profile", "soap")
-
-
+@_mutant("bp-any-type", "R1115", "The robot accepts every media type as text/xml.")
 def _any_type(request: Request, forward: Forward) -> Response:
     if posted(request) and request.media_type != "text/xml":
         request = request.copy()
@@ -94,115 +93,80 @@ def _in_chunks(request: Request) -> bool:
 
 
 def _first_part(request: Request) -> None:
-    """Of what comes in chunks, as much as a buffer holds."""
+    """Cut the body of a chunked request to 8 KiB."""
     request.body = request.body[:8192]
 
 
-MUTANTS = (
-    _mutant("bp-fault-hint", "A Fault has a child of the robot's own.", "R1000", _faults(fault_tree(hinted))),
-    _mutant("bp-fault-qualified", "The children of a Fault are qualified.", "R1001", _faults(fault_tree(qualified))),
-    _mutant(
-        "bp-fault-mute", "A Fault has no faultstring.", "fault-complete", _faults(fault_tree(each("faultstring", gone)))
-    ),
-    _mutant(
-        "bp-fault-codeless", "A Fault has no faultcode.", "fault-complete", _faults(fault_tree(each("faultcode", gone)))
-    ),
-    _mutant(
-        "bp-fault-own-code", "faultcode is a code that SOAP's namespace does not have.", "R1004", _faults(coded("Oops"))
-    ),
-    _mutant("bp-fault-unbound", "The prefix of faultcode is not bound.", "faultcode-qualified", _faults(unbound)),
-    _mutant(
-        "bp-fault-code-bare",
-        "faultcode has no prefix.",
-        "faultcode-qualified",
-        _faults(text(r"(<faultcode[^>]*>\s*)[\w.-]+:", r"\1")),
-    ),
-    _mutant("bp-encoding-style", "Envelope carries encodingStyle.", "R1005", _answers(tree(styled))),
-    _mutant("bp-encoding-style-child", "The child of Body carries encodingStyle.", "R1006", _answers(in_body(styled))),
-    _mutant("bp-doctype", "Answers have a Document Type Declaration.", "R1008", _answers(declared)),
-    _mutant("bp-instruction", "Answers have a processing instruction.", "R1009", _answers(instructed)),
-    _mutant("bp-trailer", "Something follows Body.", "R1011", _answers(tree(trailer))),
-    _mutant("bp-latin", "Answers are ISO 8859-1.", "R1012", _answers(latin)),
-    _mutant(
-        "bp-charset-wrong",
-        "Content-Type says UTF-16 of messages in UTF-8.",
-        "R1018",
-        _answers(header("Content-Type", "text/xml; charset=utf-16")),
-    ),
-    _mutant("bp-must-understand-true", "mustUnderstand is written true.", "R1013", _answers(tree(understood_true))),
-    _mutant(
-        "bp-body-unqualified",
-        "The child of Body is in no namespace.",
-        "R1014",
-        altered(_ANY, in_body(unqualified), _plain_success),
-    ),
-    _mutant("bp-status-accepted", "Responses are 202.", "R1111", altered(_ANY, becomes(202), _plain_success)),
-    _mutant("bp-malformed-422", "Malformed XML is 422.", "R1113", altered(_is_malformed, page(422), anything)),
-    _mutant("bp-status-redirect", "Responses are 500.", "R1124", altered(_ANY, becomes(500), _plain_success)),
-    _mutant(
-        "bp-malformed-page",
-        "Malformed XML is 500 with a page.",
-        "R1125",
-        altered(_is_malformed, page(500, _PAGE, "text/html"), anything),
-    ),
-    _mutant("bp-malformed-fine", "Malformed XML is 200.", "R1125", altered(_is_malformed, page(200), anything)),
-    _mutant("bp-get-200", "GET of the service is 200 with a page.", "R1114", altered(_not_post, page(200), anything)),
-    _mutant("bp-any-type", "Any media type is taken for text/xml.", "R1115", lambda: _any_type),
-    _mutant(
-        "bp-type-case",
-        "A media type with a capital letter is 415.",
-        "media-type-case",
-        instead(
-            lambda request: posted(request) and not (request.field("Content-Type") or "").startswith("text/xml"),
-            problem(415, "text/xml, please"),
-        ),
-    ),
-    _mutant(
-        "bp-quoted-charset",
-        "A charset in quotation marks is 415.",
-        "charset-forms",
-        instead(
-            lambda request: posted(request) and '"' in (request.field("Content-Type") or ""),
-            problem(415, "text/xml, please"),
-        ),
-    ),
-    _mutant(
-        "bp-no-chunks", "A message in chunks is 411.", "chunked", instead(_in_chunks, problem(411, "a length, please"))
-    ),
-    _mutant("bp-few-chunks", "Of a message in chunks, 8 KiB are read.", "chunked", rewritten(_in_chunks, _first_part)),
-    _mutant("bp-fault-200", "Faults are 200.", "R1126", _faults(becomes(200))),
-    _mutant("bp-fault-400", "Faults are 400.", "R1126", _faults(becomes(400))),
-    _mutant(
-        "bp-http-1-2",
-        "Answers say HTTP/1.2.",
-        "R1141",
-        altered(posted, lambda response: setattr(response, "version", "HTTP/1.2"), anything),
-    ),
-    _mutant(
-        "bp-soap12-type",
-        "Answers are application/soap+xml.",
-        "content-type",
-        altered(posted, header("Content-Type", "application/soap+xml; charset=utf-8"), anything),
-    ),
-    _mutant(
-        "bp-wrapper-as-asked",
-        "The response's wrapper has the request's name.",
-        "R2712",
-        altered(_ANY, in_body(wrapper_as_asked), _plain_success),
-    ),
-    _mutant(
-        "bp-server-to-blame",
-        "What the client did wrong is a Server fault.",
-        "R2724",
-        altered(_ACT, coded("Server"), is_fault),
-    ),
-    _mutant(
-        "bp-traceback",
-        "Faults show a stack trace.",
-        "fault-no-traceback",
-        _faults(fault_tree(each("faultstring", says(TRACE)))),
-    ),
-    _mutant(
-        "bp-fault-sometimes-200", "One fault in 50 is 200.", "R1126", altered(posted, becomes(200), status(500), nth=50)
-    ),
+_mutant("bp-fault-hint", "R1000", "A Fault has an undeclared child.").made(_faults(fault_tree(hinted)))
+_mutant("bp-fault-qualified", "R1001", "The children of a Fault are in the SOAP namespace.").made(
+    _faults(fault_tree(qualified))
+)
+_mutant("bp-fault-mute", "fault-complete", "A Fault has no faultstring.").made(
+    _faults(fault_tree(each("faultstring", gone)))
+)
+_mutant("bp-fault-codeless", "fault-complete", "A Fault has no faultcode.").made(
+    _faults(fault_tree(each("faultcode", gone)))
+)
+_mutant("bp-fault-own-code", "R1004", "faultcode is a code that SOAP 1.1 does not define.").made(_faults(coded("Oops")))
+_mutant("bp-fault-unbound", "faultcode-qualified", "The prefix of faultcode is not bound.").made(_faults(unbound))
+_mutant("bp-fault-code-bare", "faultcode-qualified", "faultcode has no prefix.").made(
+    _faults(text(r"(<faultcode[^>]*>\s*)[\w.-]+:", r"\1"))
+)
+_mutant("bp-encoding-style", "R1005", "Envelope has an encodingStyle attribute.").made(_answers(tree(styled)))
+_mutant("bp-encoding-style-child", "R1006", "The child of Body has an encodingStyle attribute.").made(
+    _answers(in_body(styled))
+)
+_mutant("bp-doctype", "R1008", "Responses have a document type declaration.").made(_answers(declared))
+_mutant("bp-instruction", "R1009", "Responses have a processing instruction.").made(_answers(instructed))
+_mutant("bp-trailer", "R1011", "An element follows Body.").made(_answers(tree(trailer)))
+_mutant("bp-latin", "R1012", "Responses are encoded in ISO 8859-1.").made(_answers(latin))
+_mutant("bp-charset-wrong", "R1018", "Content-Type declares UTF-16 for a message in UTF-8.").made(
+    _answers(header("Content-Type", "text/xml; charset=utf-16"))
+)
+_mutant("bp-must-understand-true", "R1013", 'mustUnderstand is "true" instead of "1".').made(
+    _answers(tree(understood_true))
+)
+_mutant("bp-body-unqualified", "R1014", "The child of Body is in no namespace.").altered(
+    _ANY, in_body(unqualified), _plain_success
+)
+_mutant("bp-status-accepted", "R1111", "Responses have status 202.").altered(_ANY, becomes(202), _plain_success)
+_mutant("bp-malformed-422", "R1113", "Malformed XML returns 422.").altered(_is_malformed, page(422), anything)
+_mutant("bp-status-redirect", "R1124", "Responses have status 500.").altered(_ANY, becomes(500), _plain_success)
+_mutant("bp-malformed-page", "R1125", "Malformed XML returns 500 with a page.").altered(
+    _is_malformed, page(500, _PAGE, "text/html"), anything
+)
+_mutant("bp-malformed-fine", "R1125", "Malformed XML returns 200.").altered(_is_malformed, page(200), anything)
+_mutant("bp-get-200", "R1114", "GET of the service returns 200 with a page.").altered(_not_post, page(200), anything)
+_mutant("bp-type-case", "media-type-case", "A Content-Type with a capital letter returns 415.").instead(
+    lambda request: posted(request) and not (request.field("Content-Type") or "").startswith("text/xml"),
+    problem(415, "text/xml, please"),
+)
+_mutant("bp-quoted-charset", "charset-forms", "A charset in quotation marks returns 415.").instead(
+    lambda request: posted(request) and '"' in (request.field("Content-Type") or ""), problem(415, "text/xml, please")
+)
+_mutant("bp-no-chunks", "chunked", "A chunked message returns 411.").instead(
+    _in_chunks, problem(411, "a length, please")
+)
+_mutant("bp-few-chunks", "chunked", "The robot reads only 8 KiB of a chunked message.").rewritten(
+    _in_chunks, _first_part
+)
+_mutant("bp-fault-200", "R1126", "Faults have status 200.").made(_faults(becomes(200)))
+_mutant("bp-fault-400", "R1126", "Faults have status 400.").made(_faults(becomes(400)))
+_mutant("bp-http-1-2", "R1141", "Responses have the version HTTP/1.2.").altered(
+    posted, lambda response: setattr(response, "version", "HTTP/1.2"), anything
+)
+_mutant("bp-soap12-type", "content-type", "Responses have the media type application/soap+xml.").altered(
+    posted, header("Content-Type", "application/soap+xml; charset=utf-8"), anything
+)
+_mutant("bp-wrapper-as-asked", "R2712", "The response wrapper has the name of the request wrapper.").altered(
+    _ANY, in_body(wrapper_as_asked), _plain_success
+)
+_mutant("bp-server-to-blame", "R2724", "Errors of the client return a Server fault.").altered(
+    _ACT, coded("Server"), is_fault
+)
+_mutant("bp-traceback", "fault-no-traceback", "Faults contain a stack trace.").made(
+    _faults(fault_tree(each("faultstring", says(TRACE))))
+)
+_mutant("bp-fault-sometimes-200", "R1126", "One fault in 50 has status 200.").altered(
+    posted, becomes(200), status(500), nth=50
 )

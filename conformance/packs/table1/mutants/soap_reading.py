@@ -1,13 +1,16 @@
-"""Robots whose subscribers service gives wrong values, wrong plans, or values in a wrong form."""
+"""Mutants whose subscribers service returns wrong values, plans or elements."""
 
 import re
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import altered, instead, posted, problem, rewritten, soap, text
+from conformance.mutation.changes import posted, problem, soap, text
 from conformance.mutation.messages import Request
-from conformance.mutation.mutant import of_class
-from conformance.packs.table1.mutants.xml_trees import each, gone, named, says, tree
+from conformance.mutation.table import Table
+from conformance.mutation.xml_trees import each, gone, named, says
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("soap-subscribers", "soap")
 
 _POSE, _VELOCITY, _PLAN = soap("GetPose"), soap("GetVelocity"), soap("GetPlan")
 _SMALL = 32 * 1024
@@ -39,47 +42,23 @@ def _in_map(request: Request) -> None:
     request.body = request.body.replace(b"no_such_frame", b"map")
 
 
-_mutant = of_class("soap-subscribers", "soap")
-
-MUTANTS = (
-    _mutant(
-        "soap-pose-not-unit",
-        "GetPose's quaternion is three long.",
-        "pose",
-        altered(_POSE, tree(_first_is("orientation", "w", "3.0"))),
-    ),
-    _mutant(
-        "soap-velocity-nan",
-        "GetVelocity says NaN.",
-        "velocity",
-        altered(_VELOCITY, tree(_first_is("linear", "x", "NaN"))),
-    ),
-    _mutant(
-        "soap-sensors-short-types",
-        "GetSensors names types without their kind.",
-        "sensors",
-        altered(soap("GetSensors"), text("/msg/", "/")),
-    ),
-    _mutant("soap-read-order", "Responses have y before x.", "response-valid", altered(_POSE, tree(_swapped))),
-    _mutant(
-        "soap-read-empty",
-        "Responses hold nothing that a client finds.",
-        "interop",
-        altered(soap("Get[A-Z][A-Za-z]+"), tree(each("return", gone))),
-    ),
-    _mutant("soap-plan-reversed", "GetPlan gives the way back.", "plan", altered(_PLAN, tree(_reversed_path))),
-    _mutant(
-        "soap-plan-other-frame",
-        "GetPlan's path is in another frame.",
-        "plan",
-        altered(_PLAN, tree(each("frame_id", says("base_link")))),
-    ),
-    _mutant("soap-plan-elsewhere", "GetPlan plans to another place.", "plan", rewritten(_PLAN, _elsewhere)),
-    _mutant("soap-plan-any-frame", "GetPlan takes any frame for map.", "plan-none", rewritten(_PLAN, _in_map)),
-    _mutant(
-        "soap-small-questions",
-        "A question over 32 KiB is 413.",
-        "size",
-        instead(lambda request: posted(request) and len(request.body) > _SMALL, problem(413, "too large")),
-    ),
+_mutant("soap-pose-not-unit", "pose", "GetPose returns a quaternion with w = 3.").xml(
+    _POSE, _first_is("orientation", "w", "3.0")
+)
+_mutant("soap-velocity-nan", "velocity", "GetVelocity returns NaN.").xml(_VELOCITY, _first_is("linear", "x", "NaN"))
+_mutant("soap-sensors-short-types", "sensors", "GetSensors returns types without /msg/.").altered(
+    soap("GetSensors"), text("/msg/", "/")
+)
+_mutant("soap-read-order", "response-valid", "GetPose returns y before x.").xml(_POSE, _swapped)
+_mutant("soap-read-empty", "interop", "Responses of the subscribers service contain no values.").xml(
+    soap("Get[A-Z][A-Za-z]+"), each("return", gone)
+)
+_mutant("soap-plan-reversed", "plan", "GetPlan returns the poses in reverse order.").xml(_PLAN, _reversed_path)
+_mutant("soap-plan-other-frame", "plan", "GetPlan returns a path in another frame.").xml(
+    _PLAN, each("frame_id", says("base_link"))
+)
+_mutant("soap-plan-elsewhere", "plan", "GetPlan returns a plan to another pose.").rewritten(_PLAN, _elsewhere)
+_mutant("soap-plan-any-frame", "plan-none", "GetPlan reads an unknown frame as map.").rewritten(_PLAN, _in_map)
+_mutant("soap-small-questions", "size", "A message over 32 KiB returns 413.").instead(
+    lambda request: posted(request) and len(request.body) > _SMALL, problem(413, "too large")
 )

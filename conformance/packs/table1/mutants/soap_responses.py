@@ -1,8 +1,4 @@
-"""What a mutant may do to a SOAP response: its status, its envelope, its body, its fault.
-
-Each edits a response, for ``altered``, or an XML tree in it, for ``tree`` and ``fault_tree``, or makes a response of
-its own, for ``instead``.
-"""
+"""Edits of SOAP responses, of their XML trees, and ready-made responses, for mutants."""
 
 import re
 from collections.abc import Callable
@@ -12,7 +8,7 @@ from lxml import etree
 
 from conformance.mutation.changes import SOAP
 from conformance.mutation.messages import Request, Response
-from conformance.packs.table1.mutants.xml_trees import each, tree
+from conformance.mutation.xml_trees import each, tree
 
 TRACE = (
     "java.lang.NullPointerException\n\tat org.mybot.turtlebot.soap.Publishers.execute(Publishers.java:41)\n"
@@ -21,33 +17,33 @@ TRACE = (
 
 
 def is_fault(response: Response) -> bool:
-    """Answers that hold a SOAP fault."""
+    """Return whether a response contains a SOAP fault."""
     return b"Fault" in response.body and b"faultstring" in response.body
 
 
 def fault_tree(edit: Callable[[Any], object]) -> Callable[[Response], object]:
-    """Alter the Fault element."""
+    """Return an edit that applies ``edit`` to the Fault element."""
     return tree(each("Fault", edit))
 
 
 def in_body(edit: Callable[[Any], object]) -> Callable[[Response], object]:
-    """Alter the children of Body: a wrapper, as a rule."""
+    """Return an edit that applies ``edit`` to each child of Body."""
     return tree(each("Body", lambda body: [edit(child) for child in body]))
 
 
 def hinted(element: Any) -> None:
-    """A child of Fault that SOAP does not have."""
+    """Add a child to Fault that SOAP 1.1 does not define."""
     etree.SubElement(element, "hint").text = "see the manual"
 
 
 def qualified(element: Any) -> None:
-    """Fault's children in SOAP's namespace."""
+    """Put the children of Fault in the SOAP namespace."""
     for child in element:
         child.tag = etree.QName(SOAP, etree.QName(child).localname).text
 
 
 def coded(code: str) -> Callable[[Response], object]:
-    """Give every fault another code, in the prefix that it has."""
+    """Return an edit that gives every fault another faultcode with the same prefix."""
 
     def edit(child: Any) -> None:
         child.text = re.sub(r"\w+\s*$", code, child.text or "")
@@ -56,17 +52,17 @@ def coded(code: str) -> Callable[[Response], object]:
 
 
 def unbound(response: Response) -> None:
-    """Faultcode with a prefix that is not bound."""
+    """Give faultcode a prefix that is not declared."""
     response.body = re.sub(rb"(<faultcode[^>]*>\s*)[\w.-]+:", rb"\1nowhere:", response.body)
 
 
 def styled(element: Any) -> None:
-    """EncodingStyle at an element."""
+    """Set encodingStyle on an element."""
     element.set(f"{{{SOAP}}}encodingStyle", "http://schemas.xmlsoap.org/soap/encoding/")
 
 
 def declared(response: Response) -> None:
-    """A Document Type Declaration."""
+    """Insert a document type declaration."""
     prolog, _, rest = (
         response.body.rpartition(b"?>") if response.body.startswith(b"<?xml") else (b"", b"", response.body)
     )
@@ -76,24 +72,24 @@ def declared(response: Response) -> None:
 
 
 def instructed(response: Response) -> None:
-    """A processing instruction."""
+    """Insert a processing instruction."""
     response.body = re.sub(rb"(<([\w.-]+:)?Envelope)", rb"<?robot drive?>\1", response.body, count=1)
 
 
 def trailer(root: Any) -> None:
-    """An element after Body."""
+    """Append an element after Body."""
     etree.SubElement(root, "{urn:example:trailer}signature").text = "0"
 
 
 def latin(response: Response) -> None:
-    """ISO 8859-1 in place of UTF-8."""
+    """Encode the response in ISO 8859-1."""
     body = re.sub(rb"^\s*<\?xml.*?\?>", b"", response.body)
     response.body = b'<?xml version="1.0" encoding="ISO-8859-1"?><!-- \xe9t\xe9 -->' + body
     response.put("Content-Type", "text/xml; charset=iso-8859-1")
 
 
 def understood_true(root: Any) -> None:
-    """A header block whose mustUnderstand is written true."""
+    """Insert a header block with mustUnderstand="true"."""
     block = etree.Element(f"{{{SOAP}}}Header")
     child = etree.SubElement(block, "{urn:example:status}battery")
     child.set(f"{{{SOAP}}}mustUnderstand", "true")
@@ -101,31 +97,31 @@ def understood_true(root: Any) -> None:
 
 
 def unqualified(wrapper: Any) -> None:
-    """The child of Body in no namespace."""
+    """Put the child of Body in no namespace."""
     wrapper.tag = etree.QName(wrapper).localname
 
 
 def wrapper_as_asked(wrapper: Any) -> None:
-    """The request's wrapper in place of the response's."""
+    """Rename the response wrapper to the name of the request wrapper."""
     wrapper.tag = wrapper.tag.removesuffix("Response")
 
 
 def enveloped(content: str, status: int = 200) -> Callable[[Request], Response]:
-    """An envelope of one's own."""
+    """Return a maker of SOAP responses with this content in Body."""
     body = f'<s:Envelope xmlns:s="{SOAP}"><s:Body>{content}</s:Body></s:Envelope>'.encode()
     return lambda request: Response(status, [("Content-Type", "text/xml; charset=utf-8")], body, method=request.method)
 
 
 def fault(code: str, string: str) -> Callable[[Request], Response]:
-    """A well-made SOAP fault."""
+    """Return a maker of well-formed SOAP faults."""
     return enveloped(f"<s:Fault><faultcode>s:{code}</faultcode><faultstring>{string}</faultstring></s:Fault>", 500)
 
 
 def with_content(wrapper: Any) -> None:
-    """An element in the response's wrapper."""
+    """Append an element to the response wrapper."""
     etree.SubElement(wrapper, "accepted").text = "true"
 
 
 def other_namespace(wrapper: Any) -> None:
-    """The wrapper in another namespace."""
+    """Put the response wrapper in another namespace."""
     wrapper.tag = etree.QName("http://ros-ws.org", etree.QName(wrapper).localname).text

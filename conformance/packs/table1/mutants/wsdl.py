@@ -1,4 +1,4 @@
-"""Robots whose WSDL is not the contract's, or breaks WS-I Basic Profile 1.1."""
+"""Mutants whose WSDL differs from the contract's or breaks WS-I Basic Profile 1.1."""
 
 import re
 from collections.abc import Callable
@@ -6,12 +6,15 @@ from typing import Any
 
 from lxml import etree
 
-from conformance.mutation.changes import Make, altered, hanging_up, instead, plain, text, wsdls
+from conformance.mutation.changes import Make, altered, hanging_up, plain, text, wsdls
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.mutation.mutant import of_class
+from conformance.mutation.table import Table
+from conformance.mutation.xml_trees import gone, named, tree
 from conformance.packs.table1.mutants.paths import TNS
 from conformance.packs.table1.mutants.soap_responses import latin
-from conformance.packs.table1.mutants.xml_trees import gone, named, tree
+
+MUTANTS = Table()
+_mutant = MUTANTS.of_class("describe", "soap")
 
 _WSDL = "http://schemas.xmlsoap.org/wsdl/"
 _XSD = "http://www.w3.org/2001/XMLSchema"
@@ -24,12 +27,12 @@ def _description(request: Request) -> bool:
 
 
 def _edited(edit: Callable[[Any], object]) -> Make:
-    """Alter the WSDL; ``edit`` gets its root."""
+    """Return a change that applies ``edit`` to the WSDL's root element."""
     return altered(_description, tree(edit))
 
 
 def _typed(edit: Callable[[Any], object]) -> Make:
-    """Alter schemas, inline or in documents of their own; ``edit`` gets each schema that declares something."""
+    """Return a change that applies ``edit`` to each schema with declarations, in the WSDL or imported."""
 
     def apply(root: Any) -> None:
         for schema in root.iter(f"{_X}schema"):
@@ -40,7 +43,7 @@ def _typed(edit: Callable[[Any], object]) -> Make:
 
 
 def _all(path: str, edit: Callable[[Any], object], which: slice = slice(None)) -> Make:
-    """Alter the WSDL's elements at a path, or some of them."""
+    """Return a change that applies ``edit`` to the WSDL's elements at a path, or to some of them."""
 
     def apply(root: Any) -> None:
         for node in root.findall(path)[which]:
@@ -61,8 +64,8 @@ def _twice(node: Any) -> None:
     node.addnext(etree.fromstring(etree.tostring(node)))
 
 
+@_mutant("wsdl-import-gone", "wsdl", "A document that the WSDL imports returns 404.")
 def _broken_import(request: Request, forward: Forward) -> Response:
-    """The documents that the WSDL refers to are not there."""
     response = forward(request)
     if _description(request):
         imported = f'<x:schema xmlns:x="{_XSD}"><x:import namespace="{TNS}" schemaLocation="gone.xsd"/></x:schema>'
@@ -73,6 +76,7 @@ def _broken_import(request: Request, forward: Forward) -> Response:
     return response
 
 
+@_mutant("wsdl-operation-lost", "wsdl-operations", "The WSDL lacks an operation.").through(_edited)
 def _operation_lost(root: Any) -> None:
     for node in (root.find(_OPERATION), root.find(f"{_BINDING}/{_W}operation")):
         gone(node)
@@ -87,6 +91,7 @@ def _prefix(node: Any) -> str:
     return next((key for key, value in node.nsmap.items() if key and "soap.turtlebot" in value), "tns")
 
 
+@_mutant("wsdl-import-in-types", "wsdl-R2003", "xsd:import is a direct child of wsdl:types.").through(_edited)
 def _import_in_types(root: Any) -> None:
     types = root.find(f"{_W}types")
     made = etree.Element(f"{_X}import")
@@ -94,16 +99,21 @@ def _import_in_types(root: Any) -> None:
     types.insert(0, made)
 
 
+@_mutant("wsdl-strange-element", "wsdl-R2028", "The WSDL has an element that WSDL 1.1 does not define.").through(
+    _edited
+)
 def _strange(root: Any) -> None:
     etree.SubElement(root, f"{_W}robot").set("name", "turtlebot")
 
 
+@_mutant("wsdl-same-signature", "wsdl-R2710", "Two operations have the same input element.").through(_edited)
 def _same_element(root: Any) -> None:
     parts = [part for part in root.iter(f"{_W}part") if not part.get("element", "").endswith("Response")]
     if len(parts) > 1:
         parts[1].set("element", parts[0].get("element"))
 
 
+@_mutant("wsdl-two-parts", "wsdl-R2201", "A soap:body lists two parts.").through(_edited)
 def _two_parts(root: Any) -> None:
     for message in root.findall(f"{_W}message")[:1]:
         second = etree.SubElement(message, f"{_W}part")
@@ -113,13 +123,14 @@ def _two_parts(root: Any) -> None:
         body.set("parts", "parameters more")
 
 
+@_mutant("wsdl-float", "wsdl-types", "The schema declares a double as float.").through(_typed)
 def _float(schema: Any) -> None:
     for node in [node for node in schema.iter(f"{_X}element") if node.get("type", "").endswith("double")][:1]:
         node.set("type", node.get("type").replace("double", "float"))
 
 
 def _long_sequence(edit: Callable[[Any], object]) -> Make:
-    """Alter the first sequence of each schema that has more than two elements."""
+    """Return a change that applies ``edit`` to the first sequence of more than two elements in each schema."""
 
     def apply(schema: Any) -> None:
         for sequence in [one for one in schema.iter(f"{_X}sequence") if len(one) > 2][:1]:
@@ -129,146 +140,76 @@ def _long_sequence(edit: Callable[[Any], object]) -> Make:
 
 
 def _inline_no_target(root: Any) -> None:
-    """A schema of its own in wsdl:types, which declares an element in no namespace at all."""
+    """Add a schema without targetNamespace to wsdl:types."""
     for schema in named(root, "schema")[:1]:
         made = etree.Element(f"{_X}schema")
         etree.SubElement(made, f"{_X}element").set("name", "homeless")
         schema.addnext(made)
 
 
-_mutant = of_class("describe", "soap")
-
 _OPERATION = f"{_W}portType/{_W}operation"
 _BINDING = f"{_W}binding"
 _TRANSPORT = f"{_BINDING}/{_S}binding"
 
-MUTANTS = (
-    _mutant("wsdl-gone", "There is no WSDL: 404.", "wsdl", instead(wsdls, plain(404))),
-    _mutant("wsdl-silent", "Asked for its WSDL, the robot hangs up.", "wsdl", hanging_up(wsdls)),
-    _mutant("wsdl-broken", "The WSDL is not closed.", "wsdl", altered(_description, text(r"</[\w:]+>\s*$", ""))),
-    _mutant("wsdl-import-gone", "What the WSDL imports is not there.", "wsdl", lambda: _broken_import),
-    _mutant(
-        "wsdl-service-name",
-        "The service has another name.",
-        "wsdl-names",
-        _all(f"{_W}service", _set("name", "TurtlebotOfficeService")),
-    ),
-    _mutant(
-        "wsdl-port-name",
-        "The port has another name.",
-        "wsdl-names",
-        _all(f"{_W}service/{_W}port", _set("name", "Port")),
-    ),
-    _mutant(
-        "wsdl-namespace",
-        "The target namespace is the second listing's.",
-        "wsdl-names",
-        _edited(_set("targetNamespace", "http://ros-ws.org")),
-    ),
-    _mutant("wsdl-operation-lost", "The WSDL lacks an operation.", "wsdl-operations", _edited(_operation_lost)),
-    _mutant(
-        "wsdl-part-name",
-        "A message's part has another name.",
-        "wsdl-operations",
-        _all(f"{_W}message/{_W}part", _set("name", "body")),
-    ),
-    _mutant("wsdl-float", "A double is a float in the schema.", "wsdl-types", _typed(_float)),
-    _mutant(
-        "wsdl-order",
-        "The schema has its elements in another order.",
-        "wsdl-types",
-        _long_sequence(lambda sequence: sequence.append(sequence[0])),
-    ),
-    _mutant(
-        "wsdl-optional",
-        "An element is optional in the schema.",
-        "wsdl-types",
-        _long_sequence(lambda sequence: sequence[0].set("minOccurs", "0")),
-    ),
-    _mutant(
-        "wsdl-action",
-        "wsam:Action is something else.",
-        "wsdl-action",
-        altered(_description, text(r'(:Action=["\'])[^"\']*', r"\1urn:drive")),
-    ),
-    _mutant(
-        "wsdl-address",
-        "The address in the WSDL leads nowhere.",
-        "wsdl-address",
-        altered(_description, text(r'location="http://[^"]*"', 'location="http://127.0.0.1:9/turtlesim"')),
-    ),
-    _mutant("wsdl-import-in-types", "xsd:import stands in wsdl:types itself.", "wsdl-R2003", _edited(_import_in_types)),
-    _mutant(
-        "wsdl-strange-element", "The WSDL has an element that WSDL does not know.", "wsdl-R2028", _edited(_strange)
-    ),
-    _mutant(
-        "wsdl-no-target",
-        "A schema has no targetNamespace.",
-        "wsdl-R2105",
-        altered(_description, tree(_inline_no_target)),
-    ),
-    _mutant("wsdl-two-parts", "A body names two parts.", "wsdl-R2201", _edited(_two_parts)),
-    _mutant(
-        "wsdl-type-part",
-        "A part has a type in place of an element.",
-        "wsdl-R2204",
-        _first(f"{_W}message/{_W}part", _typed_part),
-    ),
-    _mutant(
-        "wsdl-part-of-nothing",
-        "A part refers to an element that does not exist.",
-        "wsdl-R2206",
-        _first(f"{_W}message/{_W}part", lambda node: node.set("element", f"{_prefix(node)}:NothingAtAll")),
-    ),
-    _mutant("wsdl-operation-twice", "A port type has an operation twice.", "wsdl-R2304", _first(_OPERATION, _twice)),
-    _mutant(
-        "wsdl-soap12",
-        "The binding is one of SOAP 1.2.",
-        "wsdl-R2401",
-        altered(_description, text(re.escape(_SOAP), "http://schemas.xmlsoap.org/wsdl/soap12/")),
-    ),
-    _mutant(
-        "wsdl-no-transport",
-        "The binding names no transport.",
-        "wsdl-R2701",
-        _all(_TRANSPORT, lambda node: node.attrib.pop("transport", None)),
-    ),
-    _mutant(
-        "wsdl-smtp",
-        "The transport is SMTP.",
-        "wsdl-R2702",
-        _all(_TRANSPORT, _set("transport", "http://schemas.xmlsoap.org/soap/smtp")),
-    ),
-    _mutant(
-        "wsdl-mixed-styles",
-        "One operation is of style rpc.",
-        "wsdl-R2705",
-        _first(f"{_BINDING}/{_W}operation/{_S}operation", _set("style", "rpc")),
-    ),
-    _mutant(
-        "wsdl-encoded",
-        "A body is encoded.",
-        "wsdl-R2706",
-        _first(f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("use", "encoded")),
-    ),
-    _mutant("wsdl-same-signature", "Two operations have the same element.", "wsdl-R2710", _edited(_same_element)),
-    _mutant(
-        "wsdl-body-namespace",
-        "A body has a namespace attribute.",
-        "wsdl-R2716",
-        _first(f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("namespace", TNS)),
-    ),
-    _mutant(
-        "wsdl-binding-short",
-        "The binding lacks an operation of its port type.",
-        "wsdl-R2718",
-        _first(f"{_BINDING}/{_W}operation", gone),
-    ),
-    _mutant(
-        "wsdl-old-schema",
-        "Types are described in XML Schema of 1999.",
-        "wsdl-R2801",
-        altered(wsdls, text(re.escape(_XSD), "http://www.w3.org/1999/XMLSchema")),
-    ),
-    _mutant("wsdl-latin", "The WSDL is ISO 8859-1.", "wsdl-R4003", altered(_description, latin)),
+_mutant("wsdl-gone", "wsdl", "GET of the WSDL returns 404.").instead(wsdls, plain(404))
+_mutant("wsdl-silent", "wsdl", "The robot closes the connection on a request for the WSDL.").made(hanging_up(wsdls))
+_mutant("wsdl-broken", "wsdl", "The last end tag of the WSDL is missing.").altered(
+    _description, text(r"</[\w:]+>\s*$", "")
 )
+_mutant("wsdl-service-name", "wsdl-names", "The service has another name.").made(
+    _all(f"{_W}service", _set("name", "TurtlebotOfficeService"))
+)
+_mutant("wsdl-port-name", "wsdl-names", "The port has another name.").made(
+    _all(f"{_W}service/{_W}port", _set("name", "Port"))
+)
+_mutant("wsdl-namespace", "wsdl-names", "The target namespace is a wrong one.").made(
+    _edited(_set("targetNamespace", "http://ros-ws.org"))
+)
+_mutant("wsdl-part-name", "wsdl-operations", "A message's part has another name.").made(
+    _all(f"{_W}message/{_W}part", _set("name", "body"))
+)
+_mutant("wsdl-order", "wsdl-types", "The schema has the elements of a sequence in another order.").made(
+    _long_sequence(lambda sequence: sequence.append(sequence[0]))
+)
+_mutant("wsdl-optional", "wsdl-types", "A required element is optional in the schema.").made(
+    _long_sequence(lambda sequence: sequence[0].set("minOccurs", "0"))
+)
+_mutant("wsdl-action", "wsdl-action", "wsam:Action has another value.").altered(
+    _description, text(r'(:Action=["\'])[^"\']*', r"\1urn:drive")
+)
+_mutant("wsdl-address", "wsdl-address", "The address in the WSDL is wrong.").altered(
+    _description, text(r'location="http://[^"]*"', 'location="http://127.0.0.1:9/turtlesim"')
+)
+_mutant("wsdl-no-target", "wsdl-R2105", "A schema has no targetNamespace.").xml(_description, _inline_no_target)
+_mutant("wsdl-type-part", "wsdl-R2204", "A message part has a type instead of an element.").made(
+    _first(f"{_W}message/{_W}part", _typed_part)
+)
+_mutant("wsdl-part-of-nothing", "wsdl-R2206", "A message part refers to an element that does not exist.").made(
+    _first(f"{_W}message/{_W}part", lambda node: node.set("element", f"{_prefix(node)}:NothingAtAll"))
+)
+_mutant("wsdl-operation-twice", "wsdl-R2304", "A port type has an operation twice.").made(_first(_OPERATION, _twice))
+_mutant("wsdl-soap12", "wsdl-R2401", "The binding is a SOAP 1.2 binding.").altered(
+    _description, text(re.escape(_SOAP), "http://schemas.xmlsoap.org/wsdl/soap12/")
+)
+_mutant("wsdl-no-transport", "wsdl-R2701", "The binding has no transport.").made(
+    _all(_TRANSPORT, lambda node: node.attrib.pop("transport", None))
+)
+_mutant("wsdl-smtp", "wsdl-R2702", "The binding's transport is SMTP.").made(
+    _all(_TRANSPORT, _set("transport", "http://schemas.xmlsoap.org/soap/smtp"))
+)
+_mutant("wsdl-mixed-styles", "wsdl-R2705", "One operation has the style rpc.").made(
+    _first(f"{_BINDING}/{_W}operation/{_S}operation", _set("style", "rpc"))
+)
+_mutant("wsdl-encoded", "wsdl-R2706", 'A soap:body has use="encoded".').made(
+    _first(f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("use", "encoded"))
+)
+_mutant("wsdl-body-namespace", "wsdl-R2716", "A soap:body has a namespace attribute.").made(
+    _first(f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("namespace", TNS))
+)
+_mutant("wsdl-binding-short", "wsdl-R2718", "The binding lacks an operation of its port type.").made(
+    _first(f"{_BINDING}/{_W}operation", gone)
+)
+_mutant("wsdl-old-schema", "wsdl-R2801", "The types use the XML Schema namespace of 1999.").altered(
+    wsdls, text(re.escape(_XSD), "http://www.w3.org/1999/XMLSchema")
+)
+_mutant("wsdl-latin", "wsdl-R4003", "The WSDL is encoded in ISO 8859-1.").altered(_description, latin)

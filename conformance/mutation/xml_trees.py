@@ -1,4 +1,4 @@
-"""What a mutant may do to a document of XML: elements of a name are altered, or taken out of it."""
+"""Edits of XML documents, for mutants: find elements by name, change or remove them."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,7 +9,7 @@ from conformance.mutation.messages import Response
 
 
 def tree(edit: Callable[[Any], object]) -> Callable[[Response], object]:
-    """Alter the XML tree of an answer's body; what is no XML stays as it is."""
+    """Return an edit that applies ``edit`` to the root of an XML response; other responses stay unchanged."""
 
     def apply(response: Response) -> None:
         root = xml(response.body)
@@ -21,7 +21,7 @@ def tree(edit: Callable[[Any], object]) -> Callable[[Response], object]:
 
 
 def xml(body: bytes) -> Any:
-    """The root of an XML document without its comments and CDATA, or None."""
+    """Return the root of an XML document without comments and CDATA, or None if it is not XML."""
     parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, huge_tree=True)
     try:
         return etree.fromstring(body, parser)
@@ -30,12 +30,12 @@ def xml(body: bytes) -> Any:
 
 
 def named(root: Any, name: str) -> list[Any]:
-    """Elements with a local name, in document order."""
+    """Return the elements with a local name, in document order."""
     return [node for node in root.iter() if isinstance(node.tag, str) and etree.QName(node).localname == name]
 
 
 def each(name: str, edit: Callable[[Any], object], which: slice = slice(None)) -> Callable[[Any], None]:
-    """Alter the elements of an XML tree that have a local name, or some of them; ``edit`` gets one."""
+    """Return an edit that applies ``edit`` to the elements with a local name, or to the slice ``which`` of them."""
 
     def apply(root: Any) -> None:
         for node in named(root, name)[which]:
@@ -45,10 +45,10 @@ def each(name: str, edit: Callable[[Any], object], which: slice = slice(None)) -
 
 
 def gone(node: Any) -> None:
-    """Take an element out of its tree."""
+    """Remove an element from its tree."""
     node.getparent().remove(node)
 
 
 def says(value: str) -> Callable[[Any], None]:
-    """Give an element another text."""
+    """Return an edit that sets an element's text."""
     return lambda node: setattr(node, "text", value)

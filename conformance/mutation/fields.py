@@ -1,0 +1,73 @@
+"""Edits of one member of a JSON value, which is named by its path, as ``pose.pose.position.x`` or ``0.type``.
+
+They are for ``Row.json``, ``changes.values`` and ``changes.inputs``. An edit of a member that does not exist raises
+KeyError, IndexError or TypeError; ``changes.guarded`` catches them for values that a client sends.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+
+def _holder(value: Any, path: str) -> tuple[Any, Any]:
+    """Return the object or list that holds the member, and the member's name or index in it."""
+    *parents, last = path.split(".")
+    for name in parents:
+        value = value[int(name) if isinstance(value, list) else name]
+    return value, int(last) if isinstance(value, list) else last
+
+
+def found(value: Any, path: str) -> Any:
+    """Return the member's value."""
+    holder, name = _holder(value, path)
+    return holder[name]
+
+
+def field(path: str, by: Any) -> Callable[[Any], None]:
+    """Return an edit that sets the member to ``by``, or to ``by(value)`` if that is a function."""
+
+    def edit(value: Any) -> None:
+        holder, name = _holder(value, path)
+        holder[name] = by(holder[name]) if callable(by) else by
+
+    return edit
+
+
+def without(path: str) -> Callable[[Any], None]:
+    """Return an edit that removes the member."""
+
+    def edit(value: Any) -> None:
+        holder, name = _holder(value, path)
+        del holder[name]
+
+    return edit
+
+
+def swapped(one: str, other: str) -> Callable[[Any], None]:
+    """Return an edit that swaps the values of two members."""
+
+    def edit(value: Any) -> None:
+        first, second = found(value, one), found(value, other)
+        field(one, second)(value)
+        field(other, first)(value)
+
+    return edit
+
+
+def each(*edits: Callable[[Any], Any]) -> Callable[[Any], None]:
+    """Return an edit that makes several edits one after another."""
+
+    def edit(value: Any) -> None:
+        for one in edits:
+            one(value)
+
+    return edit
+
+
+def scaled(factor: float) -> Callable[[float], float]:
+    """Return a function that multiplies a number by ``factor``."""
+    return lambda number: number * factor
+
+
+def plus(by: float) -> Callable[[float], float]:
+    """Return a function that adds ``by`` to a number."""
+    return lambda number: number + by
