@@ -1,4 +1,4 @@
-"""Conversion between ROS messages and JSON, XML and text: shapes, strict reading, writing.
+"""Conversion between ROS messages and JSON, XML and text: types of fields, strict reading, writing.
 
-All conversions pass through *plain data*: dicts by field name, lists, str, int, float and bool.
+All conversions pass through *plain data*, as json.loads returns it: dicts by field name, lists, str, int, float, bool.
 """

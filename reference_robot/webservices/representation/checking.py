@@ -1,4 +1,4 @@
-"""The check that plain data from a client has the shape that the contract requires."""
+"""The check that JSON or XML data from a client has the fields, types and value ranges that the contract requires."""
 
 import math
 from typing import Any, Final
@@ -10,11 +10,11 @@ _SHOWN: Final = 120
 
 
 def checked(shape: Shape, plain: Any, where: str = "") -> Any:
-    """Return plain data of the given shape, with all real numbers converted to float.
+    """Return parsed JSON or XML data that has the required shape (types of its fields), with real numbers as float.
 
     Args:
         shape: The required shape.
-        plain: The data to check.
+        plain: The parsed data: dicts, lists, str, int, float and bool.
         where: The path of the field for error messages; empty for the whole body.
 
     Raises:

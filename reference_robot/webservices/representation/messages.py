@@ -10,7 +10,7 @@ from reference_robot.webservices.representation.shapes import Record, Series, Sh
 
 
 def reader_of(message: Any) -> Callable[[Any], dict[str, Any]]:
-    """Return a function that converts messages of a ROS class to plain data.
+    """Return a function that converts ROS messages of a class to dicts, lists and numbers.
 
     The function raises the Problem 503 for a value that is not finite, and names its field: such values must not be
     sent to clients (contract, REST).
@@ -39,7 +39,7 @@ def _require_finite(plain: Any, where: str) -> None:
 
 
 def message_from(shape: Record, plain: dict[str, Any]) -> Any:
-    """Return the ROS message for plain data of a checked shape; missing fields keep ROS's defaults."""
+    """Return the ROS message for a checked dict of its fields; missing fields keep ROS's defaults."""
     return shape.message(**{name: _value(shape.field(name), value) for name, value in plain.items()})
 
 

@@ -1,4 +1,4 @@
-"""Parsing of request bodies into plain data: strict JSON (RFC 8259), and XML in the form that the robot sends."""
+"""Parsing of request bodies into dicts, lists and numbers: strict JSON (RFC 8259), and XML as the robot sends it."""
 
 import codecs
 import json
@@ -38,7 +38,9 @@ class _Beyond:
 
 
 def read(body: bytes, content_type: bytes | None, shape: Record) -> dict[str, Any]:
-    """Return a request body as plain data of the given shape; the caller has limited the body's size.
+    """Return a JSON or XML request body as a dict that has the required shape (types of its fields).
+
+    The caller has limited the body's size.
 
     Raises:
         Problem: 415 for another media type, 400 for a body that is not JSON or XML, 422 for a wrong shape or value.
@@ -68,7 +70,7 @@ def parsed_content_type(field: bytes | None) -> tuple[str, str | None]:
 
 
 def read_json(body: bytes) -> Any:
-    """Return a JSON text as plain data; numbers too large for a double become ``_Beyond`` objects.
+    """Return the value of a JSON text; numbers too large for a double become ``_Beyond`` objects.
 
     Raises:
         Problem: 400 for a byte order mark, invalid UTF-8, invalid JSON (including NaN and Infinity) and too deep
@@ -114,7 +116,7 @@ def _whole(lexeme: str) -> int | _Beyond:
 
 
 def _from_element(element: etree._Element, shape: Any, where: str) -> Any:
-    """Return an XML element as plain data; values of a wrong type remain text, which the shape check refuses."""
+    """Return the value of an XML element; a value of a wrong type remains text, which ``checked`` refuses later."""
     if element.attrib:
         raise Problem(422, f"unknown attribute {shown(next(iter(element.attrib)))} of {where}")
     if isinstance(shape, Record):

@@ -1,4 +1,4 @@
-"""Shapes, which describe the fields and value ranges of plain data; most are derived from ROS message classes."""
+"""Shapes: the types and value ranges of fields in JSON and XML, most of them derived from ROS message classes."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from rosidl_parser.definition import AbstractNestedType, AbstractString, Array, 
 
 @dataclass(frozen=True)
 class Real:
-    """The shape of a finite IEEE 754 double (ROS float32 and float64)."""
+    """The type of a field that holds a finite IEEE 754 double (ROS float32 and float64)."""
 
 
 @dataclass(frozen=True)
 class Whole:
-    """The shape of an integer between the bounds of its ROS type, both inclusive."""
+    """The type of a field that holds an integer between the bounds of its ROS type, both inclusive."""
 
     lowest: int
     highest: int
@@ -25,7 +25,7 @@ class Whole:
 
 @dataclass(frozen=True)
 class Text:
-    """The shape of a string with a minimum and a maximum length in characters, both inclusive."""
+    """The type of a field that holds a string; the bounds of its length in characters are inclusive."""
 
     shortest: int = 0
     longest: int | None = None
@@ -33,12 +33,12 @@ class Text:
 
 @dataclass(frozen=True)
 class Truth:
-    """The shape of a boolean."""
+    """The type of a field that holds a boolean."""
 
 
 @dataclass(frozen=True)
 class Series:
-    """The shape of a list of items; ``length`` is set for ROS arrays of fixed size."""
+    """The type of a field that holds a list of items; ``length`` is set for ROS arrays of fixed size."""
 
     item: Shape
     length: int | None = None
@@ -46,7 +46,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Record:
-    """The shape of an object with named fields, in the order of the ROS definition.
+    """The type of an object with named fields, in the order of the ROS definition.
 
     ``optional`` names the fields that input may omit; ``message`` is the ROS class, if there is one.
     """
@@ -57,7 +57,7 @@ class Record:
     message: Any = field(default=None, compare=False)
 
     def field(self, name: str) -> Shape | None:
-        """Return the shape of a field; None if the record has no such field."""
+        """Return the type of a field; None if the record has no such field."""
         return dict(self.fields).get(name)
 
 
@@ -75,7 +75,7 @@ _OPTIONAL: Final = {"std_msgs/Header": frozenset({"stamp"})}
 
 @cache
 def shape_of(message: Any) -> Record:
-    """Return the shape of a ROS message class that rosidl generated.
+    """Return the types of the fields of a ROS message class that rosidl generated.
 
     Raises:
         TypeError: A field has a type that the web services do not support (wide characters, long double).

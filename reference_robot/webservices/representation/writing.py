@@ -1,4 +1,4 @@
-"""Plain data written as JSON, XML and text.
+"""Writing of dicts, lists and numbers as JSON, XML and text.
 
 All three formats write a double with the fewest digits that read back as the same double, so that the values are
 identical in all formats (contract, class ``equivalence``).
@@ -24,23 +24,25 @@ _ITEM_NAMES: Final = {"Sensors": "sensor", "NavigationServices": "service", "Del
 
 
 def write_json(plain: Any) -> bytes:
-    """Return plain data as JSON in UTF-8 without BOM (RFC 8259 8.1); raise ValueError for a non-finite number."""
+    """Return a value as JSON in UTF-8 without BOM (RFC 8259 8.1); raise ValueError for a non-finite number."""
     return json.dumps(plain, ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode()
 
 
 def write_xml(plain: Any, root: str) -> bytes:
-    """Return plain data as XML: a child element per field; array items are repeated elements of the field's name."""
+    """Return a dict or list as XML: a child element per field; array items are repeated elements of the field's
+    name.
+    """
     return etree.tostring(element_of(plain, root), encoding="utf-8", xml_declaration=True)
 
 
 def write_text(plain: Any) -> bytes:
-    """Return plain data as a YAML document, in the form that ``ros2 topic echo`` prints."""
+    """Return a dict or list as a YAML document, in the form that ``ros2 topic echo`` prints."""
     text = yaml.dump(plain, Dumper=_Dumper, sort_keys=False, default_flow_style=False, allow_unicode=True, width=2**31)
     return str(text).encode()
 
 
 def element_of(plain: Any, name: str) -> etree._Element:
-    """Return plain data as an XML element with the given (possibly namespace-qualified) name."""
+    """Return a dict, list or value as an XML element with the given (possibly namespace-qualified) name."""
     element = etree.Element(name)
     if isinstance(plain, list):
         _fill(element, {_ITEM_NAMES.get(name, "item"): plain})

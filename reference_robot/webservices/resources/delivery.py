@@ -34,7 +34,7 @@ class Delivery(Resource):
 
     @staticmethod
     def owns(path: bytes) -> bool:
-        """Return whether a raw path has the form of this resource, whatever its values."""
+        """Return whether a raw URL path has the form of a delivery path, whatever its values."""
         return _ANY.fullmatch(path) is not None
 
     def put(self, request: Request) -> Response:

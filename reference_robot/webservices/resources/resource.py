@@ -37,7 +37,7 @@ def wanted_format(request: Request) -> str:
 def represented(
     plain: Any, root: str, media_type: str, status: int = 200, headers: tuple[tuple[bytes, bytes], ...] = ()
 ) -> Response:
-    """Return a response with plain data in a media type; ``root`` names the XML root element, the ROS type."""
+    """Return a response with a dict or list as JSON, XML or text; ``root`` names the XML root element, the ROS type."""
     if media_type == JSON:
         body = write_json(plain)
     elif media_type == XML:
@@ -48,5 +48,5 @@ def represented(
 
 
 def sent(request: Request, shape: Record) -> dict[str, Any]:
-    """Return the request body as plain data of the given shape; raise the Problem 415, 400 or 422."""
+    """Return the JSON or XML request body as a dict of the required shape; raise the Problem 415, 400 or 422."""
     return read(request.content(), request.headers.get(b"content-type"), shape)

@@ -88,7 +88,7 @@ class Goals:
         self._one_at_a_time = asyncio.Lock()
 
     def current(self) -> dict[str, Any] | None:
-        """Return the active goal as a plain MoveBaseActionGoal with its status, or None.
+        """Return the active goal as the dict of a MoveBaseActionGoal with its status, or None.
 
         Raises:
             Problem: 503 while the ROS thread hangs, because the robot's present state is unknown.
@@ -106,7 +106,7 @@ class Goals:
         return self.current() is not None
 
     async def send(self, wanted: dict[str, Any]) -> tuple[int, dict[str, Any]]:
-        """Send a plain MoveBaseActionGoal of valid shape to the navigation, unless it is the current goal already.
+        """Send the goal in a dict of a MoveBaseActionGoal to the navigation, unless it is the current goal already.
 
         Returns:
             The HTTP status and the goal as the robot holds it: 200 for a repeat, 201 for a new goal, 202 if it

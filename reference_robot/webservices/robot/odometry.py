@@ -53,7 +53,7 @@ class LatestOdometry:
         return None if serialized is None else monotonic() - received
 
     def written(self, writer: Callable[[dict[str, Any]], T]) -> T:
-        """Return the result of a writer for the latest message; each writer is called at most once per message.
+        """Return what a writer makes of the latest message (such as its JSON); a writer is called once per message.
 
         Raises:
             Problem: 503 as ``message``, and for a value that is not finite.

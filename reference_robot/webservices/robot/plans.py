@@ -62,7 +62,7 @@ class Planner:
         self._read = reader_of(Path)
 
     async def plan(self, query: PlanQuery) -> dict[str, Any]:
-        """Return a plain nav_msgs/GetPlan response, ``{"plan": Path}``, with at least one pose.
+        """Return a path as the dict of a nav_msgs/GetPlan response, ``{"plan": Path}``, with at least one pose.
 
         Raises:
             Problem: 422 for an unknown frame, a negative tolerance or a goal that no plan reaches; 503 without a

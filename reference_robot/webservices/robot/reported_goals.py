@@ -1,4 +1,4 @@
-"""Goals of other clients as plain MoveBaseActionGoals, from the robot's own report or from the action's status."""
+"""Goals of other clients in the form of a MoveBaseActionGoal, from the robot's report or from the action's status."""
 
 import json
 from typing import Any, Final

@@ -27,7 +27,7 @@ def require_known_frame(frame_id: str, frames: Frames, where: str) -> None:
 
 
 def require_pose(stamped: dict[str, Any], frames: Frames, where: str) -> None:
-    """Raise the Problem 422 for a plain PoseStamped in an unknown frame or without a unit quaternion."""
+    """Raise the Problem 422 for the dict of a PoseStamped in an unknown frame or without a unit quaternion."""
     require_known_frame(stamped["header"]["frame_id"], frames, f"{where}.header.frame_id")
     orientation = stamped["pose"]["orientation"]
     if not abs(math.hypot(*orientation.values()) - 1) <= _UNIT_TOLERANCE:

@@ -39,7 +39,7 @@ class Velocity:
         self._watchdog = VelocityWatchdog(settings.hold, self._stop)
 
     def measured(self) -> dict[str, Any]:
-        """Return the measured velocity as a plain geometry_msgs/Twist, in m/s and rad/s.
+        """Return the measured velocity as a dict with the fields of a geometry_msgs/Twist, in m/s and rad/s.
 
         Raises:
             Problem: 503, if there is no odometry of the last second.
@@ -47,7 +47,9 @@ class Velocity:
         return self._read(self._odometry.message().twist.twist)
 
     async def command(self, twist: dict[str, Any]) -> None:
-        """Publish a plain Twist once; the robot's or this program's watchdog ends the velocity after the hold time.
+        """Publish a velocity, a dict with the fields of a Twist, once; a watchdog ends the velocity after the hold time.
+
+        The watchdog is the robot's own or the one of these web services.
 
         Raises:
             Problem: 422 for a value beyond the limits or a component that a differential drive cannot actuate, 409
