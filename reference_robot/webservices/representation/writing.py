@@ -29,9 +29,7 @@ def write_json(plain: Any) -> bytes:
 
 
 def write_xml(plain: Any, root: str) -> bytes:
-    """Return a dict or list as XML: a child element per field; array items are repeated elements of the field's
-    name.
-    """
+    """Return a dict or list as XML: a child element per field; array items are repeated elements of one name."""
     return etree.tostring(element_of(plain, root), encoding="utf-8", xml_declaration=True)
 
 

@@ -47,7 +47,7 @@ class Velocity:
         return self._read(self._odometry.message().twist.twist)
 
     async def command(self, twist: dict[str, Any]) -> None:
-        """Publish a velocity, a dict with the fields of a Twist, once; a watchdog ends the velocity after the hold time.
+        """Publish a velocity, a dict with the fields of a Twist, once; a watchdog ends it after the hold time.
 
         The watchdog is the robot's own or the one of these web services.
 
