@@ -1,10 +1,9 @@
-"""Shortest paths around obstacles: A* on a visibility graph of the corners of the office's boxes.
+"""Shortest paths around obstacles: Floyd-Warshall on a visibility graph of the corners of the office's boxes.
 
-A shortest path among boxes turns only at corners. A graph of about a hundred corners gives exact paths in about a
-millisecond, without a grid and without smoothing.
+A shortest path among boxes turns only at corners. The shortest ways between the corners are calculated once, which
+takes some milliseconds. A plan then takes about a millisecond and is exact, without a grid and without smoothing.
 """
 
-import heapq
 import itertools
 import math
 from enum import IntEnum
@@ -52,17 +51,18 @@ class Planner:
         usable = [office.contains(x, y) and self._grown.is_free(x, y) for x, y in corners]
         self._corners: Floats = corners[usable]
         count = len(self._corners)
-        pairs = self._grown.free_lines(
+        visible = self._grown.free_lines(
             np.repeat(self._corners, count, axis=0), np.tile(self._corners, (count, 1))
         ).reshape(count, count)
-        self._neighbours = [
-            [
-                (int(other), math.dist(self._corners[corner], self._corners[other]))
-                for other in np.flatnonzero(seen)
-                if other != corner
-            ]
-            for corner, seen in enumerate(pairs)
-        ]
+        straight = np.hypot(*(self._corners[:, None] - self._corners).T)
+        self._lengths: Floats = np.where(visible, straight, math.inf)
+        np.fill_diagonal(self._lengths, 0.0)
+        self._next = np.tile(np.arange(count), (count, 1))  # at [i, j] the corner after i on the way to j
+        for corner in range(count):
+            detours = self._lengths[:, corner, None] + self._lengths[corner]
+            shorter = detours < self._lengths
+            self._lengths = np.where(shorter, detours, self._lengths)
+            self._next = np.where(shorter, self._next[:, corner, None], self._next)
 
     def plan(self, start: Pose, goal: Pose, tolerance: float = 0.0) -> Floats:
         """Return the shortest path from a pose to a pose (x and y in m, yaw in rad).
@@ -128,39 +128,17 @@ class Planner:
         count = len(self._corners)
         from_begin = self._grown.free_lines(np.broadcast_to(begin, (count, 2)), self._corners)
         to_end = self._grown.free_lines(self._corners, np.broadcast_to(end, (count, 2)))
-        left = np.hypot(*(self._corners - end).T)
-        gone = np.hypot(*(self._corners - begin).T)
-        best = {int(corner): float(gone[corner]) for corner in np.flatnonzero(from_begin)}
-        came_from: dict[int, int] = {}
-        finish = count  # the index of the end point
-        frontier = [(length + float(left[corner]), corner) for corner, length in best.items()]
-        heapq.heapify(frontier)
-        settled: set[int] = set()
-        while frontier:
-            _, corner = heapq.heappop(frontier)
-            if corner == finish:
-                return [_point(begin), *self._walk_back(came_from), _point(end)]
-            if corner in settled:
-                continue
-            settled.add(corner)
-            onward = self._neighbours[corner]
-            if to_end[corner]:
-                onward = [*onward, (finish, float(left[corner]))]
-            for other, length in onward:
-                total = best[corner] + length
-                if total < best.get(other, math.inf):
-                    best[other] = total
-                    came_from[other] = corner
-                    heapq.heappush(frontier, (total + (0.0 if other == finish else float(left[other])), other))
-        return None
-
-    def _walk_back(self, came_from: dict[int, int]) -> list[tuple[float, float]]:
-        corner = came_from[len(self._corners)]
-        way = [corner]
-        while corner in came_from:
-            corner = came_from[corner]
-            way.append(corner)
-        return [_point(self._corners[corner]) for corner in reversed(way)]
+        gone = np.where(from_begin, np.hypot(*(self._corners - begin).T), math.inf)
+        left = np.where(to_end, np.hypot(*(self._corners - end).T), math.inf)
+        totals = gone[:, None] + self._lengths + left
+        if not np.isfinite(totals).any():
+            return None
+        corner, last = divmod(int(totals.argmin()), count)
+        turns = [corner]
+        while corner != last:
+            corner = int(self._next[corner, last])
+            turns.append(corner)
+        return [_point(begin), *(_point(self._corners[turn]) for turn in turns), _point(end)]
 
 
 def _point(row: Floats) -> tuple[float, float]:
