@@ -1,1 +1,1 @@
-"""Watching a device: one clock, one way to poll."""
+"""Observe a device over time: a clock and polling."""

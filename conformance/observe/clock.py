@@ -1,28 +1,28 @@
-"""The clock by which a device is watched: real in a run, simulated in tests."""
+"""The clock for observing a device: real in a run, simulated in tests."""
 
 import time
 from typing import Final, Protocol
 
 
 class Clock(Protocol):
-    """Tells the time, and waits."""
+    """A monotonic clock that can sleep."""
 
     def now(self) -> float:
-        """Return the time, s since some moment; it never goes back."""
+        """Return the time, s since an arbitrary start."""
 
     def sleep(self, seconds: float) -> None:
-        """Wait; a negative time is no wait."""
+        """Wait; a negative time does not wait."""
 
 
 class _WallClock:
     """The system's monotonic clock."""
 
     def now(self) -> float:
-        """Return the time, s since some moment."""
+        """Return the time, s since an arbitrary start."""
         return time.monotonic()
 
     def sleep(self, seconds: float) -> None:
-        """Wait; a negative time is no wait."""
+        """Wait; a negative time does not wait."""
         time.sleep(max(0.0, seconds))
 
 
@@ -31,7 +31,7 @@ WALL_CLOCK: Final[Clock] = _WallClock()
 
 
 class SimulatedClock:
-    """A clock that goes only when somebody waits by it.
+    """A clock whose time advances only by sleep().
 
     Attributes:
         time_s: the time, s.
@@ -45,5 +45,5 @@ class SimulatedClock:
         return self.time_s
 
     def sleep(self, seconds: float) -> None:
-        """Let the time pass."""
+        """Advance the time."""
         self.time_s += max(0.0, seconds)

@@ -1,4 +1,4 @@
-"""The one way to look at something again and again until it is over."""
+"""Polling: repeat an observation at a fixed interval until it is over."""
 
 from collections.abc import Callable, Iterator
 
@@ -10,12 +10,12 @@ _MOST_GIVEN_BACK_S = 5.0
 
 
 class Patience:
-    """A wait for something that a device has a time for. Delays of its responses do not count.
+    """A time limit for a device that does not count delays of its responses.
 
     Args:
-        pace: of the device's responses.
-        seconds: how long the device has, from now on.
-        clock: by which that is counted.
+        pace: response times of the device.
+        seconds: time that the device has from now on, s.
+        clock: measures it.
     """
 
     def __init__(self, pace: Pace, seconds: float, clock: Clock = WALL_CLOCK) -> None:
@@ -31,13 +31,13 @@ class Patience:
 
 
 def poll(clock: Clock, every_s: float, is_over: Callable[[], bool]) -> Iterator[None]:
-    """Yield at once, and then every so often, until it is over; the last time after that.
+    """Yield at once and then every ``every_s`` until ``is_over()``, and once more after that.
 
     Args:
-        clock: by which turns begin.
-        every_s: from the beginning of one turn to the beginning of the next, s; a turn that takes longer delays it.
-        is_over: called before each turn. The turn after a true value is the last one, so that what happened while
-            the caller was held up is still seen.
+        clock: the clock.
+        every_s: interval from the start of one turn to the start of the next, s; a longer turn delays the next.
+        is_over: called before each turn. One last turn follows a true value, to observe what happened during a delay of
+            the caller.
     """
     while True:
         begun = clock.now()
@@ -49,6 +49,6 @@ def poll(clock: Clock, every_s: float, is_over: Callable[[], bool]) -> Iterator[
 
 
 def poll_for(clock: Clock, every_s: float, seconds: float) -> Iterator[None]:
-    """Yield at once, and then every so often, for so many seconds; the last time when they have passed."""
+    """Yield at once and then every ``every_s`` for ``seconds``, and once more at the end."""
     until = clock.now() + seconds
     return poll(clock, every_s, lambda: clock.now() >= until)

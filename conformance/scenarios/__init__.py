@@ -1,1 +1,1 @@
-"""Scenarios record what a device does, rules judge the record, a planner orders them."""
+"""Scenarios record what a device does, rules judge the record, and a planner orders both."""

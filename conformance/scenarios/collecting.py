@@ -1,4 +1,4 @@
-"""How pytest collects rules: each is a check that has its scenario played once, and judges the trace."""
+"""The pytest plugin that collects rules as checks: each plays its scenario once per run and judges the trace."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class RulesPlugin:
     """A pytest plugin for one run.
 
     Args:
-        recordings: of the run; each scenario is played when its first rule needs it.
+        recordings: the recordings of the run; a scenario is played when its first rule needs it.
     """
 
     def __init__(self, recordings: Recordings) -> None:
@@ -27,7 +27,7 @@ class RulesPlugin:
     def pytest_pycollect_makeitem(
         self, collector: pytest.Module | pytest.Class, name: str, obj: object
     ) -> list[pytest.Item] | None:
-        """Make a check of a rule that a module defines."""
+        """Make one pytest item for each scenario of a rule."""
         if not isinstance(obj, Rule) or obj.judge.__module__ != collector.obj.__name__:
             return None
         return [self._item(collector, name, obj, scenario) for scenario in obj.on]

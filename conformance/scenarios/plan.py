@@ -1,4 +1,4 @@
-"""The plan of a run: which scenario or check has its turn when. It depends on no file's name."""
+"""The order of scenarios and checks in a run. It does not depend on file names."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from conformance.scenarios.stage import STAGES, Stage
 
 @dataclass(frozen=True)
 class Step:
-    """One check, or one rule with its scenario.
+    """One check, or one rule with its scenario, in the plan of a run.
 
     Attributes:
-        name: of the check.
-        stage: when its turn comes.
+        name: name of the check.
+        stage: the stage of the run that it belongs to.
         requirements: ids that it judges.
-        scenario: whose trace it judges; None for a check that talks to the device itself.
+        scenario: the scenario whose trace it judges; None for a check that sends requests itself.
         moves: whether it may move the device.
     """
 
@@ -29,13 +29,13 @@ class Step:
 
 
 def turn_of(step: Step, ranks: Mapping[str, int]) -> tuple[int, int, str, str]:
-    """Return the key by which steps are sorted: stage, place of its first requirement in the ledger, scenario, name.
+    """Return the sort key of a step: stage, rank of its first requirement in the ledger, scenario, name.
 
     The rules of a scenario follow each other, so that a trace is judged where it was recorded.
 
     Args:
-        step: which.
-        ranks: the place of each requirement in the ledger; of a scenario by its name, that of its first requirement.
+        step: the step.
+        ranks: rank of each requirement in the ledger; of a scenario, by its name, that of its first requirement.
     """
     first = min((ranks.get(id_, len(ranks)) for id_ in step.requirements), default=len(ranks))
     if step.scenario is not None:
@@ -44,7 +44,7 @@ def turn_of(step: Step, ranks: Mapping[str, int]) -> tuple[int, int, str, str]:
 
 
 def ordered(steps: Iterable[Step], ledger: Iterable[str]) -> list[Step]:
-    """Return steps in the order of their turns."""
+    """Return the steps in the order of the run."""
     steps, ranks = list(steps), {id_: number for number, id_ in enumerate(ledger)}
     for step in steps:
         if step.scenario is not None:
@@ -54,7 +54,7 @@ def ordered(steps: Iterable[Step], ledger: Iterable[str]) -> list[Step]:
 
 
 def told(steps: Sequence[Step]) -> list[str]:
-    """Return a plan in lines, stage by stage: scenarios with how they leave the device, checks by their names."""
+    """Return a plan as lines of text, stage by stage: scenarios with the state they leave, and checks."""
     lines: list[str] = []
     stage, scenario = None, ""
     for step in steps:

@@ -1,4 +1,4 @@
-"""Rules: what judges a trace, and never talks to a device."""
+"""Rules: functions that judge a scenario's trace, without sending requests."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Case:
-    """One case of a requirement.
+    """One case of a requirement that a rule judged.
 
     Attributes:
-        holds: whether the device keeps it.
+        holds: whether the device meets the requirement in this case.
         exchange: the evidence, or None.
-        expected: what the requirement asks for here, as a noun phrase.
-        observed: what the trace shows instead; empty: the response is described.
-        cause: failures of one cause are one finding; empty: told by the texts.
+        expected: what the requirement demands here, as a noun phrase.
+        observed: what the trace shows instead; empty: a description of the response.
+        cause: failures of the same cause are one finding; empty: derived from the texts.
         subject: what was tested; empty: method and target of the request.
     """
 
@@ -36,14 +36,14 @@ class Case:
 
 @dataclass(frozen=True)
 class NotTested:
-    """The trace does not show whether the device keeps a requirement; ``reason`` says why."""
+    """Outcome of a rule: the trace does not show whether the device meets the requirement; ``reason`` says why."""
 
     reason: str
 
 
 @dataclass(frozen=True)
 class Note:
-    """A remark that changes no verdict."""
+    """Outcome of a rule: a remark that changes no verdict."""
 
     remark: str
 
@@ -53,12 +53,12 @@ Outcome = Case | NotTested | Note
 
 @dataclass(frozen=True)
 class Rule:
-    """One requirement's judgement of the traces of scenarios.
+    """The function that judges one requirement by the traces of scenarios.
 
     Attributes:
-        requirement: its id.
-        on: the scenarios, each of which shows whether it is kept.
-        judge: takes the trace, and fixtures by their names; yields cases, or why there are none.
+        requirement: id of the requirement.
+        on: the scenarios; each trace is judged.
+        judge: takes a trace, and pytest fixtures by name; yields outcomes.
     """
 
     requirement: str
@@ -67,21 +67,21 @@ class Rule:
 
     @property
     def fixtures(self) -> tuple[str, ...]:
-        """The names of the fixtures that it judges with, beside the trace."""
+        """The names of the fixtures that the function takes beside the trace."""
         return tuple(inspect.signature(self.judge).parameters)[1:]
 
     def outcomes(self, trace: Any, fixture: Callable[[str], Any]) -> list[Outcome]:
-        """Return what the rule says of a trace."""
+        """Return the outcomes for a trace."""
         return list(self.judge(trace, **{name: fixture(name) for name in self.fixtures}))
 
 
 def rule(requirement: str, *, on: tuple[Scenario, ...]) -> Callable[[Callable[..., Iterable[Outcome]]], Rule]:
-    """Return a decorator that makes a rule of a function."""
+    """Return a decorator that turns a function into a rule."""
     return lambda judge: Rule(requirement, on, judge)
 
 
 def record(judge: Judge, requirement: str, outcomes: Iterable[Outcome]) -> None:
-    """Put down what a rule says as evidence."""
+    """Record the outcomes of a rule as evidence."""
     for one in outcomes:
         match one:
             case Case():

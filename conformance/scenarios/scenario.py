@@ -1,4 +1,4 @@
-"""Scenarios: what talks to a device and returns a trace, and never judges."""
+"""Scenarios: functions that operate a device and return a trace, without judging it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 
 
 class NotPossibleError(Exception):
-    """A scenario cannot be played on this device; the message says why. Its rules are then not tested."""
+    """Raised when a scenario cannot be played on this device; the message says why. Its rules are then not tested."""
 
 
 @dataclass(frozen=True)
@@ -19,12 +19,12 @@ class Scenario:
     """One scenario.
 
     Attributes:
-        name: of the function.
-        play: talks to the device and returns a trace. Its parameters are names of pytest fixtures.
+        name: name of the function.
+        play: operates the device and returns a trace. Its parameters are names of pytest fixtures.
         needs: what the run must have.
-        leaves: how the device is left.
-        stage: when its turn comes.
-        summary: the first line of the function's docstring.
+        leaves: the state in which the device is left.
+        stage: the stage of the run that it belongs to.
+        summary: first line of the function's docstring.
     """
 
     name: str
@@ -36,16 +36,16 @@ class Scenario:
 
     @property
     def fixtures(self) -> tuple[str, ...]:
-        """The names of the fixtures that it is played with."""
+        """The names of the fixtures that the function takes."""
         return tuple(inspect.signature(self.play).parameters)
 
 
 def scenario(
     *, needs: Collection[Need], leaves: Leaves = Leaves.AT_REST, stage: Stage = Stage.MOTION
 ) -> Callable[[Callable[..., Any]], Scenario]:
-    """Return a decorator that makes a scenario of a function.
+    """Return a decorator that turns a function into a scenario.
 
-    The function raises NotPossibleError where the device cannot play it, and PartialTraceError where it broke off.
+    The function raises NotPossibleError if the device cannot play it, and PartialTraceError if it was aborted.
     """
 
     def made(play: Callable[..., Any]) -> Scenario:
@@ -56,7 +56,7 @@ def scenario(
 
 
 class PartialTraceError(Exception):
-    """A scenario broke off: the trace up to there is judged, and the cause is the error's ``__cause__``.
+    """Raised when a scenario was aborted. The trace so far is judged; ``__cause__`` is the reason.
 
     Args:
         trace: what was recorded so far.
@@ -69,12 +69,12 @@ class PartialTraceError(Exception):
 
 @dataclass
 class Recording:
-    """A scenario that was played.
+    """The result of playing a scenario.
 
     Attributes:
-        trace: what it recorded; None where there is nothing to judge.
-        reason: why it could not be played, or an empty text.
-        error: why it broke off, or None.
+        trace: the trace, or None if there is nothing to judge.
+        reason: why the scenario could not be played, or empty.
+        error: why it was aborted, or None.
     """
 
     trace: Any = None
@@ -84,16 +84,16 @@ class Recording:
 
 @dataclass
 class Recordings:
-    """The recordings of one run: each scenario is played once, when its first rule needs it."""
+    """The recordings of one run. Each scenario is played once, when its first rule needs it."""
 
     #: By the scenario's name.
     played: dict[str, Recording] = field(default_factory=dict)
 
     def of(self, scenario: Scenario, fixture: Callable[[str], Any]) -> Recording:
-        """Return a scenario's recording; play it where it was not played before.
+        """Return the recording of a scenario, after playing it if necessary.
 
         Args:
-            scenario: which.
+            scenario: the scenario.
             fixture: returns a fixture of the run by its name.
         """
         if scenario.name not in self.played:

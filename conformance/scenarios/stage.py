@@ -1,15 +1,16 @@
-"""The stages of a run, in their order: what each needs the device to be like, and how it leaves it."""
+"""The stages of a run in their order, and what scenarios need and leave."""
 
 from enum import StrEnum
 from typing import Final
 
 
 class Stage(StrEnum):
-    """When in a run the turn of a scenario or a check comes.
+    """The stage of a run in which a scenario or check runs.
 
-    Reading comes first. Then the longest drive, other drives, and the attempts that must leave the device at rest,
-    which one watch covers; meanwhile the device is read at rest. Requests whose effects come late are sent late, and
-    other checks run while the suite waits for more of these effects.
+    Reading comes first. Then come the longest drive, other drives, and the attempts that must leave the device at rest,
+    which share one observation. Requests with late effects are sent late, and other checks run while the suite waits
+    for
+    further effects.
     """
 
     REACH = "reach"
@@ -35,7 +36,7 @@ STAGES: Final = tuple(Stage)
 
 
 class Leaves(StrEnum):
-    """How a scenario leaves the device."""
+    """The state in which a scenario leaves the device."""
 
     UNTOUCHED = "untouched"  # it was only read
     AT_REST = "at rest"
@@ -43,7 +44,7 @@ class Leaves(StrEnum):
 
 
 class Need(StrEnum):
-    """What a scenario needs."""
+    """What a scenario needs to be played."""
 
     REST = "rest"
     PUBLISHERS = "publishers"

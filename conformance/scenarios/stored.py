@@ -1,7 +1,7 @@
-"""Traces as a file: written at the end of a run, so that a later rule can judge them without the device.
+"""The file of traces, written at the end of a run, so that later rules can judge them without the device.
 
-The file is JSON, compressed by gzip (RFC 1952): one object with the traces by scenario. A trace is read by the return
-annotation of its scenario; msgspec does both.
+The file is gzipped JSON (RFC 1952): one object with the traces by scenario. The return annotation of a scenario is the
+type of its trace; msgspec encodes and decodes.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ _FAST = 1
 
 
 class TracesError(ValueError):
-    """A file of traces that cannot be used; the message says why."""
+    """Raised for an invalid file of traces; the message says why."""
 
 
 def write_traces(recordings: Recordings, folder: Path) -> Path | None:
-    """Write what was recorded to ``folder/traces.json.gz``; return the path, or None where there is no trace.
+    """Write the traces to ``folder/traces.json.gz``; return its path, or None if there is no trace.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
     traces = {name: recording.trace for name, recording in recordings.played.items() if recording.trace is not None}
     if not traces:
@@ -41,10 +41,10 @@ def write_traces(recordings: Recordings, folder: Path) -> Path | None:
 
 
 def read_traces(path: Path, scenarios: Iterable[Scenario]) -> Recordings:
-    """Return the recordings of a file, of those scenarios that are known.
+    """Read a file of traces; return the recordings of known scenarios.
 
     Raises:
-        TracesError: the file cannot be read, or a trace in it is not of its scenario's type.
+        TracesError: the file cannot be read, or a trace is not of its scenario's type.
     """
     try:
         raw = msgspec.json.decode(gzip.decompress(path.read_bytes()), type=dict[str, msgspec.Raw])
@@ -66,14 +66,14 @@ def _type_of(scenario: Scenario) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return JSON for what msgspec does not know: a slice, as its bounds."""
+    """Return a JSON value for a type that msgspec does not support: the bounds of a slice."""
     if isinstance(value, slice):
         return [value.start, value.stop]
     raise TypeError(f"a trace holds {type(value).__name__}, which cannot be written")
 
 
 def _rich(kind: type, value: Any) -> Any:
-    """Return the value that _plain() has written."""
+    """Return the value that _plain() encoded."""
     if kind is slice:
         return slice(*value)
     raise TypeError(f"a trace holds {kind.__name__}, which cannot be read")

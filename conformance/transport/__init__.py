@@ -1,1 +1,1 @@
-"""One request and its answer: exchange, client, deadlines, raw sockets."""
+"""Send HTTP requests: clients, connections, deadlines, raw sockets, recorded exchanges."""

@@ -1,4 +1,4 @@
-"""The HTTP client of the suite: every exchange bounded, recorded and shown to those who watch."""
+"""The HTTP client of the suite. Every request has a deadline, is recorded, and is reported to listeners."""
 
 import math
 import ssl
@@ -36,18 +36,18 @@ _ATTEMPTS = 2
 
 @dataclass
 class Connection:
-    """What all clients of one run share.
+    """The settings and counters that all HTTP clients of one run share.
 
     Attributes:
-        timeout_s: deadline of one exchange.
-        ca_file: authorities to trust instead of the system's.
+        timeout_s: deadline of one request with its response, s.
+        ca_file: certificate authorities to trust instead of the system's, or None.
         token: bearer token, or None.
-        request_rate: ceiling in requests per second, or None.
-        listeners: told what became of every request.
-        sent: how many requests have been sent.
-        resent: how many of them once more, because the server had closed the kept connection before it responded.
-        acted_at: when a request by another than a safe method was sent or answered last, s of the monotonic clock.
-        pace: how fast the robot answers.
+        request_rate: maximum requests per second, or None.
+        listeners: are called with every response and every failed request.
+        sent: number of requests sent.
+        resent: number of requests sent again because the server had closed the kept connection (RFC 9112 9.3.1).
+        acted_at: when a request with an unsafe method was last sent or answered, s of the monotonic clock.
+        pace: how fast the robot responds.
     """
 
     timeout_s: float = 10.0
@@ -62,11 +62,11 @@ class Connection:
     _next_slot: float = 0.0
 
     def tls(self) -> ssl.SSLContext:
-        """See connections.tls_context."""
+        """The TLS context that trusts ``ca_file``, or the system's authorities."""
         return tls_context(self.ca_file)
 
     def take_slot(self, method: str) -> None:
-        """Wait until the rate ceiling lets one more request through, and count it."""
+        """Count a request, after waiting until ``request_rate`` allows it."""
         self.sent += 1
         if self.request_rate:
             now = time.monotonic()
@@ -76,17 +76,17 @@ class Connection:
         self.note(method)
 
     def note(self, method: str) -> None:
-        """Take down that a request is on its way, or has been answered or given up."""
+        """Update ``acted_at`` if the method is unsafe: called when a request is sent, answered or given up."""
         if method not in SAFE_METHODS:
             self.acted_at = time.monotonic()
 
 
 class HttpClient:
-    """Sends requests to one base URL.
+    """A client that sends requests to one base URL.
 
     Args:
-        base_url: where the interface is; its path is put in front of every path that is asked for.
-        connection: deadline, credentials, ceiling and listeners.
+        base_url: URL of the interface; its path is prepended to the path of every request.
+        connection: deadline, token, rate limit and listeners.
     """
 
     def __init__(self, base_url: str, connection: Connection) -> None:
@@ -103,7 +103,7 @@ class HttpClient:
         self._connections = Connections(self.host.encode("idna").decode("ascii"), self.port, self.tls)
 
     def close(self) -> None:
-        """Close the connections that are open."""
+        """Close all open connections."""
         self._connections.close()
 
     def send(
@@ -117,19 +117,19 @@ class HttpClient:
         authorized: bool = True,
         timeout_s: float | None = None,
     ) -> Exchange:
-        """Send one request and wait for its whole answer.
+        """Send a request and return it with the complete response.
 
         Args:
             method: any token.
-            path: target below the base URL, sent octet by octet as given.
-            headers: further fields, after Host; Accept: */* is added, and ("Accept", "") leaves it out.
-            body: octets; Content-Length is added for it, and for every PUT, POST and PATCH.
-            fresh: use a connection of its own, closed afterwards: nothing is ever sent twice.
-            authorized: whether to send the token, where there is one.
-            timeout_s: another deadline than the run's; more for what is sent and received is always given.
+            path: request target below the base URL, sent byte for byte as given.
+            headers: headers after Host. ``Accept: */*`` is added by default; ("Accept", "") leaves it out.
+            body: request body; Content-Length is added for it, and for every PUT, POST and PATCH.
+            fresh: use a new connection and close it afterwards, so that the request is never sent twice.
+            authorized: whether to send the token, if there is one.
+            timeout_s: deadline instead of the run's, s; large bodies extend it.
 
         Raises:
-            NoAnswerError: no HTTP response came.
+            NoAnswerError: no HTTP response was received.
         """
         fields = self._fields(method, tuple(headers), body, close=fresh)
         shown = tuple((name, value) for name, value in fields if name != "Connection")
@@ -209,7 +209,7 @@ class HttpClient:
 
 
 class _SilenceError(Exception):
-    """Why one attempt brought no answer; the message says it in words."""
+    """Raised when one attempt to send a request gets no response; the message says why."""
 
     def __init__(self, problem: str, kind: NoAnswer) -> None:
         super().__init__(problem)
@@ -217,7 +217,7 @@ class _SilenceError(Exception):
 
 
 def _no_answer(error: Exception, seconds: float) -> _SilenceError:
-    """Sort what went wrong on the wire; anything that is no network error is the suite's own and is raised again."""
+    """Convert a network error to the reason for a missing response; raise any other error again, as it is a bug."""
     text = str(error) or type(error).__name__
     if isinstance(error, TimeoutError):
         return _SilenceError(f"no response within {seconds:.3g} s", NoAnswer.TIMEOUT)

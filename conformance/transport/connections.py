@@ -1,7 +1,7 @@
-"""HTTP/1.1 connections to a robot, which are used again while they are idle.
+"""Persistent HTTP/1.1 connections to a robot.
 
-They send what they are given: target, fields and their order. h11 parses the answers, strictly, which makes it the
-judge of framing as well. What clients that do more cost instead: docs/design.md.
+They send target, headers and their order exactly as given. h11 parses responses strictly, so it also checks their
+framing. Why no common HTTP client is used: docs/design.md.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ _QUICKACK: Final = getattr(socket, "TCP_QUICKACK", None)  # Linux alone has it
 
 
 class NoConnectionError(OSError):
-    """No connection can be had; the message says why."""
+    """Raised when no connection can be opened; the message says why."""
 
 
 class ClosedError(Exception):
-    """The server closed the connection before any answer was whole enough to be one."""
+    """Raised when the server closes the connection before the response is complete."""
 
 
 def tls_context(ca_file: Path | None) -> ssl.SSLContext:
-    """A context that trusts the system's authorities, or only those in ``ca_file``.
+    """Return a TLS context that trusts the authorities in ``ca_file``, or the system's if it is None.
 
     Raises:
         OSError: the file cannot be read, or (ssl.SSLError) holds no certificate.
@@ -56,11 +56,11 @@ def tls_context(ca_file: Path | None) -> ssl.SSLContext:
 
 
 def open_link(host: str, port: int, tls: ssl.SSLContext | None, within_s: float) -> socket.socket:
-    """A socket to a server, with TLS where there is a context for it.
+    """Return a socket connected to a server, with TLS if a context is given.
 
     Raises:
-        TimeoutError: it takes longer than it may.
-        NoConnectionError: there is none.
+        TimeoutError: connecting takes longer than ``within_s``.
+        NoConnectionError: the connection is refused or fails.
     """
     try:
         link = socket.create_connection((host, port), within_s)
@@ -73,12 +73,12 @@ def open_link(host: str, port: int, tls: ssl.SSLContext | None, within_s: float)
 
 
 class HttpConnection:
-    """One connection, which is opened by the first exchange on it.
+    """One connection, opened by the first request on it.
 
     Attributes:
-        is_open: whether it has been opened, and not closed since.
-        is_idle: whether an exchange has ended on it that another one can follow.
-        last_status: of the last response on it; 0 before the first.
+        is_open: whether it is open.
+        is_idle: whether the last response is complete and another request may follow.
+        last_status: status of the last response; 0 before the first.
     """
 
     def __init__(self, host: str, port: int, tls: ssl.SSLContext | None) -> None:
@@ -93,17 +93,17 @@ class HttpConnection:
 
     @property
     def is_open(self) -> bool:
-        """See the class."""
+        """Whether the connection is open."""
         return self._link is not None
 
     def exchange(self, request: h11.Request, content: bytes, deadline: Deadline) -> Response:
-        """Send a request, and read its whole answer.
+        """Send a request and return the complete response.
 
         Raises:
             TimeoutError: the deadline passed.
-            NoConnectionError: there is no connection.
-            ClosedError: the server ended it without an answer.
-            h11.RemoteProtocolError: what came is no HTTP, or too much.
+            NoConnectionError: the connection cannot be opened.
+            ClosedError: the server closed it without a response.
+            h11.RemoteProtocolError: the response is not HTTP, or too large.
             OSError: the connection broke.
         """
         started, self.is_idle, self._begun = time.perf_counter(), False, False
@@ -127,15 +127,15 @@ class HttpConnection:
         return response
 
     def ended_before(self, method: str) -> bool:
-        """Return whether the server ended the kept connection before a request on it, so that it may be sent again.
+        """Return whether the server closed the kept connection before this request, which may then be sent again.
 
-        A request that is not idempotent counts only where the network says that nobody has read it (RFC 9110 9.2.2).
+        For a method that is not idempotent, the network must show that no server read the request (RFC 9110 9.2.2).
         """
         kept = self.last_status > 0 and not self._begun
         return kept and (method in IDEMPOTENT_METHODS or self._was_reset)
 
     def _send(self, link: socket.socket, request: h11.Request, content: bytes, deadline: Deadline) -> None:
-        """Head and content leave as one segment where they are short: a robot is woken once."""
+        """Send head and body, in one segment if they are short."""
         state = self._state
         octets = state.send(request) or b""
         if content:
@@ -153,7 +153,7 @@ class HttpConnection:
         deadline.sent()
 
     def _head(self, link: socket.socket, deadline: Deadline) -> h11.Response | h11.InformationalResponse:
-        """The answer's head; interim answers come before the real one (RFC 9110 15.2)."""
+        """Return the head of the final response or the next interim response (RFC 9110 15.2)."""
         while True:
             event = self._event(link, deadline)
             if isinstance(event, h11.Response):
@@ -192,12 +192,12 @@ class HttpConnection:
 
     @property
     def has_expired(self) -> bool:
-        """Whether an idle one has been idle for too long, or something has come on it since: its end, mostly."""
+        """Return whether an idle connection was idle too long, or the server has closed it or sent something."""
         late = time.monotonic() > self._idle_since + _EXPIRY_S
         return late or self._link is None or _is_readable(self._link)
 
     def close(self) -> None:
-        """Close it, if it is open."""
+        """Close the connection if it is open."""
         self.is_idle = False
         if self._link is not None:
             self._link.close()
@@ -205,7 +205,7 @@ class HttpConnection:
 
 
 def _is_reset(link: socket.socket) -> bool:
-    """Return whether a peer that has closed a connection also reset it, as it does on data that nobody reads."""
+    """Return whether the server reset a connection that it had closed, as data came after the close."""
     if not hasattr(select, "poll"):  # Windows
         return False
     poll = select.poll()
@@ -222,18 +222,18 @@ def _is_readable(link: socket.socket) -> bool:
 
 
 class Connections:
-    """The connections of one client to its server: one that is idle is used again, else another one is opened."""
+    """A pool of connections to one server."""
 
     def __init__(self, host: str, port: int, tls: ssl.SSLContext | None) -> None:
         self._server = host, port, tls
         self._idle: list[HttpConnection] = []
 
     def new(self) -> HttpConnection:
-        """One of its own."""
+        """Return a new connection that is not in the pool."""
         return HttpConnection(*self._server)
 
     def take(self) -> HttpConnection:
-        """An idle one that the server has not closed, else a new one; nobody else gets it meanwhile."""
+        """Take an idle connection out of the pool if the server has not closed it; otherwise return a new one."""
         while self._idle:
             connection = self._idle.pop()
             if not connection.has_expired:
@@ -242,13 +242,13 @@ class Connections:
         return self.new()
 
     def give_back(self, connection: HttpConnection, *, keep: bool = True) -> None:
-        """The exchange is over: keep its connection, where another one can follow on it."""
+        """Put a connection back into the pool if it can be used again and ``keep`` is true; otherwise close it."""
         if keep and connection.is_idle and len(self._idle) < _KEPT:
             self._idle.append(connection)
         else:
             connection.close()
 
     def close(self) -> None:
-        """Close those that are idle."""
+        """Close the idle connections."""
         while self._idle:
             self._idle.pop().close()

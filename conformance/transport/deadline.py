@@ -1,4 +1,4 @@
-"""One deadline for a whole exchange, however slowly its octets drip."""
+"""One deadline for a whole request and response, even if bytes arrive one at a time."""
 
 import time
 
@@ -6,12 +6,12 @@ from conformance.transport.pace import time_for, time_to_arrive
 
 
 class Deadline:
-    """The moment at which an exchange ends that begins now.
+    """The deadline of a request that starts now.
 
     Args:
-        seconds: until its last octet, and more for each that comes.
-        octets: of content that go out: more time as long as they do. When they have gone, or none does for so many
-            seconds, there is nothing to give more time for.
+        seconds: time until the last byte of the response, s; each received byte extends it slightly.
+        octets: size of the request body, bytes: the deadline is extended while the server still accepts it. A server
+            that accepts no byte for ``seconds`` misses the deadline.
     """
 
     def __init__(self, seconds: float, octets: int = 0) -> None:
@@ -20,10 +20,10 @@ class Deadline:
         self._at = time.monotonic() + seconds + time_for(octets)
 
     def left_s(self) -> float:
-        """How long a wait for the answer may take, s.
+        """Return how long to wait for the response, s.
 
         Raises:
-            TimeoutError: no longer.
+            TimeoutError: the deadline has passed.
         """
         left = self._at - time.monotonic()
         if left <= 0:
@@ -31,17 +31,17 @@ class Deadline:
         return left
 
     def to_send_s(self) -> float:
-        """How long the server may take nothing of the request, s.
+        """Return how long the server may accept no byte of the request, s.
 
         Raises:
-            TimeoutError: no longer.
+            TimeoutError: the deadline has passed.
         """
         return min(self.left_s(), self._seconds)
 
     def sent(self) -> None:
-        """All of the request has been handed to the network."""
+        """Note that the whole request has been handed to the network."""
         self._at = min(self._at, time.monotonic() + self._seconds + time_to_arrive(self._octets))
 
     def came(self, octets: int) -> None:
-        """So many octets of the answer have come."""
+        """Note that a number of bytes of the response was received."""
         self._at += time_for(octets)

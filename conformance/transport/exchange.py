@@ -1,4 +1,4 @@
-"""What was sent to a robot and what came back, as values that can be shown and sent again."""
+"""Requests and responses as values that can be recorded, shown and sent again."""
 
 import base64
 import gzip
@@ -26,11 +26,11 @@ class Request:
     """One HTTP request as it was sent.
 
     Attributes:
-        method: as on the wire.
-        url: absolute, with its target as it was sent.
-        headers: pairs in sending order; a bearer token is never kept in them.
-        body: octets.
-        raw: what went over the socket, where the request was written by hand and is no plain HTTP request.
+        method: HTTP method.
+        url: absolute URL with the request target as sent.
+        headers: (name, value) pairs in sending order, without a bearer token.
+        body: request body.
+        raw: the bytes on the socket if the request was written by hand and is not plain HTTP; otherwise empty.
     """
 
     method: str
@@ -41,14 +41,14 @@ class Request:
 
     @property
     def size(self) -> int:
-        """Return how much there is to read in the request; the smallest failing request is the one to show."""
+        """Return how much there is to read; findings show the smallest failing request."""
         if self.raw is not None:
             return len(self.raw)
         return len(self.url) + len(self.body) + sum(len(name) + len(value) for name, value in self.headers)
 
     @property
     def target(self) -> str:
-        """Return the request target as it was sent; that of a raw request stands in its first line."""
+        """Return the request target as sent; for a raw request, that in its first line."""
         target = "/" + self.url.split("//", 1)[-1].partition("/")[2]
         if self.raw is not None:
             words = self.raw.split(b"\r\n", 1)[0].decode("latin-1").split(" ")
@@ -59,7 +59,7 @@ class Request:
 
     @property
     def endpoint(self) -> str:
-        """Return method, server and path with its values taken out, and the operation of a SOAP message."""
+        """Return method, server and path without parameter values, and the operation of a SOAP message."""
         path = "/".join(
             "*" if _VALUE.search(part) or len(part) > _LONG_SEGMENT else part
             for part in self.target.split("?", 1)[0].split("/")
@@ -70,7 +70,7 @@ class Request:
         return f"{self.method} {scheme}//{rest.partition('/')[0]}{path}{operation}"
 
     def curl(self) -> str:
-        """A shell command that sends the request again (a raw one by nc)."""
+        """Return a shell command that sends the request again: curl, or nc for a raw request."""
         if self.raw is not None:
             host, _, port = self.url.split("//", 1)[-1].split("/", 1)[0].rpartition(":")
             return f"{_printed(self.raw)} | nc {host.strip('[]')} {port}"
@@ -110,7 +110,7 @@ def _is_plain(body: bytes) -> bool:
 
 
 def _printed(body: bytes) -> str:
-    """A shell command that writes ``body``; compressed where that makes it shorter, as attack bodies are huge."""
+    """Return a shell command that prints ``body``, compressed if that makes the command shorter."""
     packed = gzip.compress(body, mtime=0)
     if len(packed) < len(body):
         return f"echo {base64.b64encode(packed).decode()} | base64 -d | gunzip"
@@ -123,11 +123,11 @@ class Response:
 
     Attributes:
         status: status code.
-        headers: pairs in the order and spelling in which they came.
-        body: octets, after transfer coding and before content coding.
-        elapsed_ms: from the first octet sent to the last one received.
+        headers: (name, value) pairs in the order and case as received.
+        body: body after transfer decoding and before content decoding.
+        elapsed_ms: time from the first byte sent to the last byte received, ms.
         http_version: ``HTTP/1.1`` or ``HTTP/1.0``.
-        received_s: when its last octet came, s on the monotonic clock; 0 where nobody looked.
+        received_s: when the last byte was received, s on the monotonic clock; 0 if unknown.
     """
 
     status: int
@@ -139,24 +139,24 @@ class Response:
 
     @cached_property
     def _by_name(self) -> dict[str, list[str]]:
-        """The values of each field, by its name in lower case: every answer is looked through by many."""
+        """The values of each header by its name in lower case. Cached, because many checks read it."""
         found: dict[str, list[str]] = {}
         for name, value in self.headers:
             found.setdefault(name.lower(), []).append(value)
         return found
 
     def header(self, name: str) -> str | None:
-        """The value of a field, several joined by commas (RFC 9110 5.3); None where there is none."""
+        """Return the value of a header, several joined by commas (RFC 9110 5.3), or None."""
         values = self._by_name.get(name.lower())
         return ", ".join(values) if values else None
 
     def repeated(self, *names: str) -> str:
-        """The first of these fields that stands more than once; empty where none does."""
+        """Return the first of these headers that occurs more than once, or an empty text."""
         return next((name for name in names if len(self._by_name.get(name.lower(), ())) > 1), "")
 
     @cached_property
     def media_type(self) -> str:
-        """Content-Type without parameters, in lower case; empty where there is none."""
+        """The media type in Content-Type, without parameters, in lower case; empty without the header."""
         return (self.header("content-type") or "").split(";", 1)[0].strip().lower()
 
     @property
@@ -167,25 +167,20 @@ class Response:
 
 @dataclass(frozen=True)
 class Exchange:
-    """A request with its answer.
-
-    Attributes:
-        request: what was sent.
-        response: what came.
-    """
+    """A request with its response."""
 
     request: Request
     response: Response
 
     @property
     def came(self) -> str:
-        """What came, in a few words for a finding."""
+        """A short description of the response, for findings."""
         kind = f", {self.response.media_type}" if self.response.media_type else ""
         return f"status {self.response.status}{kind}"
 
 
 class NoAnswer(StrEnum):
-    """Why no answer came."""
+    """Why no response was received."""
 
     REFUSED = "refused"
     TIMEOUT = "timeout"
@@ -198,12 +193,12 @@ class NoAnswer(StrEnum):
 
 @dataclass(frozen=True)
 class Unanswered:
-    """A request to which no HTTP response came.
+    """A request without an HTTP response.
 
     Attributes:
-        request: what was sent.
-        problem: what happened instead ("no response within 10 s", ...).
-        kind: the same as one of a few.
+        request: the request.
+        problem: what happened instead, in words ("no response within 10 s").
+        kind: the same as an enum value.
     """
 
     request: Request
@@ -212,7 +207,7 @@ class Unanswered:
 
     @property
     def came(self) -> str:
-        """What came, in a few words for a finding: nothing, and why."""
+        """A short description of what happened instead of a response, for findings."""
         return self.problem
 
 
@@ -221,7 +216,7 @@ Attempt = Exchange | Unanswered
 
 
 class NoAnswerError(Exception):
-    """A request was sent and no HTTP response came.
+    """Raised when a request gets no HTTP response.
 
     Attributes:
         unanswered: the request, and what happened instead.
@@ -233,15 +228,15 @@ class NoAnswerError(Exception):
 
     @property
     def kind(self) -> NoAnswer:
-        """What happened, as one of a few."""
+        """What happened instead of a response."""
         return self.unanswered.kind
 
 
 class Listener:
-    """Is told what became of every request; each kind that it does not override, it lets pass."""
+    """Base class for objects that are called with every response and every request without a response. Does nothing."""
 
     def answered(self, exchange: Exchange) -> None:
-        """An answer came."""
+        """Handle a response."""
 
     def unanswered(self, request: Unanswered) -> None:
-        """None came."""
+        """Handle a request without a response."""

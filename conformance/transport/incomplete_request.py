@@ -1,4 +1,4 @@
-"""Requests that are never completed: begun on a socket by hand, then left open or broken off."""
+"""Requests that are never completed: sent in part over a raw socket, then left open or broken off."""
 
 import contextlib
 import socket
@@ -13,17 +13,17 @@ _RESET: Final = struct.pack("ii", 1, 0)
 
 
 class PartialRequest:
-    """One request of which a part has been sent.
+    """A request of which only a part has been sent. The constructor sends that part.
 
     Args:
         client: the interface to send it to.
         method, path: as for HttpClient.send().
-        sent: the octets of the body that are sent.
-        promised: Content-Length, or None for a chunked body whose last chunk never comes.
-        head_only: how many octets of the head to send, without any body; None for the whole request.
+        sent: the part of the body to send.
+        promised: Content-Length, or None for a chunked body without its last chunk.
+        head_only: number of bytes of the head to send, without a body; None: the whole head and ``sent``.
 
     Raises:
-        NoAnswerError: there is no connection.
+        NoAnswerError: the connection cannot be opened.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class PartialRequest:
         self.vanish()
 
     def vanish(self, *, reset: bool = True) -> None:
-        """Break the connection off: by a reset, or by an end in the middle, as when a client's process is killed."""
+        """Break the connection off, by a TCP reset or by a normal close, as when a client's process is killed."""
         with contextlib.suppress(OSError):
             if reset:
                 self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)

@@ -1,4 +1,4 @@
-"""How fast a robot answers, and how much of a wait was the network's and not the robot's."""
+"""How fast a robot responds, and how much of a delay came from the network instead of the robot."""
 
 import threading
 
@@ -11,20 +11,20 @@ _LATE_S = 0.1
 
 
 def time_for(octets: int) -> float:
-    """How long so many octets may take on their way, s: for so much longer no answer is overdue."""
+    """Return how long a number of bytes may take on the network, s. Deadlines are extended by it."""
     return octets / _SLOWEST_OCTETS_PER_S
 
 
 def time_to_arrive(octets: int) -> float:
-    """How long the last of so many octets may take on their way, once all of them have been handed over, s."""
+    """Return how long the last of a number of bytes may take to arrive after all were handed to the network, s."""
     return time_for(min(octets, _UNDER_WAY))
 
 
 class Pace:
-    """What is known of a robot's answers in time.
+    """The response times of a robot so far.
 
     Attributes:
-        usual_s: how long an answer usually takes, s.
+        usual_s: the usual response time, s.
     """
 
     def __init__(self, usual_s: float = 0.001) -> None:
@@ -33,17 +33,17 @@ class Pace:
         self._lock = threading.Lock()
 
     def is_late(self, seconds: float, octets: int = 0) -> bool:
-        """Whether an exchange of so many octets took longer than one does here that nothing has held up."""
+        """Return whether a response of this size took longer than an undisturbed one does."""
         return seconds > 2 * self.usual_s + _LATE_S + time_for(octets)
 
     def took(self, seconds: float, octets: int) -> None:
-        """Take down how long an exchange took, answered or not."""
+        """Record how long a request took, with or without a response."""
         if self.is_late(seconds, octets):
             with self._lock:
                 self._lateness_s += seconds - self.usual_s
 
     @property
     def lateness_s(self) -> float:
-        """By how much answers have been late so far, all together, s."""
+        """The sum of all delays beyond the usual response time so far, s."""
         with self._lock:
             return self._lateness_s

@@ -1,4 +1,4 @@
-"""Several clients at once: requests that leave at one moment, each client on a connection of its own."""
+"""Several concurrent clients: their requests are sent at the same moment, each on its own connection."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _BUSY: Final = frozenset({HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVA
 
 @dataclass(frozen=True)
 class Outgoing:
-    """A request that is to be sent.
+    """A request to be sent.
 
     Attributes:
-        client: the interface that it is for.
-        method, path, headers, body: as HttpClient.send() takes them.
+        client: the interface to send it to.
+        method, path, headers, body: as for HttpClient.send().
     """
 
     client: HttpClient
@@ -35,24 +35,25 @@ class Outgoing:
 
 
 def is_busy(attempt: Attempt) -> bool:
-    """Whether a robot had no time for a request: it said so, or took no further connection."""
+    """Return whether the robot was overloaded: it responded 503 or the like, or accepted no further connection."""
     return not isinstance(attempt, Exchange) or attempt.response.status in _BUSY
 
 
 def send_together(rounds: Sequence[Sequence[Outgoing]]) -> list[list[Attempt]]:
-    """Send the requests of each round at one moment, the next round when all of one are answered.
+    """Send the requests of each round concurrently, one round after another.
 
-    The first request of every round is the first client's, and so on; a client keeps its connection. Listeners are told
-    afterwards, in order; of a robot that had too much to do they are not told.
+    The nth request of every round belongs to the nth client, which keeps its connection. Listeners are called
+    afterwards,
+    in order, except for requests that met an overloaded robot.
 
     Args:
         rounds: at most MOST_CLIENTS requests each.
 
     Returns:
-        What became of each; a connection that was refused or closed is no answer.
+        The results in the order of the requests; a refused or closed connection is a result without a response.
 
     Raises:
-        NoAnswerError: a robot did not answer within the deadline.
+        NoAnswerError: the robot did not respond within the deadline.
     """
     clients = [_Client() for _ in range(max(map(len, rounds), default=0))]
     attempts: list[list[Attempt]] = []
@@ -77,14 +78,14 @@ def send_together(rounds: Sequence[Sequence[Outgoing]]) -> list[list[Attempt]]:
 
 
 class _Client:
-    """One of several clients: its connections are its own, and nobody listens while others are being served."""
+    """One of several concurrent clients, with its own connections and without listeners."""
 
     def __init__(self) -> None:
         # By base URL: the client whose connections are shared, and the own one.
         self._clients: dict[str, tuple[HttpClient, HttpClient]] = {}
 
     def send(self, request: Outgoing, wait: Callable[[], object]) -> Attempt:
-        """Wait for the others, then send."""
+        """Wait for the other clients, then send."""
         shared = request.client
         # The ceiling on the rate has been kept to before.
         settings = replace(shared.connection, listeners=[], request_rate=None, resent=0)
@@ -96,17 +97,17 @@ class _Client:
             return none.unanswered
 
     def close(self) -> None:
-        """Close the connections, and count what was sent again on them."""
+        """Close the connections, and add their repeated requests to the run's count."""
         for shared, own in self._clients.values():
             own.close()
             shared.connection.resent += own.connection.resent
 
 
 def _tell(requests: Sequence[Outgoing], attempts: Sequence[Attempt]) -> None:
-    """Have what came judged by those who listen.
+    """Call the listeners with the results.
 
     Raises:
-        NoAnswerError: something did not come.
+        NoAnswerError: a request got no response.
     """
     for request, attempt in zip(requests, attempts, strict=True):
         for listener in request.client.connection.listeners:

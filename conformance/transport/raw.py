@@ -1,6 +1,6 @@
-"""HTTP/1.1 over a plain socket: requests that no client library would send, and responses read octet by octet.
+"""HTTP/1.1 over a plain socket: requests that no client library sends, and responses checked byte by byte.
 
-Every wait ends at one deadline. A response with broken framing is refused with the clause of RFC 9112 that it breaks.
+Every wait has a deadline. The error for a response with broken framing names the violated clause of RFC 9112.
 """
 
 import itertools
@@ -27,19 +27,19 @@ _TO_CONNECT_S = 0.05
 
 
 class FramingError(Exception):
-    """Octets are no well-framed response; the message says what is wrong, and by which clause."""
+    """Raised when bytes are not a correctly framed response; the message names the fault and the clause."""
 
 
 @dataclass(frozen=True)
 class RawAnswer:
-    """What came over one connection.
+    """Everything received over one connection.
 
     Attributes:
-        octets: all of it.
-        closed: whether the robot closed the connection; if not, the deadline passed.
-        sent_all: whether the whole request went out.
-        elapsed_ms: from the first octet sent to the end.
-        early: whether something came in a pause of sending.
+        octets: the bytes.
+        closed: whether the robot closed the connection; otherwise the deadline passed.
+        sent_all: whether the whole request was sent.
+        elapsed_ms: time from the first byte sent to the end, ms.
+        early: whether bytes were received during a pause of sending.
     """
 
     octets: bytes
@@ -50,13 +50,13 @@ class RawAnswer:
 
 
 def head(client: HttpClient, method: str, path: str, *fields: str, host: bool = True) -> bytes:
-    """Return the head of a request: request line, Host, the token if the run has one, and the given fields.
+    """Return the head of a request: request line, Host, the run's token if any, and the given headers.
 
     Args:
-        client: gives authority, prefix and token.
-        method: as on the wire.
-        path: below the base URL.
-        fields: whole lines, without line ends.
+        client: supplies authority, path prefix and token.
+        method: HTTP method.
+        path: request target below the base URL.
+        fields: whole header lines, without line ends.
         host: whether to send Host.
     """
     lines = [f"{method} {client.prefix}{path} HTTP/1.1"]
@@ -68,14 +68,14 @@ def head(client: HttpClient, method: str, path: str, *fields: str, host: bool = 
 
 
 def chunked(body: bytes, size: int, extension: bytes = b"", trailers: bytes = b"") -> bytes:
-    """Return a body in chunks of ``size`` octets, each with an extension, and whole trailer lines (RFC 9112 7.1)."""
+    """Return a body in chunks of ``size`` bytes, each with an extension, and with trailer lines (RFC 9112 7.1)."""
     pieces = (body[start : start + size] for start in range(0, len(body), size))
     chunks = b"".join(b"%x%b\r\n%b\r\n" % (len(piece), extension, piece) for piece in pieces)
     return chunks + b"0%b\r\n%b\r\n" % (extension, trailers)
 
 
 def refuses_chunks(attempt: Attempt) -> bool:
-    """Return whether a server of HTTP/1.0, which has no chunks, asks for a length (RFC 9112 6.1)."""
+    """Return whether an HTTP/1.0 server, which cannot read chunks, responded 411 (RFC 9112 6.1)."""
     if isinstance(attempt, Unanswered):
         return False
     return attempt.response.http_version == "HTTP/1.0" and attempt.response.status == HTTPStatus.LENGTH_REQUIRED
@@ -90,18 +90,18 @@ def talk(
     cuts: Sequence[int] = (),
     pause_s: float = 0.0,
 ) -> RawAnswer:
-    """Send octets over a connection of their own, and read until the robot closes it or the deadline passes.
+    """Send bytes over a new connection, and read until the robot closes it or the deadline passes.
 
     Args:
-        client: which robot.
-        octets: what to send.
-        timeout_s: deadline for all of it, and more for each octet; by default the run's.
-        answers: stop after so many complete responses to GET; 0: only when the connection ends.
-        cuts: places before which sending pauses.
-        pause_s: length of a pause, s; it ends early when something comes.
+        client: the interface to send to.
+        octets: the bytes.
+        timeout_s: deadline for everything, s; by default the run's. Large sizes extend it.
+        answers: stop after this number of complete responses to GET; 0: read until the connection ends.
+        cuts: positions at which sending pauses.
+        pause_s: length of a pause, s; it ends early when bytes are received.
 
     Raises:
-        NoAnswerError: no connection could be opened.
+        NoAnswerError: the connection cannot be opened.
     """
     deadline = time.monotonic() + (timeout_s or client.connection.timeout_s) + time_for(len(octets))
     request = shown(client, octets)
@@ -139,7 +139,7 @@ def talk(
 def _sent(
     link: socket.socket, octets: bytes, deadline: float, cuts: Sequence[int], pause_s: float
 ) -> tuple[bool, bool]:
-    """Send octets with pauses before the cuts; return whether all went out, and whether something came in a pause."""
+    """Send bytes with pauses; return whether all were sent, and whether bytes were received during a pause."""
     early = False
     try:
         for begin, end in itertools.pairwise((0, *cuts, len(octets))):
@@ -161,7 +161,7 @@ def _set_timeout(link: socket.socket, deadline: float) -> None:
 
 
 def answers_in(octets: bytes, most: int) -> int:
-    """Return how many complete responses to GET an open connection has brought, at most ``most``."""
+    """Return how many complete responses to GET the bytes from an open connection hold, at most ``most``."""
     for count in range(most):
         try:
             _, octets = parse(octets, "GET", closed=False)
@@ -171,7 +171,7 @@ def answers_in(octets: bytes, most: int) -> int:
 
 
 def shown(client: HttpClient, octets: bytes) -> Request:
-    """Return the request as a finding shows it: without the token."""
+    """Return the request as findings show it, without the token."""
     if client.connection.token:
         octets = octets.replace(client.connection.token.encode("latin-1", "replace"), b"$ROAAS_TOKEN")
     line = octets.split(b"\r\n", 1)[0].decode("latin-1")
@@ -184,18 +184,18 @@ def _address(client: HttpClient) -> str:
 
 
 def parse(octets: bytes, method: str, *, closed: bool, elapsed_ms: float = 0.0) -> tuple[Response, bytes]:
-    """Return the first final response in a stream, and the octets behind it.
+    """Return the first final response in a byte stream, and the bytes after it.
 
-    h11 reads them; what it forgives and RFC 9112 does not let a server send is refused before and after.
+    h11 parses; framing that h11 tolerates and RFC 9112 forbids servers to send is rejected before and after.
 
     Args:
-        octets: from the first octet of a status line on.
-        method: of the request that the response is to.
-        closed: whether the connection ended behind the octets.
-        elapsed_ms: to be put into the response.
+        octets: the bytes, from a status line on.
+        method: method of the request.
+        closed: whether the connection ended after the bytes.
+        elapsed_ms: for the response.
 
     Raises:
-        FramingError: the response is not well-framed, or not complete.
+        FramingError: the response is incomplete or its framing is broken.
     """
     section, separator, _ = octets.partition(b"\r\n\r\n")
     if not separator:
@@ -227,10 +227,10 @@ def parse(octets: bytes, method: str, *, closed: bool, elapsed_ms: float = 0.0) 
 
 
 def _content(reader: h11.Connection) -> tuple[bytes, bytes]:
-    """Return the content of a response whose head has been read, and the octets behind it.
+    """Return the body of a response whose head has been parsed, and the bytes after it.
 
     Raises:
-        FramingError: the end of the content has not come.
+        FramingError: the body is incomplete.
         h11.RemoteProtocolError: its framing is broken.
     """
     body = bytearray()
@@ -242,13 +242,13 @@ def _content(reader: h11.Connection) -> tuple[bytes, bytes]:
 
 
 def read_one(client: HttpClient, octets: bytes, came: RawAnswer, method: str) -> tuple[Attempt, bytes]:
-    """Return the first response as an exchange, or why it cannot be read; and the octets behind it.
+    """Return the first response as an exchange (or why it cannot be parsed), and the bytes after it.
 
     Args:
-        client: which robot.
+        client: the interface that the request was sent to.
         octets: the request.
         came: what talk() returned.
-        method: of the request.
+        method: method of the request.
     """
     request = shown(client, octets)
     if not came.octets:
@@ -263,5 +263,5 @@ def read_one(client: HttpClient, octets: bytes, came: RawAnswer, method: str) ->
 
 
 def rest_of(came: RawAnswer, octets: bytes) -> RawAnswer:
-    """Return what came over a connection with only ``octets`` of it left."""
+    """Return a copy of ``came`` with other bytes."""
     return RawAnswer(octets, came.closed, came.sent_all, came.elapsed_ms)

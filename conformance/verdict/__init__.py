@@ -1,1 +1,1 @@
-"""From evidence to verdicts: what was judged, requirement by requirement, and what follows for class and robot."""
+"""From evidence to verdicts: of each requirement, each class and the robot."""

@@ -1,4 +1,4 @@
-"""A baseline of expected failures: each with a reason and a day on which it expires."""
+"""A baseline: a file of expected failures, each with a reason and an expiry date."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 
 
 class BaselineError(TomlFileError):
-    """A baseline that cannot be used; the message names the entry and the offending value."""
+    """Raised for an invalid baseline file; the message names the entry and the offending value."""
 
 
 class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One failure that is known and accepted for a while.
+    """A failure that is known and accepted until a date.
 
     Attributes:
-        requirement: id of the requirement that fails.
-        reason: why that is accepted.
-        expires: the last day on which it is.
+        requirement: id of the failing requirement.
+        reason: why the failure is accepted.
+        expires: last day on which it is accepted.
     """
 
     requirement: Text
@@ -39,10 +39,10 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def load_baseline(path: Path, known: Iterable[str]) -> tuple[Expectation, ...]:
-    """Read ``[[expected]]`` tables with requirement, reason and expires.
+    """Read a baseline file: ``[[expected]]`` tables with requirement, reason and expires.
 
     Raises:
-        BaselineError: it cannot be read, or an entry names no known requirement or lacks a field.
+        BaselineError: the file cannot be read, or an entry is incomplete or names an unknown requirement.
     """
     baseline = read_toml(path, _File, BaselineError).expected
     ids = set(known)
@@ -53,7 +53,7 @@ def load_baseline(path: Path, known: Iterable[str]) -> tuple[Expectation, ...]:
 
 
 def apply_baseline(verdicts: Iterable[Verdict], baseline: Iterable[Expectation], today: dt.date) -> list[Verdict]:
-    """Turn expected failures into warnings; an entry that has expired or no longer fails is an error."""
+    """Turn expected failures into warnings. An entry that has expired or whose requirement passes becomes an error."""
     expected = {entry.requirement: entry for entry in baseline}
     return [
         _applied(verdict, expected[verdict.requirement.id], today) if verdict.requirement.id in expected else verdict
@@ -62,7 +62,7 @@ def apply_baseline(verdicts: Iterable[Verdict], baseline: Iterable[Expectation],
 
 
 def accepted_until(verdicts: Iterable[Verdict]) -> str:
-    """The last day on which all failures that the baseline accepts still are; empty where it accepts none."""
+    """Return the last day on which all failures accepted by the baseline still are; empty if it accepts none."""
     return min((verdict.expected_failure[1] for verdict in verdicts if verdict.expected_failure), default="")
 
 

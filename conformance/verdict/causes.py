@@ -1,18 +1,18 @@
-"""One cause, one finding: a cause that several requirements meet is one finding, and the others point to it.
+"""Group findings by cause: several requirements that met the same cause share one finding.
 
-A closed connection, a hang, a server error and a response that no parser reads are causes that many checks meet. Two
-findings have the same cause when its kind and the method, server and path of the request are the same, and also the
-status of a server error and the operation of a SOAP message. The finding stays with one requirement, which is chosen by
+A closed connection, a hang, a server error and a response that cannot be parsed are causes that many checks meet. Two
+findings have the same cause if its kind and the method, server and path of the request are the same, and also the
+status of a server error and the operation of a SOAP message. The finding stays with one requirement, chosen by
 
 1. level: MUST first;
-2. ``forbids`` in the ledger, which names the kinds of causes that a requirement is about;
-3. what was done: a request that was sent comes before one that was not sent because the server hung before, and a check
-   of a few requirements before a check of many;
+2. ``forbids`` in the ledger, which lists the kinds of causes that a requirement is about;
+3. the request: a request that was sent comes before one that was not sent because the server hung before, and a check
+   of few requirements before a check of many;
 4. time: the requirement that met the cause first.
 
-All other requirements that met it are not tested.
+All other requirements that met the cause are not tested.
 
-A request written by hand tests a rule of its own, so it shares a cause only where an ordinary request met that as well.
+A raw request tests a rule of its own, so it shares a cause only if an ordinary request met that cause as well.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Cause:
     """A finding, with the requirements that are not tested because of it.
 
     Attributes:
-        finding: the one that is told.
+        finding: the finding that is reported.
         blocks: ids of the requirements that could not be tested.
     """
 
@@ -55,19 +55,20 @@ def by_cause(
     claims: Container[str],
     scored: Container[str] | None = None,
 ) -> tuple[dict[str, Evidence], list[Cause]]:
-    """Have each cause told once, and number the findings in the order in which a vendor should look at them.
+    """Keep one finding for each cause, and number the findings in the order in which a vendor should look at them.
 
-    MUST comes before SHOULD, then no response before hang, server error, unreadable response and broken rule, then the
-    cause that keeps more requirements from being tested.
+    MUST comes before SHOULD; then closed connection, hang, server error, unparsable response, broken rule; then the
+    cause
+    that blocks more requirements.
 
     Args:
         evidence: by requirement.
         ledger: the requirements.
-        claims: the classes that are judged; the others have no findings.
+        claims: the classes that are judged; others have no findings.
         scored: ids of the requirements that count; None: all.
 
     Returns:
-        The evidence with the findings that remain, and these findings in their order.
+        The evidence with the remaining findings, and the causes in order.
     """
     judged = {id_: one for id_, one in ledger.items() if one.class_ in claims}
     places = {id_: place for place, id_ in enumerate(judged)}
@@ -112,7 +113,7 @@ def by_cause(
 
 
 def _groups(findings: Iterable[Finding]) -> list[list[Finding]]:
-    """Return the findings that share a cause, cause by cause, as far as an ordinary request met it."""
+    """Return the findings that share a cause, group by group, for causes that an ordinary request met."""
     groups: defaultdict[str, list[Finding]] = defaultdict(list)
     for finding in findings:
         for cause in finding.causes if not finding.alone else ():
@@ -125,7 +126,7 @@ def _groups(findings: Iterable[Finding]) -> list[list[Finding]]:
 
 
 def _kept(evidence: Evidence, told_by: Mapping[int, list[Finding]]) -> dict[str, Finding]:
-    """Return the findings that stay with a requirement: at least one, where more failed than was kept."""
+    """Return the findings that stay with a requirement: at least one if more cases failed than were kept."""
     own = {
         key: finding
         for key, finding in evidence.findings.items()

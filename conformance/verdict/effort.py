@@ -1,4 +1,4 @@
-"""How much is tried: numbers of cases and time, by what the user asks and by how fast the robot answers."""
+"""How many cases and how much time a run uses, depending on the requested effort and the robot's response time."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ _FEWEST = 3
 
 @dataclass(frozen=True)
 class Speed:
-    """Robots that answer about as fast get the same cases: so that a run stays bounded, and chance has no say in it.
+    """A class of robots with similar response times, which all get the same number of cases.
+
+    Fixed classes keep a run bounded and independent of small differences in time.
 
     Attributes:
         name: of the class.
-        up_to_ms: how long the slowest of them take for an answer, ms.
-        share: of the cases that a fast robot gets.
+        up_to_ms: the longest usual response time in the class, ms.
+        share: share of a fast robot's cases, 0 to 1.
     """
 
     name: str
@@ -34,7 +36,7 @@ class Speed:
 
     @property
     def remark(self) -> str:
-        """What a reader has to know of a run at this speed; empty where nothing was left out."""
+        """What a report says about omitted cases; empty if none were omitted."""
         if self.share == 1:
             return ""
         return (
@@ -44,7 +46,7 @@ class Speed:
 
     @property
     def says(self) -> str:
-        """Which robots are in the class, in words."""
+        """A description of the robots in the class."""
         before = max((speed.up_to_ms for speed in SPEEDS if speed.up_to_ms < self.up_to_ms), default=0.0)
         if self.up_to_ms == math.inf:
             return f"more than about {before:g} ms for an answer"
@@ -60,13 +62,13 @@ _CLEARLY = 1.25
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is tried.
+    """How much a run tries.
 
     Attributes:
         name: quick, standard or deep.
-        usual_ms: how long the robot usually takes to answer, ms.
-        minutes: how long a deep run should take, about.
-        speed: class of the robot by that.
+        usual_ms: the robot's usual response time, ms.
+        minutes: approximate duration of a deep run, min.
+        speed: the robot's class by response time.
     """
 
     name: str = "standard"
@@ -75,7 +77,7 @@ class Effort:
     speed: Speed = SPEEDS[0]
 
     def seen(self, usual_ms: float) -> Effort:
-        """The effort for a robot of which an interface usually answers within so many ms; never more than before."""
+        """Return the effort after an interface's usual response time was measured, ms; it never increases."""
         usual_ms = max(self.usual_ms, usual_ms)
         speeds = SPEEDS[SPEEDS.index(self.speed) :]
         speed = next(one for one in speeds if usual_ms <= _CLEARLY * one.up_to_ms)
@@ -83,31 +85,31 @@ class Effort:
 
     @property
     def factor(self) -> float:
-        """Cases in relation to standard effort against a fast robot."""
+        """Number of cases relative to standard effort with a fast robot."""
         return _FACTORS.get(self.name, max(1.0, self.minutes)) * self.speed.share
 
     def cases(self, standard: int) -> int:
-        """How many cases to try where ``standard`` are tried at standard effort; never fewer than three."""
+        """Return the number of cases where standard effort has ``standard``; at least three."""
         return max(min(_FEWEST, standard), round(standard * self.factor))
 
     @property
     def budget_s(self) -> float:
-        """Time after which one exploration stops looking for further cases, s."""
+        """Time after which one exploration stops trying further cases, s."""
         return _BUDGETS_S.get(self.name, 10.0 * max(1.0, self.minutes))
 
     @property
     def slow(self) -> bool:
-        """Whether each request costs so much time that few have to do (an Arduino takes hundreds of milliseconds)."""
+        """Whether the robot responds so slowly that only few requests are affordable, like an Arduino."""
         return self.speed.share < 1
 
     def subsample(self, items: Sequence[_Item], count: int) -> list[_Item]:
-        """All items with a robot that answers quickly; with a slow one ``count`` of them, spread evenly."""
+        """Return all items for a fast robot, and ``count`` evenly spaced ones for a slow robot."""
         if not self.slow or len(items) <= count:
             return list(items)
         return [items[index * len(items) // count] for index in range(count)]
 
     def draw(self, items: Sequence[_Item], standard: int, seed: str) -> list[_Item]:
-        """So many of the items as cases() says of ``standard``, in their order, the same ones for one seed."""
+        """Return ``cases(standard)`` of the items at random, in their order; the same ones for the same seed."""
         count = self.cases(standard)
         if len(items) <= count:
             return list(items)

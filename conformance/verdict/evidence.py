@@ -1,4 +1,4 @@
-"""The judge: checks and observers say what they saw, and it keeps the evidence, requirement by requirement."""
+"""The judge, which collects the evidence of checks and observers for each requirement."""
 
 from __future__ import annotations
 
@@ -31,30 +31,30 @@ _VALUES = re.compile(r"[-+]?\d[\d.e+-]*|'[^']*'|\"[^\"]*\"")
 
 
 class RefutedError(AssertionError):
-    """A property does not hold: tells Hypothesis to look for a smaller case. The judge has the evidence already."""
+    """Raised to make Hypothesis shrink a failing case. The judge has recorded the failure already."""
 
 
 class HarnessError(Exception):
-    """The suite made what the contract does not allow, and was about to send it as valid: never the robot's failure.
+    """Raised when the suite generated a valid request that the contract forbids: a bug of the suite, not of the robot.
 
-    What a check was to judge is in error then, and the run ends with 4 unless something else failed.
+    The requirements of the check then have an error, and the run ends with exit code 4 unless something else failed.
     """
 
 
 @dataclass
 class Evidence:
-    """What is known of one requirement.
+    """Everything known about one requirement.
 
     Attributes:
-        cases: how many cases were judged.
-        findings: causes of failure, by cause.
-        skips: reasons why something could not be judged that had to be.
-        errors: reasons why judging broke off.
+        cases: number of judged cases.
+        findings: findings by cause.
+        skips: reasons why a mandatory case could not be judged.
+        errors: reasons why judging was aborted.
         notes: remarks that change no verdict.
         checks: names of the checks that judged it.
         unclaimed: why it does not apply to a robot for which no classes were named.
-        unshown: how many cases failed in further ways than are kept as findings.
-        because: the finding of another requirement because of which this one could not be tested.
+        unshown: number of failed cases that are not kept as findings.
+        because: the finding of another requirement that prevented the test, or None.
     """
 
     cases: int = 0
@@ -69,21 +69,21 @@ class Evidence:
 
     @property
     def failures(self) -> int:
-        """Return how many cases failed."""
+        """Return the number of failed cases."""
         return sum(finding.seen for finding in self.findings.values()) + self.unshown
 
 
 class Judge:
-    """Collects evidence from checks and observers.
+    """Collects the evidence of checks and observers.
 
     Args:
-        known: the requirements, by id; or their ids alone.
+        known: the requirements by id, or their ids alone.
 
     Attributes:
         evidence: by requirement.
-        check_name: of the check that runs.
-        at_risk: the requirements that a hostile request is about to test; a robot that dies of it has failed them.
-        met: what the check that runs has found so far, newest last.
+        check_name: name of the running check.
+        at_risk: the requirements that fail if the robot stops responding during a hostile request.
+        met: findings of the running check, newest last.
         ended_by: the finding after which the robot stopped responding, or None.
     """
 
@@ -99,17 +99,17 @@ class Judge:
         self._by_rule = threading.local()
 
     def begin(self, check_name: str) -> None:
-        """Begin a check: what was sent before does not lead to its findings."""
+        """Start a check: earlier requests do not belong to the sequence that led to its findings."""
         self.check_name, self.at_risk, self.met = check_name, (), []
         self._sent.clear()
 
     def sent(self, request: Request) -> None:
-        """Take down that a request of the check went out."""
+        """Record that the check sent a request."""
         self._sent.append(Sent(time.monotonic(), request))
 
     @contextmanager
     def by_rule(self) -> Iterator[None]:
-        """Let what is judged meanwhile, in this thread, be rules of their own for whatever came, errors included."""
+        """Treat everything judged in this context, in this thread, as a broken rule of its own, even server errors."""
         self._by_rule.on = True
         try:
             yield
@@ -117,7 +117,7 @@ class Judge:
             self._by_rule.on = False
 
     def _led_to(self, exchange: Attempt | None) -> tuple[Sent, ...]:
-        """The requests up to that of an exchange, which may have gone over a socket that nobody listens to."""
+        """Return the check's requests up to that of an exchange, which may have used a raw socket without listeners."""
         sent = tuple(self._sent)
         if exchange is None:
             return sent
@@ -137,14 +137,14 @@ class Judge:
         cause: str = "",
         subject: str = "",
     ) -> bool:
-        """Judge one case, and go on whatever comes of it.
+        """Record whether one case meets a requirement.
 
         Args:
-            requirement: its id; one that the contract at hand does not have is ignored.
-            holds: whether the case meets it.
+            requirement: its id; ignored if the contract does not have it.
+            holds: whether the case meets the requirement.
             exchange: the evidence.
-            expected: what the requirement asks for here, in a few words.
-            found: what a look at the response showed; empty: status and media type are wrong by themselves.
+            expected: what the requirement demands here, as a noun phrase.
+            found: what the response showed; empty if status and media type alone are wrong.
             cause: failures of the same cause are one finding; by default the texts without their numbers.
             subject: what was tested; by default method and target of the request.
 
@@ -171,7 +171,7 @@ class Judge:
         cause: str,
         subject: str,
     ) -> None:
-        """Put a failed case down: as one more of a finding that there is, or as a new one."""
+        """Add a failed case to an existing finding of its cause, or as a new finding."""
         kind = self._kind(requirement, exchange, found)
         observed = observed_in(exchange, found)
         causes = causes_of(kind, exchange)
@@ -210,7 +210,7 @@ class Judge:
         self.met.append(finding)
 
     def _kind(self, requirement: str, exchange: Attempt | None, found: str) -> CauseKind:
-        """Return the kind of cause that keeps a requirement from being met."""
+        """Return the kind of cause of a failed case."""
         kind = kind_of(exchange, found)
         forbids = self._ledger[requirement].forbids if requirement in self._ledger else ()
         return CauseKind.RULE if getattr(self._by_rule, "on", False) and kind not in forbids else kind
@@ -225,20 +225,20 @@ class Judge:
         found: str = "",
         cause: str = "",
     ) -> None:
-        """Judge one case of a property: like check(), but a case that fails ends the example.
+        """Record whether one case of a property meets a requirement; a failed case ends the Hypothesis example.
 
         Raises:
-            RefutedError: it does not hold.
+            RefutedError: the case fails.
         """
         if not self.check(requirement, holds, exchange, expected, found=found, cause=cause):
             raise RefutedError(f"{requirement}: expected {expected}, got {observed_in(exchange, found)}")
 
     def skip(self, requirement: str, reason: str) -> None:
-        """Say that something which had to be judged could not be, and why."""
+        """Record why a mandatory case could not be judged."""
         self._say(requirement, reason, lambda evidence: evidence.skips)
 
     def error(self, requirement: str, reason: str) -> None:
-        """Say that judging broke off, and why."""
+        """Record why judging was aborted."""
         self._say(requirement, reason, lambda evidence: evidence.errors)
 
     def note(self, requirement: str, remark: str) -> None:
@@ -246,7 +246,7 @@ class Judge:
         self._say(requirement, remark, lambda evidence: evidence.notes)
 
     def unclaimed(self, requirement: str, reason: str) -> None:
-        """Say that the requirement does not apply: it needs an interface that nobody said was there."""
+        """Record why a requirement does not apply: no address was given for the interface that it needs."""
         if requirement in self.evidence:
             self.evidence[requirement].unclaimed = reason
 
@@ -256,19 +256,19 @@ class Judge:
             where(evidence).append(text)
 
     def refuted(self) -> dict[str, int]:
-        """Return how many failures each requirement that has any has seen so far."""
+        """Return the number of failures so far, by requirement."""
         return {id_: evidence.failures for id_, evidence in self.evidence.items() if evidence.findings}
 
     def counts(self, ids: Iterable[str]) -> dict[str, int]:
-        """Return how many cases each of the requirements has."""
+        """Return the number of cases by requirement."""
         return {id_: self.evidence[id_].cases for id_ in ids if id_ in self.evidence}
 
     def cases(self, requirement: str) -> int:
-        """Return how many cases a requirement has; 0 for one that the contract at hand does not have."""
+        """Return the number of cases of a requirement; 0 if the contract does not have it."""
         return self.evidence[requirement].cases if requirement in self.evidence else 0
 
     def stopped(self, requirement: str, reason: str) -> None:
-        """Say that a requirement was not tested because the run was called off, and why."""
+        """Record that a requirement was not tested because the run was aborted, and why."""
         evidence = self.evidence.get(requirement)
         if evidence is None:
             return

@@ -1,4 +1,4 @@
-"""Hypothesis as the maker and shrinker of cases; the judge, not Hypothesis, keeps what was found."""
+"""Explore cases with Hypothesis: it generates and shrinks them, and the judge records the failures."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 
 class Explorer:
-    """Runs properties with cases that depend on nothing but the run's seed and the check's name.
+    """Runs properties with cases that depend only on the run's seed and the check's name.
 
     Args:
         run_seed: seed of the run.
-        name: of the check.
-        effort: how much is tried, and for how long.
-        cut_short: takes down, by check, how many cases were made for which no time was left.
+        name: name of the check.
+        effort: how many cases, and how much time.
+        cut_short: the number of generated cases that time did not allow, by check; updated.
     """
 
     def __init__(self, run_seed: int, name: str, effort: Effort, cut_short: dict[str, int] | None = None) -> None:
@@ -40,15 +40,15 @@ class Explorer:
         self._count = 0
 
     def __call__(self, strategy: SearchStrategy[Any], try_case: Callable[[Any], None], *, cases: int) -> None:
-        """Try ``try_case`` on values of ``strategy``; a case that fails is made smaller.
+        """Call ``try_case`` with values of ``strategy``, and shrink a failing value.
 
         Args:
-            strategy: makes values.
-            try_case: sends requests and asks the judge; judge.require() ends it when a case fails.
-            cases: how many at standard effort.
+            strategy: generates values.
+            try_case: sends requests and calls the judge; judge.require() ends a failing case.
+            cases: number of cases at standard effort.
 
         Raises:
-            NoAnswerError: the robot did not answer.
+            NoAnswerError: the robot did not respond.
         """
         until = time.monotonic() + self._effort.budget_s
         silence: list[NoAnswerError] = []
@@ -76,10 +76,10 @@ class Explorer:
             raise silence[0]
 
     def machine(self, factory: Callable[[], RuleBasedStateMachine], *, cases: int, steps: int) -> None:
-        """Run a state machine: ``cases`` walks of up to ``steps`` rules at standard effort.
+        """Run a Hypothesis state machine: ``cases`` sequences of up to ``steps`` steps at standard effort.
 
         Raises:
-            NoAnswerError: the robot did not answer.
+            NoAnswerError: the robot did not respond.
         """
         # Walks are not made smaller: with a robot that moves, each try would cost seconds.
         chosen = settings(self._settings(cases), stateful_step_count=steps, phases=(Phase.generate,))
@@ -88,7 +88,7 @@ class Explorer:
         _swallow_refuted(lambda: run_state_machine_as_test(seeded, settings=chosen))
 
     def left_out(self, cases: int) -> None:
-        """Take down that cases which were made were not tried for want of time."""
+        """Record how many generated cases were not tried because time ran out."""
         if cases:
             self._cut_short[self._name] = self._cut_short.get(self._name, 0) + cases
 
@@ -111,9 +111,9 @@ class Explorer:
 
 
 def _swallow_refuted(run: Callable[[], object]) -> None:
-    """Run a property whose failures the judge has seen.
+    """Run a property and ignore failures, which the judge has recorded.
 
-    An intermittent failure does not come again when Hypothesis looks at it once more; it was one all the same.
+    This includes Hypothesis's error about an intermittent failure that it cannot reproduce.
     """
     try:
         run()

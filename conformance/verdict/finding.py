@@ -1,4 +1,4 @@
-"""Findings: what the suite did, what it expected by which rule, and what it got; and the one text that says so."""
+"""Findings, and their text: what the suite did, what it expected by which rule, and what it got."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ class Sent(NamedTuple):
 
 
 class Again(NamedTuple):
-    """How often a failure came back when its request was sent again.
+    """How often a failure occurred again when its request was repeated.
 
     Attributes:
-        came_back: how often the response failed, or was of the same kind.
-        sent: how often the request was sent.
-        judged: whether an observer judged each response; else only their kind was compared.
+        came_back: number of repetitions that failed in the same way.
+        sent: number of repetitions.
+        judged: whether an observer judged each response; otherwise only the kinds of the responses were compared.
     """
 
     came_back: int
@@ -54,24 +54,24 @@ class Again(NamedTuple):
 
 @dataclass
 class Finding:
-    """One reason for which a requirement is not met.
+    """One reason why a requirement is not met.
 
     Attributes:
         requirement: id of the requirement.
-        source: the text that the requirement quotes.
+        source: the clause that the requirement cites.
         subject: what was tested: ``GET /robot/pose/``.
-        expected: what the requirement asks for here.
-        observed: what came instead.
-        exchange: the smallest failing request with what became of it, or None where none was sent.
+        expected: what the requirement demands here.
+        observed: what the suite got instead.
+        exchange: the smallest failing request with its result, or None if none was sent.
         cause: the kind of cause.
-        causes: what identifies the causes that it was found with; another finding may have them as well.
-        among: for how many requirements at once it was put down; 1: a check judged this one by itself.
-        alone: whether this requirement keeps the finding, because its request ended the robot.
-        seen: how often it was found.
-        sequence: the requests of its check up to it, so that they can be sent again.
-        again: how often it came back; None: it was not tried again.
-        met: the place in the order in which the run met its findings.
-        number: its place among the findings of a result; 0 until the run is over.
+        causes: keys of its causes; findings with a common key have the same cause.
+        among: number of requirements that the same check recorded it for.
+        alone: whether only this requirement keeps the finding, because its request made the robot stop responding.
+        seen: number of failed cases.
+        sequence: the requests of its check up to the failing one, for replay.
+        again: the result of repeating the request; None if it was not repeated.
+        met: position in the order in which the run recorded findings.
+        number: its number in the result; 0 until the run is over.
     """
 
     requirement: str
@@ -92,12 +92,12 @@ class Finding:
 
     @property
     def unsent(self) -> bool:
-        """Return whether the request was not even sent, because its endpoint had hung before."""
+        """Return whether the request was not sent because its endpoint had hung before."""
         return isinstance(self.exchange, Unanswered) and self.exchange.kind is NoAnswer.CIRCUIT_OPEN
 
     @property
     def text(self) -> str:
-        """Return the finding in words: what the suite did, what it expected, what it got, and how often."""
+        """Return the finding as text: what the suite did, what it expected, what it got, and how often."""
         rule = ", ".join(filter(None, (self.requirement, self.source)))
         did = f"Sent {_described(self.exchange.request)}." if self.exchange else f"Tested {self.subject}."
         parts = [did, f"Expected {_clause(self.expected)} ({rule}).", f"Got {_clause(self.observed)}."]
@@ -113,20 +113,20 @@ class Finding:
 
     @property
     def brief(self) -> str:
-        """Return subject and observation, for a sentence that points to the finding."""
+        """Return subject and observation, for a reference to the finding."""
         return f"{self.subject}: {_clause(self.observed)}"
 
 
 def in_full(finding: Finding) -> str:
-    """Return a finding in words, with a command that sends its request again."""
+    """Return the finding as text, with a command that sends its request again."""
     curl = f"\n  {finding.exchange.request.curl()[:_SHOWN_CURL]}" if finding.exchange else ""
     return f"{finding.text}{curl}"
 
 
 def kind_of(exchange: Attempt | None, found: str = "") -> CauseKind:
-    """Return the kind of cause that an exchange is by itself; RULE where a well-formed response came.
+    """Return the kind of cause of an exchange; RULE if a well-formed response was received.
 
-    Where a check found something else than that, such as an effect of the request, the finding breaks its own rule.
+    If a check found something else, such as a wrong effect of the request, the kind is RULE as well.
     """
     if isinstance(exchange, Unanswered):
         return _KINDS[exchange.kind] if not found or exchange.problem in found else CauseKind.RULE
@@ -144,9 +144,9 @@ def kind_of(exchange: Attempt | None, found: str = "") -> CauseKind:
 
 
 def causes_of(kind: CauseKind, exchange: Attempt | None) -> set[str]:
-    """Return what identifies a cause that other checks may meet as well: kind, endpoint and, if any, status.
+    """Return the keys of a cause that other checks may meet as well: kind, endpoint and status, if any.
 
-    The set is empty where a response breaks a rule: that is no other requirement's cause.
+    The set is empty for a broken rule, which is no other requirement's cause.
     """
     if kind is CauseKind.RULE or exchange is None:
         return set()
@@ -160,7 +160,7 @@ def causes_of(kind: CauseKind, exchange: Attempt | None) -> set[str]:
 
 
 def subject_of(exchange: Attempt | None, check_name: str) -> str:
-    """Return what was tested: method and target of the request; the check where no request was sent."""
+    """Return what was tested: method and target of the request, or the check's name if none was sent."""
     if exchange is None:
         return f"by the check {check_name}" if check_name else "the robot"
     request = exchange.request
@@ -168,7 +168,7 @@ def subject_of(exchange: Attempt | None, check_name: str) -> str:
 
 
 def observed_in(exchange: Attempt | None, found: str) -> str:
-    """Return what came: the response in a few words, with what a check found in it."""
+    """Return a description of the response, with what a check found in it."""
     if exchange is None:
         return found or "something else"
     if isinstance(exchange, Unanswered):
@@ -187,7 +187,7 @@ def observed_in(exchange: Attempt | None, found: str) -> str:
 
 
 def _described(request: Request) -> str:
-    """Return a request in a few words: its first line, what is special in its fields, and its body."""
+    """Return a short description of a request: first line, unusual headers, body."""
     if request.raw is not None:
         return f"the bytes {_quoted(request.raw)}"
     what = f"`{request.method} {_cut(request.target, _SHOWN_TARGET)}`"
@@ -215,5 +215,5 @@ def _cut(text: str, most: int) -> str:
 
 
 def _clause(text: str) -> str:
-    """Return a text as a part of a sentence, which ends with its own full stop."""
+    """Return a text without its final period, for use inside a sentence."""
     return text.strip().removesuffix(".")

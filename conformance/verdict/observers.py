@@ -1,4 +1,4 @@
-"""Observers judge every exchange of a run, whatever check it belongs to."""
+"""Observers: judge every exchange of a run, whichever check sent it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 
 class Observers(Listener):
-    """Has observers judge every exchange; what they judge holds for every response, errors included.
+    """Calls observers with every exchange. What they judge holds for every response, errors included.
 
     Args:
-        judge: takes what they see.
-        observers: each is shown every exchange.
+        judge: records their judgements.
+        observers: the observers.
     """
 
     def __init__(self, judge: Judge, observers: Iterable[Listener]) -> None:
@@ -26,13 +26,13 @@ class Observers(Listener):
         self._observers = tuple(observers)
 
     def answered(self, exchange: Exchange) -> None:
-        """Show an exchange to each observer."""
+        """Call each observer with an exchange."""
         with self._judge.by_rule():
             for observer in self._observers:
                 observer.answered(exchange)
 
     def unanswered(self, request: Unanswered) -> None:
-        """Show a request without a response to each observer."""
+        """Call each observer with a request without a response."""
         with self._judge.by_rule():
             for observer in self._observers:
                 observer.unanswered(request)

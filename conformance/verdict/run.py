@@ -1,4 +1,4 @@
-"""What one run knows: what is claimed of a robot, what may be done to it, and what has been found so far."""
+"""The data of one run: the statement, what is judged and allowed, and the evidence so far."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
 
 
 def seed_of_nonce(nonce: str) -> int:
-    """The seed of a run that a relying party asked for with a nonce: it could not be known before; 48 bits."""
+    """Return the run's seed for a nonce of a relying party: 48 bits that nobody could know before."""
     return int.from_bytes(hashlib.sha256(b"roaas-nonce/1\0" + nonce.encode()).digest()[:6])
 
 
 @dataclass(frozen=True)
 class Given:
-    """What a run was asked with, for whoever checks its result.
+    """The inputs of a run that a verifier of its result needs.
 
     Attributes:
-        statement: digest of the statement's file, as `sha256:…`; None where there was none.
-        baseline: digest of the file of accepted failures, likewise.
-        nonce: what the relying party chose, or None.
-        places: where in their files claims and requirements stand, as result.json has it.
+        statement: digest of the statement file as `sha256:…`, or None.
+        baseline: digest of the baseline file as `sha256:…`, or None.
+        nonce: chosen by the relying party, or None.
+        places: lines of claims and requirements in their files, as in result.json.
     """
 
     statement: str | None = None
@@ -40,22 +40,22 @@ class Given:
 
 @dataclass
 class Run:
-    """One run: data only, whoever is connected to what.
+    """The data of one run, without connections.
 
     Attributes:
-        statement: what the vendor says, options applied.
-        contract: what the robot is judged by.
+        statement: the vendor's statement, with command line options applied.
+        contract: the contract that the robot is judged by.
         claims: the classes that are judged.
         allow_motion: whether the robot may be moved.
-        seed: of everything random.
-        requirement_set: what the robot is scored by, or None for all of the contract.
-        given: what is told of that in the result, beside the statement.
-        effort: how much is tried; lessened once it is known how slowly the robot answers.
-        judge: what has been found.
-        aborted: why the robot cannot be asked any more, or empty.
-        interrupted: whether somebody broke the run off.
-        unreachable: why an interface was not reached at the start.
-        cut_short: by check, how many of the cases that were made for it were not tried for want of time.
+        seed: seed of everything random.
+        requirement_set: the frozen set that scores the robot, or None for the whole contract.
+        given: inputs that the result repeats, beside the statement.
+        effort: how much is tried; reduced when the robot responds slowly.
+        judge: the evidence.
+        aborted: why the run was aborted, or empty.
+        interrupted: whether the user interrupted the run.
+        unreachable: why an interface was not reachable at the start.
+        cut_short: number of generated cases that time did not allow, by check.
     """
 
     statement: Statement = field(default_factory=lambda: empty_statement(Contract.load()))
@@ -77,7 +77,7 @@ class Run:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a reader has to know of how much was tried: what was left out because answers, or cases, took long."""
+        """Remarks for the report about cases that were omitted because responses took long or time ran out."""
         found = [self.effort.speed.remark] if self.effort.speed.remark else []
         if self.cut_short:
             checks = ", ".join(f"{name} ({count} cases)" for name, count in sorted(self.cut_short.items()))

@@ -1,7 +1,7 @@
-"""From evidence to verdicts. The rules are here; a baseline may change what they say.
+"""The rules that turn evidence into verdicts; a baseline may change the verdicts afterwards.
 
-MUST fails, SHOULD warns, MAY informs. Skip outranks pass: a class with a MUST that could not be judged is
-inconclusive, never passed; so is one of which nothing was judged.
+A failed MUST is a fail, a failed SHOULD a warning, a failed MAY information. Not tested outranks pass: a class with an
+untested MUST, or without any judged case, is inconclusive.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ NOT_SEEN = "it was not seen in this run, so it is not judged"
 
 
 class Value(StrEnum):
-    """What can be said of one requirement."""
+    """The verdict on one requirement."""
 
     PASS = "pass"  # noqa: S105 - no password
     FAIL = "fail"
@@ -37,7 +37,7 @@ class Value(StrEnum):
 
 
 class ClassValue(StrEnum):
-    """What can be said of a conformance class."""
+    """The verdict on a conformance class."""
 
     PASS = "pass"  # noqa: S105 - as above
     FAIL = "fail"
@@ -46,7 +46,7 @@ class ClassValue(StrEnum):
 
 
 class Overall(StrEnum):
-    """What can be said of a robot."""
+    """The verdict on a robot."""
 
     CONFORMANT = "conformant"
     NOT_CONFORMANT = "not-conformant"
@@ -54,7 +54,7 @@ class Overall(StrEnum):
 
 
 class View(StrEnum):
-    """From where a robot was seen."""
+    """What observed a class: the web services alone, or ROS too."""
 
     BLACK_BOX = "black box"  # through its web services alone
     ON_ROS = "seen on ROS"  # by a probe as well
@@ -62,15 +62,15 @@ class View(StrEnum):
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is said of one requirement.
+    """The verdict on one requirement, with its reason and evidence.
 
     Attributes:
-        requirement: which.
-        value: what is said of it.
-        reason: why, where it is not simply passed.
-        evidence: what was seen.
-        scored: whether it counts; what is newer than the set of requirements that a run is scored by does not.
-        expected_failure: reason and last day of the baseline's entry that accepts the failure, or None.
+        requirement: the requirement.
+        value: the verdict.
+        reason: why, unless it simply passed.
+        evidence: what the run recorded.
+        scored: whether it counts; requirements newer than the set that scores the run do not.
+        expected_failure: reason and last day of the baseline entry that accepts the failure, or None.
     """
 
     requirement: Requirement
@@ -82,7 +82,7 @@ class Verdict:
 
     @property
     def because(self) -> Finding | None:
-        """Return the finding of another requirement because of which this one was not tested."""
+        """Return the finding of another requirement that prevented the test, or None."""
         return self.evidence.because if self.value in {Value.SKIP, Value.WARN} else None
 
 
@@ -92,13 +92,13 @@ def verdict_of(
     claims: Iterable[str],
     undeclared: Mapping[str, str] = MappingProxyType({}),
 ) -> Verdict:
-    """Judge one requirement by its evidence.
+    """Return the verdict on one requirement.
 
     Args:
-        requirement: which.
-        evidence: what was seen.
-        claims: the classes that are claimed.
-        undeclared: why what needs a figure is not judged, by the prerequisite that the statement does not declare.
+        requirement: the requirement.
+        evidence: what the run recorded.
+        claims: the claimed classes.
+        undeclared: why requirements are not judged whose prerequisite the statement does not declare, by prerequisite.
     """
 
     def verdict(value: Value, reason: str = "") -> Verdict:
@@ -131,7 +131,7 @@ def verdict_of(
 
 
 def score(verdicts: Iterable[Verdict], requirements: Container[str], name: str) -> list[Verdict]:
-    """Keep what is newer than a set of requirements from counting: it is shown, and no more than a warning."""
+    """Mark requirements outside a frozen set as not counting: their failures become warnings."""
     return [
         verdict if verdict.requirement.id in requirements else _unscored(verdict, f"newer than {name}, and not scored")
         for verdict in verdicts
@@ -144,7 +144,7 @@ def _unscored(verdict: Verdict, told: str) -> Verdict:
 
 
 def class_verdicts(verdicts: Iterable[Verdict], claims: Iterable[str]) -> dict[str, tuple[ClassValue, str]]:
-    """Verdict and reason for each class that has requirements: pass, fail, inconclusive or not-claimed."""
+    """Return verdict and reason of each class that has requirements: pass, fail, inconclusive or not-claimed."""
     by_class: dict[str, list[Verdict]] = {}
     for verdict in verdicts:
         by_class.setdefault(verdict.requirement.class_, []).append(verdict)
@@ -174,7 +174,7 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
 
 
 def views(verdicts: Iterable[Verdict]) -> dict[str, View]:
-    """How each claimed class was looked at that a look at the ROS side could have judged further."""
+    """Return what observed each claimed class that a ROS probe could judge further."""
     seen: dict[str, View] = {}
     for verdict in verdicts:
         if verdict.value is Value.NOT_CLAIMED or Prerequisite.PROBE not in verdict.requirement.needs:
@@ -185,10 +185,9 @@ def views(verdicts: Iterable[Verdict]) -> dict[str, View]:
 
 
 def _holds_back(requirement: Requirement) -> bool:
-    """Whether a class waits for this requirement to be judged.
+    """Return whether a class is inconclusive until this requirement is judged.
 
-    What only a ROS probe can see is judged when there is one; a robot without ROS at hand is not held back by it, nor
-    one by what it did not happen to do.
+    Requirements that only a ROS probe can judge, or that depend on something that did not occur, do not hold back.
     """
     return (
         requirement.level is Level.MUST
@@ -198,7 +197,7 @@ def _holds_back(requirement: Requirement) -> bool:
 
 
 def overall(classes: Mapping[str, tuple[ClassValue, str]]) -> Overall:
-    """conformant, not-conformant or inconclusive."""
+    """Return the verdict on the robot: conformant, not-conformant or inconclusive."""
     values = {value for value, _ in classes.values()} - {ClassValue.NOT_CLAIMED}
     if ClassValue.FAIL in values:
         return Overall.NOT_CONFORMANT
