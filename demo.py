@@ -1,4 +1,4 @@
-"""``make demo``: the whole job on this machine. A robot, its certification, a load test, and the reports."""
+"""``make demo``: start a robot, certify it, run a load test, and write the reports, all on this machine."""
 
 import argparse
 import json
@@ -16,29 +16,29 @@ from pathlib import Path
 from typing import Any
 
 from conformance.commandline.exit_codes import ExitCode
+from conformance.selftest.robots import stopped
 
 _ROAAS = (sys.executable, "-m", "roaas")
 _START_S = 60
-_STOP_S = 10
-# One operation and the client that takes least of the processor: on a machine that others use as well, robot and
-# generator together stay far from what it can do, and the difference is told from noise after half a minute.
+# One operation, and the client that needs the least processor time. So robot and load generator do not overload a
+# shared machine, and the difference is significant after half a minute.
 _MEASURED = ("--operation", "delivery", "--client", "wire", "--rate", "200", "--warmup", "1")
 _STATEMENT = Path(__file__).parent / "reference_robot" / "statement.toml"
 
 
 def main() -> int:
-    """Run the demo; the exit code is the certification's, or the load test's where the robot conforms.
+    """Run the demo; return the exit code of the certification, or of the load test if the robot conforms.
 
-    A measurement that carries no statement is no failure here: it says so, and tells of a busy machine.
+    A load test without a significant result does not fail the demo; it only means that the machine is busy.
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for results and reports [out]")
     parser.add_argument("--duration", type=float, default=25.0, help="seconds of load [25]")
     options = parser.parse_args()
     started = time.monotonic()
-    # What ends a CI job takes the robot with it, like Ctrl-C.
+    # SIGTERM, which ends a CI job, stops the robot too, like Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    # A domain of its own, so that no other robot on this machine is in the conversation.
+    # A ROS domain that other robots on this machine probably do not use.
     domain = random.SystemRandom().randint(1, 101)
     _say("1/3", f"starting the reference robot on ROS domain {domain}")
     with _robot(domain) as (rest, soap):
@@ -55,33 +55,26 @@ def main() -> int:
 
 @contextmanager
 def _robot(domain: int) -> Iterator[tuple[str, str]]:
-    """The reference robot on free ports; yields its REST base URL and its publishers' WSDL."""
+    """Run the reference robot on free ports; yield the REST base URL and the WSDL URL of the publishers' service."""
     command = [*_ROAAS, "robot", "--rest-port", "0", "--soap-port", "0", "--domain-id", str(domain)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)  # noqa: S603 - ours
-    # A robot that never gets ready must not keep the demo waiting.
-    watchdog = threading.Timer(_START_S, process.kill)
-    watchdog.start()
-    try:
+    with stopped(process):
+        # Kill a robot that never gets ready, so that the demo does not wait for ever.
+        watchdog = threading.Timer(_START_S, process.kill)
+        watchdog.daemon = True
+        watchdog.start()
         line = process.stdout.readline() if process.stdout else ""
+        watchdog.cancel()
         ready = re.match(r"ready rest=(\S+) soap=(\S+)", line)
         if ready is None:
-            raise SystemExit(f"the robot did not get ready within {_START_S} s (it said {line!r})")
-        watchdog.cancel()
+            raise SystemExit(f"the robot did not get ready within {_START_S} s (it printed {line!r})")
         yield ready[1], ready[2]
-    finally:
-        watchdog.cancel()
-        process.terminate()
-        try:
-            process.wait(_STOP_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
 
 
 def _roaas(*arguments: str) -> int:
-    # The robot's libraries set up their own environment; each command is to start from a clean one.
+    # Each command starts with an environment without the robot's domain.
     environment = {key: value for key, value in os.environ.items() if key != "ROS_DOMAIN_ID"}
-    # Progress and complaints are on standard error; what was found stands in the files, and the summary says it.
+    # Progress and errors go to standard error; the results go to files, which the summary reads.
     command = [*_ROAAS, *arguments]
     return subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=False).returncode  # noqa: S603 - ours
 

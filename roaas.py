@@ -1,6 +1,7 @@
-"""The front door: the command ``roaas``, which hands each subcommand to its room.
+"""The command ``roaas``: finds each subcommand in its package ("room") and runs it.
 
-Rooms are imported when their command is used, so that ``roaas certify`` needs neither ROS nor Locust.
+The rooms are the packages conformance, loadtests, reference_robot and reports. A room is imported only when its command
+is used, so that ``roaas certify`` needs neither ROS nor Locust.
 """
 
 from __future__ import annotations
@@ -14,93 +15,85 @@ from typing import Any
 
 import click
 
+# The module of each command, in which the command has its own name, and the summary in `roaas --help`, which is given
+# here so that it need not import every package.
 _COMMANDS = {
-    "robot": ("reference_robot.cli", "robot"),
-    "certify": ("conformance.cli.certify", "certify"),
-    "load": ("loadtests.cli", "load"),
-    "replay": ("conformance.cli.replay", "replay"),
-    "report": ("reports.cli.pages", "report"),
-    "compare": ("reports.cli.pages", "compare"),
-    "diff": ("reports.cli.difference", "diff"),
-    "keygen": ("reports.cli.attestation", "keygen"),
-    "sign": ("reports.cli.signing", "sign"),
-    "verify": ("reports.cli.attestation", "verify"),
-    "registry": ("reports.cli.registry", "registry"),
-    "selftest": ("conformance.cli.selftest", "selftest"),
-    "contract": ("conformance.cli.contract", "contract"),
+    "robot": ("reference_robot.cli", "Run the reference robot."),
+    "certify": ("conformance.cli.certify", "Judge a robot by its contract."),
+    "load": ("loadtests.cli", "Measure SOAP against REST."),
+    "replay": ("conformance.cli.replay", "Send a finding's requests again, and report whether it persists."),
+    "report": ("reports.cli.pages", "Write the pages from the result files again."),
+    "compare": ("reports.cli.pages", "Show whether a robot got slower between two load tests."),
+    "diff": ("reports.cli.difference", "Show what changed between two results: new failures, fixed, lost coverage."),
+    "keygen": ("reports.cli.attestation", "Make a key pair for signing results."),
+    "sign": ("reports.cli.signing", "Sign a result, so that others can verify the signer."),
+    "verify": ("reports.cli.attestation", "Check a signed certificate, and whether it meets your policy."),
+    "registry": (
+        "reports.cli.registry",
+        "Make a static site from signed certificates: which robot passed which classes.",
+    ),
+    "selftest": ("conformance.cli.selftest", "Test the suite: it must kill mutants, and must not fail a good device."),
+    "contract": ("conformance.cli.contract", "Show the requirements, export the contract's files."),
 }
-# What `roaas --help` says of them, so that it need not import every room.
-_SUMMARIES = {
-    "robot": "Run the reference robot.",
-    "certify": "Judge a robot by its contract.",
-    "load": "Measure SOAP against REST.",
-    "replay": "Send a finding's requests again, and say whether it is still there.",
-    "report": "Write the pages from the result files again.",
-    "compare": "Show whether a robot got slower between two load tests.",
-    "diff": "Show what changed between two results: new failures, fixed, lost coverage.",
-    "keygen": "Make a key pair for signing results.",
-    "sign": "Sign a result, so that others can check who vouches for it.",
-    "verify": "Check a signed certificate, and whether it meets your policy.",
-    "registry": "Make a static site from signed certificates: which robot passed which classes.",
-    "selftest": "Test the suite: it must kill mutants, and must not fail a good device.",
-    "contract": "Show the requirements, export the contract's files.",
-}
-_EXTRAS = {"robot": "robot", "load": "load"}
+_EXTRAS = {"robot", "load"}  # commands that need the optional dependencies of the same name
 _ROOMS = {"conformance", "loadtests", "reference_robot", "reports"}
 _INSTALLED = Path(__file__).with_name("roaas_rooms")
 
 
 def open_rooms() -> None:
-    """Let this process, and those that it starts, import the rooms.
+    """Make the packages of RoAAS importable in this process and in the processes that it starts.
 
-    In a checkout they lie beside this file. A wheel has them in a folder of its own, because nobody else's module
-    named `reports` or `conformance` should be shadowed by ours, nor ours by theirs.
+    In a checkout the packages are next to this file. A wheel installs them in the folder ``roaas_rooms``, so that names
+    such as `reports` and `conformance` do not collide with other installed packages.
     """
     folder = str(_INSTALLED)
     if folder in sys.path or not _INSTALLED.is_dir():
         return
     sys.path.insert(0, folder)
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (folder, os.environ.get("PYTHONPATH"))))
-    # `python -m`, by which rooms start processes, would look into the working directory first.
+    # Otherwise `python -m`, with which packages start processes, would search the working directory first.
     os.environ["PYTHONSAFEPATH"] = "1"
 
 
 class _Rooms(click.Group):
-    """A click group whose subcommands live in the rooms."""
+    """The click group of all subcommands; it imports a subcommand's module when the subcommand is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         return list(_COMMANDS)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click's
         with formatter.section("Commands"):
-            formatter.write_dl(list(_SUMMARIES.items()))
+            formatter.write_dl([(name, summary) for name, (_, summary) in _COMMANDS.items()])
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
             return None
         open_rooms()
-        module, name = _COMMANDS[cmd_name]
+        module, _ = _COMMANDS[cmd_name]
         try:
-            command = getattr(import_module(module), name)
+            command = getattr(import_module(module), cmd_name)
         except ModuleNotFoundError as missing:
             if cmd_name not in _EXTRAS or (missing.name or "").split(".")[0] in _ROOMS:
                 raise
             raise click.UsageError(
                 f"'roaas {cmd_name}' needs the Python module {missing.name!r}, which is not installed: "
-                f"pip install 'roaas[{_EXTRAS[cmd_name]}]'",
+                f"pip install 'roaas[{cmd_name}]'",
                 ctx,
             ) from missing
         if not isinstance(command, click.Command):
-            raise TypeError(f"{module}.{name} is no command")
+            raise TypeError(f"{module}.{cmd_name} is not a command")
         return command
 
 
 class FrontDoor:
-    """What a room asks of another one."""
+    """Functions through which one package uses another without importing it.
+
+    Commands get an instance as click's context object.
+    """
 
     @staticmethod
     def notary(key: Path) -> Any:
-        """Have the reports room read a private key before a run that is to be signed by it."""
+        """Return a signer that holds the private key in a file, read before the run whose results it will sign."""
         try:
             return import_module("reports.attestation.signing").Notary(key)
         except import_module("reports.errors").ReportError as error:
@@ -108,13 +101,13 @@ class FrontDoor:
 
     @staticmethod
     def render(written: Path, notary: Any = None) -> None:
-        """Have the reports room render, and sign, what a command wrote, also when it failed or was interrupted."""
+        """Write, and optionally sign, the reports for a result file, also after a failed or interrupted run."""
         for path in import_module("reports.rendering").render(written.parent, notary):
             click.echo(f"report: {path}")
 
     @staticmethod
     def compare(old: Path, new: Path, threshold: float) -> int:
-        """Have the reports room say what changed between two latency results; returns the exit code."""
+        """Print what changed between two latency result files; return the exit code."""
         pages = import_module("reports.cli.pages")
         try:
             code: int = pages.tell_change(old, new, threshold)
@@ -125,7 +118,7 @@ class FrontDoor:
 
     @staticmethod
     def history(folder: Path) -> None:
-        """Have the reports room write the history of the results that are stored in a folder."""
+        """Write the page with the history of the latency results stored in a folder."""
         try:
             for path in import_module("reports.latency.history").write_history(folder):
                 click.echo(f"history: {path}")
@@ -134,7 +127,7 @@ class FrontDoor:
 
     @staticmethod
     def known(pack: str | None) -> dict[str, Any]:
-        """Return what the installed suite knows of a contract pack: digest, requirement sets, profiles."""
+        """Return what the installed suite contains for a contract pack: digest, requirement sets, profiles."""
         try:
             known: dict[str, Any] = import_module("conformance.engine.suite").known(pack)
         except import_module("conformance.contract.locating").ContractError as error:
@@ -146,12 +139,12 @@ class FrontDoor:
 @click.version_option(package_name="roaas", prog_name="roaas")
 def main() -> None:
     """Conformance and load tests for robots that are web services."""
-    # What ends a command in a container or a CI job cleans up like Ctrl-C; some commands have a handler of their own.
+    # SIGTERM, sent by containers and CI jobs, cleans up like Ctrl-C; some commands install their own handler.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 def load_node() -> None:
-    """The command ``roaas-load-node``: a load test's master or one of its workers, on a machine of its own."""
+    """Run the command ``roaas-load-node``: the master or a worker of a load test that is spread over machines."""
     open_rooms()
     import_module("loadtests.node").main(sys.argv[1:])
 

@@ -1,7 +1,7 @@
-"""The checks in a pytest project of one's own: ``pytest -p roaas_pytest --pyargs conformance --robot-rest URL``.
+"""The pytest plugin for use in any project: ``pytest -p roaas_pytest --pyargs conformance --robot-rest URL``.
 
-It is asked for by name. As an entry point of pytest's it would be loaded in every run of everybody who installed the
-suite, and take the name `conformance` from their own modules.
+The plugin is loaded by ``-p`` and is not an entry point of pytest. An entry point would be loaded in every pytest run
+of everybody who installed the suite, and its package `conformance` would hide a module of theirs with that name.
 """
 
 from roaas import open_rooms

@@ -1,4 +1,4 @@
-"""Deliver the paper's coffee over REST, and watch it: ``python examples/deliver_rest.py [URL]``."""
+"""Order the paper's coffee over REST and print the robot's progress: ``python examples/deliver_rest.py [URL]``."""
 
 import sys
 import time

@@ -1,4 +1,4 @@
-"""Deliver the paper's coffee over SOAP: ``python examples/deliver_soap.py [WSDL]``."""
+"""Order the paper's coffee over SOAP: ``python examples/deliver_soap.py [WSDL]``."""
 
 import sys
 

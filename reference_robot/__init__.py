@@ -1,1 +1,1 @@
-"""A robot that conforms: ROS 2 interfaces, a simulated robot, and the web services in front of it."""
+"""The reference robot: a simulated ROS 2 robot, and REST and SOAP web services in front of its ROS nodes."""

@@ -1,4 +1,4 @@
-"""``python -m reference_robot`` is ``roaas robot``."""
+"""Run the command ``roaas robot`` for ``python -m reference_robot``."""
 
 from reference_robot.cli import robot
 

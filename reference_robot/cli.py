@@ -1,4 +1,4 @@
-"""The command ``robot``: the simulated robot and its web services, or the web services alone."""
+"""The command ``roaas robot``: starts the simulated robot and its web services, or the web services alone."""
 
 import sys
 from importlib import import_module
@@ -14,7 +14,7 @@ _HIGHEST_DOMAIN_ID: Final = 101
 _FILE: Final = click.Path(exists=True, dir_okay=False, path_type=Path)
 _PORT: Final = click.IntRange(0, 65535)
 
-# What must be importable, and where it comes from.
+# Modules that the robot imports, and how to install them.
 _NEEDED: Final = {
     "rclpy": "ROS 2 Jazzy: pip install 'roaas[ros]', or apt's ros-jazzy-rclpy and `source /opt/ros/jazzy/setup.bash`",
     "mybot_delivery_app.msg": "the interface package: pip install reference_robot/interfaces/mybot_delivery_app",
@@ -30,7 +30,7 @@ _NEEDED: Final = {
 @click.command(cls=RosCommand)
 @click.option("--config", type=_FILE, help="TOML file of names, limits and deadlines.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
-@click.option("--insecure", is_flag=True, help="Let everybody who reaches --host drive the robot, without a token.")
+@click.option("--insecure", is_flag=True, help="Let every client that reaches --host drive the robot without a token.")
 @click.option("--rest-port", type=_PORT, default=7003, show_default=True, help="0 takes a free one.")
 @click.option("--soap-port", type=_PORT, default=5555, show_default=True, help="0 takes a free one.")
 @click.option(
@@ -51,39 +51,39 @@ _NEEDED: Final = {
 @click.option(
     "--realistic",
     is_flag=True,
-    help="Simulate a robot like a real one: odometry that is slow, noisy and drifts, wheels that slip, late commands.",
+    help="Simulate imperfections: slow odometry with noise and drift, wheels that slip, commands that arrive late.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Which realistic robot.")
-@click.option("--token-file", type=_FILE, help="Ask for a bearer token in this file, with its scopes.")
-@click.option("--tls-cert", type=_FILE, help="Serve HTTPS with this certificate, or chain, in PEM.")
-@click.option("--tls-key", type=_FILE, help="The certificate's private key in PEM.")
+@click.option("--seed", type=int, default=0, show_default=True, help="With --realistic: which imperfections.")
+@click.option("--token-file", type=_FILE, help="Require a bearer token from this file; scopes limit its use.")
+@click.option("--tls-cert", type=_FILE, help="Serve HTTPS with this certificate or chain (PEM).")
+@click.option("--tls-key", type=_FILE, help="Private key of the certificate (PEM).")
 @click.option(
     "--allowed-host",
     multiple=True,
     metavar="NAME",
-    help="Answer to this name as well; .NAME: and to all below it. Repeatable.",
+    help="Accept this host name too; .NAME accepts all names below NAME. Repeatable.",
 )
 @click.option(
     "--public-url",
     multiple=True,
     metavar="[rest=|soap=]URL",
-    help="Where clients find the robot, or one of its interfaces, behind a proxy. Repeatable.",
+    help="Address of the robot, or of one interface, as clients see it through a proxy. Repeatable.",
 )
 @click.option(
     "--trusted-proxy",
     multiple=True,
     metavar="ADDRESS",
-    help="Believe X-Forwarded-Proto and -Host from this address or network. Repeatable.",
+    help="Trust X-Forwarded-Proto and -Host from this address or network. Repeatable.",
 )
-@click.option("--attach", is_flag=True, help="Start no simulation; serve the robot on the ROS graph.")
+@click.option("--attach", is_flag=True, help="Start no simulation; serve a robot that is on the ROS graph already.")
 @click.option(
-    "--delivery-only", is_flag=True, help="Run the delivery application alone, beside the robot on the ROS graph."
+    "--delivery-only", is_flag=True, help="Run only the delivery application, for a robot that is on the ROS graph."
 )
 def robot(**options: object) -> None:
     """Run the reference robot.
 
-    When both interfaces answer, one line on stdout says where. SIGINT and SIGTERM stop the robot. What follows
-    --ros-args goes to ROS: namespaces, remappings, parameters such as use_sim_time, enclaves.
+    When both interfaces are ready, the command prints their addresses in one line. SIGINT and SIGTERM stop the robot.
+    Arguments after --ros-args are passed to ROS: namespaces, remappings, parameters such as use_sim_time, enclaves.
     """
     for module, remedy in _NEEDED.items():
         try:
@@ -91,6 +91,6 @@ def robot(**options: object) -> None:
         except ImportError as error:
             click.echo(f"roaas robot needs {module}, which cannot be imported ({error}). Install {remedy}", err=True)
             sys.exit(ExitCode.USAGE)
-    # Only now: it imports ROS and the web server.
+    # Imported only here, because the module imports ROS and the web server.
     launch = import_module("reference_robot.launch")
     launch.run(launch.Options(**options))

@@ -1,4 +1,4 @@
-"""A delivery request, as the simulation and the web services hand it on."""
+"""The delivery request: its fields, and its conversion to and from a serialized ROS message."""
 
 import struct
 from operator import attrgetter
@@ -13,7 +13,7 @@ _LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 
 
 class DeliveryRequest(NamedTuple):
-    """The fields of a DeliveryRequestMsg: coordinates in metres in the map frame, every double as it was sent."""
+    """The fields of one DeliveryRequestMsg; coordinates are doubles in metres in the map frame."""
 
     message_code: int
     depot_x: float
@@ -23,24 +23,26 @@ class DeliveryRequest(NamedTuple):
     source_x: float
     source_y: float
 
-    def octets(self) -> bytes:
-        """Return the DeliveryRequestMsg as ROS sends it: in 0.3 µs, where rclpy takes 2 to do so field by field.
+    def serialized(self) -> bytes:
+        """Return the request as a serialized DeliveryRequestMsg (CDR, little endian).
+
+        Packing the bytes directly takes 0.3 µs; rclpy's serialization, field by field, takes 2 µs.
 
         Raises:
-            struct.error: The message code is no int32.
+            struct.error: The message code does not fit into an int32.
         """
         return _CDR.pack(_LITTLE_ENDIAN, *self)
 
     @classmethod
-    def of(cls, octets: bytes) -> Self:
-        """Return the request that a DeliveryRequestMsg says, from whomever it came, in whatever order of octets.
+    def of(cls, data: bytes) -> Self:
+        """Return the request that is stored in a serialized DeliveryRequestMsg of either byte order.
 
         Raises:
-            rclpy's RMWError: The octets are no such message.
+            rclpy's RMWError: The bytes are not a DeliveryRequestMsg.
         """
-        if len(octets) == _CDR.size and octets.startswith(_LITTLE_ENDIAN[:2]):  # the last two say nothing of a message
-            return cls._make(_CDR.unpack(octets)[1:])
-        return cls._make(_FIELDS_OF(deserialize_message(octets, DeliveryRequestMsg)))
+        if len(data) == _CDR.size and data.startswith(_LITTLE_ENDIAN[:2]):  # the last two bytes are options
+            return cls._make(_CDR.unpack(data)[1:])
+        return cls._make(_FIELDS_OF(deserialize_message(data, DeliveryRequestMsg)))
 
 
 _FIELDS_OF: Final = attrgetter(*DeliveryRequest._fields)

@@ -1,4 +1,4 @@
-"""The end of a program that waits in its main thread: a signal, or another thread's word."""
+"""Waiting for the end of a program: SIGINT, SIGTERM, or a call from another thread."""
 
 import contextlib
 import os
@@ -6,24 +6,25 @@ import signal
 
 
 class Ending:
-    """Waits for SIGINT, SIGTERM or ``bring``; make it in the main thread.
+    """A one-time event that SIGINT, SIGTERM or a call of ``trigger`` sets off. Create it in the main thread.
 
-    A handler in Python runs when the main thread runs again, which an event that it waits for does not bring about; the
-    octet that the interpreter writes for each signal, in whatever thread it arrives, does.
+    Python runs signal handlers only when the main thread executes Python code, so a thread that blocks on an event
+    would not wake up. The interpreter also writes a byte to a pipe for each signal, whichever thread receives the
+    signal. The main thread waits for that byte.
     """
 
     def __init__(self) -> None:
-        self._told, self._tell = os.pipe()
-        os.set_blocking(self._tell, False)
-        signal.set_wakeup_fd(self._tell)
+        self._read_end, self._write_end = os.pipe()
+        os.set_blocking(self._write_end, False)
+        signal.set_wakeup_fd(self._write_end)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda _number, _frame: None)
 
     def wait(self) -> None:
-        """Return when the end has come."""
-        os.read(self._told, 1)
+        """Block until SIGINT, SIGTERM or a call of ``trigger``."""
+        os.read(self._read_end, 1)
 
-    def bring(self) -> None:
-        """Bring the end about, from any thread."""
-        with contextlib.suppress(BlockingIOError):  # the pipe is full: it has come
-            os.write(self._tell, b"\0")
+    def trigger(self) -> None:
+        """Make ``wait`` return; may be called from any thread."""
+        with contextlib.suppress(BlockingIOError):  # the pipe is full, so `wait` returns anyway
+            os.write(self._write_end, b"\0")

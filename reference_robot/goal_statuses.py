@@ -1,4 +1,4 @@
-"""The goals of an action server, whoever sent them, as its status topic tells (ROS 2 design, "Actions")."""
+"""The goals of a ROS action server, from every client, as the server's status topic reports them (ROS 2 "Actions")."""
 
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
@@ -12,7 +12,7 @@ ACTIVE: Final = frozenset({GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTI
 
 
 class ReportedGoal(NamedTuple):
-    """A goal as its server reports it: the 16 octets of its id as hexadecimal, its status, when it was accepted."""
+    """A goal as reported by its action server: id (32 hexadecimal digits), status, and time of acceptance."""
 
     identity: str
     status: int
@@ -21,20 +21,22 @@ class ReportedGoal(NamedTuple):
 
 
 class GoalStatuses:
-    """Keeps what an action's server told last, in the executor's thread; ``on_change`` is called after each report.
+    """A subscriber that keeps the latest goal statuses of an action server.
 
-    A server that died told nothing of the end of its goals, and the next one does not know them: they end with it.
+    The executor's thread updates the object and calls ``on_change`` after each report. A server that crashes does not
+    report the end of its goals, and its successor does not know them. So the goals count as ended when their server
+    disappears.
 
     Attributes:
-        reported: The goals in the order in which the server lists them, those that ended lately among them.
-        losses: How many servers have gone so far.
+        reported: The goals in the order of the server's report, including goals that ended recently.
+        losses: How many servers of this action have disappeared so far.
     """
 
     def __init__(self, node: Node, action: str, on_change: Callable[[], None] = lambda: None) -> None:
         self.reported: tuple[ReportedGoal, ...] = ()
         self.losses = 0
         self._on_change = on_change
-        self._is_of_newest = True  # what is reported came from the server that came last
+        self._is_of_newest = True  # the newest server has sent a report
         node.create_subscription(
             GoalStatusArray,
             f"{action}/_action/status",
@@ -54,7 +56,10 @@ class GoalStatuses:
         self._on_change()
 
     def _note_servers(self, change: Any) -> None:
-        """Take up that servers came or went: ``change`` is rclpy's, and may stand for several changes."""
+        """Update the state after action servers appeared or disappeared.
+
+        ``change`` is rclpy's matched event for the status topic; one event may summarise several changes.
+        """
         if change.total_count_change:
             self._is_of_newest = False
         lost = change.total_count_change - change.current_count_change

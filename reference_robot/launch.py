@@ -1,6 +1,7 @@
-"""Starts a whole robot: the simulation as a child process, unless a robot is there already, and the web services.
+"""Start the parts of the robot that the command line selects.
 
-Or the delivery application alone.
+Usually these are the simulation, as a child process, and the web services. With ``--attach`` only the web services
+start, with ``--delivery-only`` only the delivery application.
 """
 
 import contextlib
@@ -46,20 +47,20 @@ _DISCOVERY_RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 
 class UnusableError(click.ClickException):
-    """The robot cannot be started as asked: the message names the option, file or port, and what is wrong with it."""
+    """An error in an option, file or port that prevents the start; the message names it and the reason."""
 
     exit_code = ExitCode.USAGE
 
 
 class RobotLostError(click.ClickException):
-    """The simulated robot did not come up, or ended by itself."""
+    """An error for a simulated robot that did not start or that ended unexpectedly."""
 
     exit_code = ExitCode.FAILED
 
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line says (cli.md)."""
+    """The options of the command ``roaas robot``, as click parsed them (docs/cli.md)."""
 
     config: Path | None
     host: str
@@ -86,7 +87,7 @@ def run(options: Options) -> None:
 
     Raises:
         UnusableError: A file, port or address cannot be used.
-        RobotLostError: There is no robot (any more) behind the web services.
+        RobotLostError: The robot behind the web services did not start or has ended.
     """
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
 
@@ -102,7 +103,7 @@ def run(options: Options) -> None:
     try:
         configuration = load_configuration(options.config)
         listening = _listening(options)
-        RosRuntime(options.domain_id, options.ros_arguments).close()  # whether ROS takes them, before anything starts
+        RosRuntime(options.domain_id, options.ros_arguments).close()  # raises if the arguments are bad
         runner = RobotWebServiceNodesRunner(configuration, listening, options.domain_id, options.ros_arguments)
         with contextlib.suppress(_Stopped), _stopped_by_signals(), _simulation(options):
             runner.run(ready, wait_for_robot=not options.attach)
@@ -113,20 +114,20 @@ def run(options: Options) -> None:
 
 
 def _listening(options: Options) -> Listening:
-    """Return how the robot is reached.
+    """Return the network settings of the web services: addresses, tokens, host names, proxies and TLS.
 
     Raises:
         TokenFileError: The token file cannot be used.
-        TlsFileError: Certificate or key cannot be used.
-        ListeningError: Another option cannot be used, or lets strangers drive the robot.
+        TlsFileError: The certificate or the key cannot be used.
+        ListeningError: Another option is invalid, or would let anyone on the network drive the robot without a token.
     """
     authorization = Authorization(None if options.token_file is None else read_tokens(options.token_file))
     if not options.insecure:
         require_guarded(options.host, authorization)
     if (options.tls_cert is None) != (options.tls_key is None):
-        raise ListeningError("--tls-cert and --tls-key go together: a server needs a certificate and its key")
-    if authorization.is_asked_for and options.tls_cert is None and not is_loopback(options.host):
-        _LOGGER.warning("tokens travel in the clear to --host %s: --tls-cert and --tls-key hide them", options.host)
+        raise ListeningError("give both --tls-cert and --tls-key: a server needs a certificate and its key")
+    if authorization.is_required and options.tls_cert is None and not is_loopback(options.host):
+        _LOGGER.warning("tokens are sent to --host %s unencrypted; --tls-cert and --tls-key encrypt them", options.host)
     return Listening(
         options.host,
         options.rest_port,
@@ -140,7 +141,7 @@ def _listening(options: Options) -> Listening:
 
 
 def _deliver(options: Options) -> None:
-    """Run the delivery application until SIGINT or SIGTERM: it drives whatever robot takes NavigateToPose goals."""
+    """Run the delivery application until SIGINT or SIGTERM, for any robot that accepts NavigateToPose goals."""
     ending = Ending()
     try:
         names = load_configuration(options.config)
@@ -155,12 +156,12 @@ def _deliver(options: Options) -> None:
 
 
 class _Stopped(BaseException):
-    """A signal came while no event loop was there to take it."""
+    """A SIGINT or SIGTERM that arrived while no event loop was running to handle it."""
 
 
 @contextlib.contextmanager
 def _stopped_by_signals() -> Iterator[None]:
-    """Let SIGINT and SIGTERM unwind what has been started so far."""
+    """Raise _Stopped on SIGINT and SIGTERM, so that everything started inside the block is cleaned up."""
 
     def stop(_number: int, _frame: FrameType | None) -> None:
         raise _Stopped
@@ -173,7 +174,7 @@ def _stopped_by_signals() -> Iterator[None]:
 def _simulation(options: Options) -> contextlib.AbstractContextManager[None]:
     if options.attach:
         return contextlib.nullcontext()
-    # A simulated robot is no affair of other machines on the network, unless the environment says so.
+    # The simulated robot is visible on this machine only, unless the environment says otherwise.
     os.environ.setdefault(_DISCOVERY_RANGE, "LOCALHOST")
     seed = options.seed if options.realistic else None
     log = get_logging_directory() / f"robot-{os.getpid()}.log"

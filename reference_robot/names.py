@@ -1,7 +1,6 @@
-"""Names of the robot's topics, services, actions and frames, read from one TOML file.
+"""The names of the robot's topics, services, actions and frames, read from a TOML file.
 
-Both the simulation and the web services bind to a ``RosNames``, so that a robot with other names is
-served by another file and no code.
+The simulation and the web services both use these names. A robot with other names needs another file, not other code.
 """
 
 from pathlib import Path
@@ -15,7 +14,7 @@ DEFAULT_NAMES_FILE: Final = Path(__file__).with_name("names.toml")
 
 
 class Topics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Topic names, relative to the robot's namespace unless they begin with a slash."""
+    """Names of the robot's topics, relative to the robot's namespace unless they begin with a slash."""
 
     odom: Text = "odom"
     scan: Text = "scan"
@@ -32,27 +31,27 @@ class Topics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Services(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Service names."""
+    """Names of the robot's ROS services."""
 
     get_plan: Text = "get_plan"
 
 
 class Actions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Action names."""
+    """Names of the robot's ROS actions."""
 
     navigate_to_pose: Text = "navigate_to_pose"
     compute_path_to_pose: Text = "compute_path_to_pose"
 
 
 class Nodes(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Names of nodes that have a lifecycle."""
+    """Names of the navigation's lifecycle nodes."""
 
     navigator: Text = "bt_navigator"
     planner: Text = "planner_server"
 
 
 class Frames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Frame ids as they stand in message headers."""
+    """Ids of the robot's coordinate frames, as they occur in message headers."""
 
     map: Text = "map"
     odom: Text = "odom"
@@ -60,13 +59,13 @@ class Frames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Velocity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which message type carries velocity commands."""
+    """The message type of velocity commands; ``auto`` uses the type that the robot subscribes to."""
 
     message: Literal["auto", "Twist", "TwistStamped"] = "auto"
 
 
 class RosNames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Everything by which the rooms of the robot find each other on the ROS graph."""
+    """All names by which the simulation and the web services find each other on the ROS graph."""
 
     topics: Topics = Topics()
     services: Services = Services()
@@ -77,12 +76,12 @@ class RosNames(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def load_names(path: Path | None = None) -> RosNames:
-    """Read names from a TOML file; keys that it leaves out keep their defaults.
+    """Return the ROS names from a TOML file; keys that are missing in the file keep their defaults.
 
     Raises:
-        TomlFileError: The file cannot be read, is no TOML, or has an unknown or unusable key.
+        TomlFileError: The file cannot be read, is not TOML, or has an unknown key or an invalid value.
     """
     source = path or DEFAULT_NAMES_FILE
     tables = read_tables(source)
-    tables.pop("web", None)  # the web services' own, which they read and check
+    tables.pop("web", None)  # read and checked by the web services
     return fit(tables, RosNames, str(source))

@@ -1,4 +1,4 @@
-"""The ROS runtime that the simulation and the web services share: a context, nodes, one executor thread.
+"""The ROS runtime that the simulation and the web services share: a context, nodes and executor threads.
 
 ::
 
@@ -8,9 +8,9 @@
         ros.start()
         ...  # callbacks run in the runtime's thread until the block ends
 
-The context is the runtime's own and installs no signal handlers: those belong to the program. Set
-``ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`` in the environment before, where a robot is to be seen on
-this machine only. Where the environment names no profiles of Fast DDS, those in ``fastdds.xml`` are used.
+The runtime has its own ROS context and installs no signal handlers; signals are left to the program. To hide the robot
+from other machines, set ``ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`` in the environment first. If the environment
+names no Fast DDS profiles, the runtime uses those in ``fastdds.xml``.
 """
 
 import os
@@ -36,14 +36,14 @@ from rclpy.subscription import Subscription
 
 try:
     from rclpy.experimental.events_executor import EventsExecutor as RosExecutor
-except ImportError:  # a Jazzy from before its backport
+except ImportError:  # an early Jazzy, without the backport
     from rclpy.executors import SingleThreadedExecutor as RosExecutor
 
 # Measured with 50 Hz odometry, two action servers and a dozen subscriptions in one process:
 # EventsExecutor 2.2 % of a core, SingleThreadedExecutor, which builds its wait set anew for every
 # message, 6 %.
 
-# Read once in a process, when its first participant is made; a user's own file counts instead.
+# Fast DDS reads the file once per process. A file that the user has set takes precedence.
 _FAST_DDS_PROFILES: Final = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _OUR_PROFILES: Final = Path(__file__).with_name("fastdds.xml")
 
@@ -54,19 +54,19 @@ _HIGHEST_DOMAIN_ID: Final = 101  # higher ones put DDS's ports into Linux's ephe
 
 
 class RosArgumentsError(ValueError):
-    """ROS does not understand its arguments; the message has them, and what ROS says of them."""
+    """An error in the arguments after ``--ros-args``; the message contains the arguments and ROS's explanation."""
 
 
 class RosRuntime:
-    """One rclpy context with its nodes, spun in one thread but for those that are made ``apart``.
+    """One ROS context with its nodes. One thread runs all their callbacks, except for nodes that are created ``apart``.
 
     Args:
         domain_id: The ROS domain, 0 to 101; None takes ROS_DOMAIN_ID from the environment.
-        arguments: ROS's own (``--ros-args ...``): namespace, remappings, parameters, enclave, for all nodes.
+        arguments: ROS arguments (``--ros-args ...``) for all nodes: namespace, remappings, parameters, enclave.
 
     Raises:
         ValueError: The domain id is out of range.
-        RosArgumentsError: ROS does not understand the arguments.
+        RosArgumentsError: ROS rejects the arguments.
     """
 
     def __init__(self, domain_id: int | None = None, arguments: Sequence[str] = ()) -> None:
@@ -84,29 +84,30 @@ class RosRuntime:
                 signal_handler_options=SignalHandlerOptions.NO,
             )
         except (rclpy_c.RCLError, rclpy_c.RCLInvalidROSArgsError, rclpy_c.UnknownROSArgsError) as error:
-            raise RosArgumentsError(f"ROS does not take {' '.join(arguments)}: {error}") from error
+            raise RosArgumentsError(f"ROS does not accept {' '.join(arguments)}: {error}") from error
         self._executors = [RosExecutor(context=self.context)]
-        self._awake: list[float] = []  # for each thread, when it last had nothing or one thing less to do
+        self._awake: list[float] = []  # for each thread: when its last callback or wait ended
         self._nodes: list[Node] = []
         self._threads: list[threading.Thread] = []
         self._watches: list[tuple[rclpy_c.GuardCondition, threading.Thread]] = []
         self._closing = threading.Event()
 
     def create_node(self, name: str, *, apart: bool = False, spun: bool = True) -> Node:
-        """Make a node that this runtime spins and destroys; ``apart``, in a thread of its own.
+        """Return a new node, which ``close`` destroys.
 
-        What comes to a node apart, however much, does not wait in one queue with what the other nodes have to do.
-        A node that is not spun has no callbacks of its own; ``watch`` tells that something waits at its subscriptions,
-        and ``taken`` takes it.
+        Args:
+            name: The node's name.
+            apart: Run the node's callbacks in a thread of its own, so that its messages do not delay other nodes.
+            spun: False for a node without callbacks; ``watch`` and ``waiting_messages`` serve its subscriptions.
 
         Raises:
-            RosArgumentsError: A parameter among ROS's arguments is none that a node can have.
+            RosArgumentsError: The ROS arguments contain a parameter that a node cannot have.
         """
         try:
-            # Its parameter services would stand among the robot's own services.
+            # Parameter services would appear among the robot's own services.
             node = Node(name, context=self.context, start_parameter_services=False)
         except ParameterException as error:
-            raise RosArgumentsError(f"a node does not take its parameter: {error}") from error
+            raise RosArgumentsError(f"a node does not accept its parameter: {error}") from error
         self._nodes.append(node)
         if not spun:
             return node
@@ -116,10 +117,10 @@ class RosRuntime:
         return node
 
     def watch(self, subscription: Subscription, node: Node, callback: Callable[[], None], pause_s: float) -> None:
-        """Call back in a node's thread when something waits at a subscription of a node that is not spun.
+        """Call ``callback`` in a node's thread whenever messages wait at a subscription of a node that is not spun.
 
-        It is called at once when the first message comes, and then at most every ``pause_s``: who takes many messages
-        at a time is woken once for them. The runtime must not be started yet.
+        The first message triggers a call at once; later calls are at least ``pause_s`` seconds apart, so that each call
+        can read many messages. Call this method before ``start``.
         """
         executor = next(executor for executor in self._executors if node in executor.get_nodes())
         wake = rclpy_c.GuardCondition(self.context.handle)
@@ -127,7 +128,7 @@ class RosRuntime:
         self._watches.append((wake, threading.Thread(target=self._watch, args=arguments, name="ros", daemon=True)))
 
     def start(self) -> None:
-        """Run callbacks in threads of their own from now on; a second call does nothing."""
+        """Start the threads that run the callbacks; a second call does nothing."""
         if not self._threads:
             self._awake = [time.monotonic()] * len(self._executors)
             self._threads = [
@@ -139,28 +140,28 @@ class RosRuntime:
                 thread.start()
 
     def silence(self) -> float:
-        """Return for how many seconds a thread has been in one callback, or without a sign of life; 0.5 s is usual."""
+        """Return for how many seconds the least active thread has been in one callback or idle; 0.5 s is normal."""
         return time.monotonic() - min(self._awake, default=time.monotonic())
 
     def hangs(self) -> bool:
-        """Tell whether a thread hangs: what the nodes keep of the robot's state is then as old as the silence."""
+        """Return whether a thread has been silent for over 2 s; the robot's state in memory is then out of date."""
         return self.silence() > HUNG_S
 
     def close(self) -> None:
-        """Stop the threads, then tear down nodes and context; a second call does nothing."""
+        """Stop the threads and destroy the nodes and the context; a second call does nothing."""
         if self._closing.is_set():
             return
         self._closing.set()
         for wake, _ in self._watches:
             wake.trigger_guard_condition()
-        # In this order, or the process may end in "terminate called without an active exception".
+        # Any other order may crash the process: "terminate called without an active exception".
         give_up = time.monotonic() + _CLOSING_S
         for executor in self._executors:
             executor.shutdown(timeout_sec=max(0.0, give_up - time.monotonic()))
         for thread in self._threads:
             thread.join(max(0.0, give_up - time.monotonic()))
         for node in reversed(self._nodes):
-            # destroy_node leaves actions alone, and one that is left keeps its node on the graph.
+            # destroy_node does not destroy actions; a remaining action keeps the node on the graph.
             for entity in list(node.waitables):
                 if isinstance(entity, ActionClient | ActionServer):
                     entity.destroy()
@@ -176,7 +177,7 @@ class RosRuntime:
         self.close()
 
     def _spin(self, number: int, executor: RosExecutor) -> None:
-        # Not executor.spin(): EventsExecutor's own loop takes a whole core off the main thread.
+        # Not executor.spin(): outside the main thread, EventsExecutor's loop uses a whole core.
         while not self._closing.is_set() and self.context.ok():
             self._awake[number] = time.monotonic()
             try:
@@ -188,7 +189,7 @@ class RosRuntime:
                     get_logger("ros").error(f"a callback failed:\n{traceback.format_exc()}")
 
     def _watch(
-        self, subscription: Subscription, wake: rclpy_c.GuardCondition, tell: Callable[[], object], pause_s: float
+        self, subscription: Subscription, wake: rclpy_c.GuardCondition, notify: Callable[[], object], pause_s: float
     ) -> None:
         waiting = rclpy_c.WaitSet(1, 1, 0, 0, 0, 0, self.context.handle)
         while not self._closing.is_set() and self.context.ok():
@@ -197,12 +198,12 @@ class RosRuntime:
             waiting.add_guard_condition(wake)
             waiting.wait(-1)
             if waiting.is_ready("subscription", 0):
-                tell()
+                notify()
                 self._closing.wait(pause_s)
 
 
-def taken(subscription: Subscription) -> Iterator[bytes]:
-    """Take what waits at a subscription of a node that is not spun: the octets of each message, as ROS sent them."""
+def waiting_messages(subscription: Subscription) -> Iterator[bytes]:
+    """Remove and yield the serialized messages that wait at a subscription of a node that is not spun."""
     handle = subscription.handle
     with handle:
         while (found := handle.take_message(subscription.msg_type, True)) is not None:  # noqa: FBT003 - rclpy's own

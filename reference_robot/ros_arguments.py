@@ -1,4 +1,4 @@
-"""ROS's own arguments on a command line: ``--ros-args ... [--]``, as every ROS program takes them."""
+"""ROS arguments on a command line: ``--ros-args ... [--]``, as every ROS program accepts them."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -10,10 +10,10 @@ _END: Final = "--"
 
 
 class RosCommand(click.Command):
-    """A command that gets what stands behind ``--ros-args`` as its parameter ``ros_arguments``, a tuple of words."""
+    """A click command that passes the words of ``--ros-args ...`` to its function as the tuple ``ros_arguments``."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Take ROS's words out before click sees them."""
+        """Parse the command line after moving the ROS arguments from it into the parameter ``ros_arguments``."""
         own, ros = divided(args)
         left = super().parse_args(ctx, own)
         ctx.params["ros_arguments"] = tuple(ros)
@@ -21,7 +21,10 @@ class RosCommand(click.Command):
 
 
 def divided(words: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Return a program's own words, and ROS's: from each ``--ros-args`` up to ``--`` or the end, both included."""
+    """Return the program's own words and the ROS words of a command line.
+
+    ROS words reach from each ``--ros-args`` up to the next ``--`` or the end, both included.
+    """
     own: list[str] = []
     ros: list[str] = []
     is_ros = False

@@ -1,4 +1,4 @@
-"""The simulated robot as a child process, which ends with its parent, however that ends."""
+"""The simulated robot as a child process that ends with its parent process, even if the parent is killed."""
 
 import contextlib
 import os
@@ -17,13 +17,19 @@ _STOP: Final = 5.0  # seconds
 
 
 class SimulationError(RuntimeError):
-    """The simulation did not start, or ended by itself."""
+    """An error for a simulation that did not start or that ended unexpectedly."""
 
 
 class SimulatedRobot:
-    """The simulation in a process of its own, with a watch on its end; like a real robot where a seed says which.
+    """A simulated robot that runs in a child process, which is monitored.
 
-    What it has to say of goals and missions goes to the file ``log``; ``ros_arguments`` are for its nodes.
+    Args:
+        domain_id: The ROS domain.
+        time_scale: How many times faster than real time the robot moves.
+        config: The TOML file with the ROS names; None for the default names.
+        realistic_seed: Seed of a robot with imperfect wheels and odometry; None for a perfect robot.
+        log: The file for the simulation's log.
+        ros_arguments: ROS arguments for the simulation's nodes.
     """
 
     def __init__(
@@ -50,20 +56,20 @@ class SimulatedRobot:
 
     @contextlib.contextmanager
     def running(self) -> Iterator[None]:
-        """Run the simulation while the block runs; should it end by itself, the block is ended by SIGTERM.
+        """Run the simulation during the block; if the simulation ends first, SIGTERM is sent to this process.
 
         Raises:
-            SimulationError: It did not become ready, or ended by itself.
+            SimulationError: The simulation did not become ready, or ended unexpectedly.
         """
         self._log.parent.mkdir(parents=True, exist_ok=True)
         with (
             self._log.open("w", encoding="utf-8") as log,
             subprocess.Popen(  # noqa: S603 - our own program, and arguments that click has checked
                 self._command,
-                stdin=subprocess.PIPE,  # its end tells the child that the parent is gone, even if that was killed
+                stdin=subprocess.PIPE,  # closes when the parent ends, even if killed; the child notices
                 stdout=subprocess.PIPE,
                 stderr=log,
-                start_new_session=True,  # so that Ctrl-C reaches the parent alone, which stops the child in order
+                start_new_session=True,  # so that Ctrl-C reaches the parent only, which then stops the child
             ) as process,
         ):
             try:
@@ -78,19 +84,19 @@ class SimulatedRobot:
                 _end(process)
         if lost:
             raise SimulationError(
-                f"the simulation ended by itself with exit code {process.returncode}; its log is {self._log}"
+                f"the simulation ended unexpectedly with exit code {process.returncode}; its log is {self._log}"
             )
 
     def _await_ready(self, stdout: IO[bytes]) -> None:
         give_up = time.monotonic() + _START
-        told = b""
-        while b"ready" not in told.split():
+        output = b""
+        while b"ready" not in output.split():
             readable, _, _ = select.select([stdout], [], [], max(0.0, give_up - time.monotonic()))
-            octets = os.read(stdout.fileno(), 4096) if readable else b""
-            if not octets:
+            data = os.read(stdout.fileno(), 4096) if readable else b""
+            if not data:
                 why = "ended" if readable else f"was not ready within {_START:g} s"
                 raise SimulationError(f"the simulation {why}: {' '.join(self._command)}; its log is {self._log}")
-            told += octets
+            output += data
 
     def _watch(self, process: subprocess.Popen[bytes], stdout: IO[bytes]) -> None:
         while os.read(stdout.fileno(), 4096):

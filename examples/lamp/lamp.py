@@ -1,4 +1,4 @@
-"""A dimmable lamp with a web API: ``python lamp.py [PORT]``. It fades to the brightness that it is sent."""
+"""A dimmable lamp with a web API: ``python lamp.py [PORT]``. The lamp fades to each brightness it receives."""
 
 import json
 import logging
@@ -15,7 +15,7 @@ OPENAPI = yaml.safe_load((Path(__file__).parent / "openapi.yaml").read_text(enco
 
 
 class Lamp:
-    """Fades from one brightness to another, 0 to 1."""
+    """A lamp that fades from one brightness to another; 0 is off, 1 is full brightness."""
 
     def __init__(self) -> None:
         self.start = self.target = 0.0
@@ -23,12 +23,12 @@ class Lamp:
 
     @property
     def brightness(self) -> float:
-        """The brightness at this moment."""
+        """The present brightness, 0 to 1, calculated from the time since the fade began."""
         way = FADE_PER_S * (time.monotonic() - self.since)
         return min(self.target, self.start + way) if self.target > self.start else max(self.target, self.start - way)
 
     def fade(self, target: float) -> None:
-        """Begin to fade."""
+        """Begin to fade from the present brightness to ``target``."""
         self.start, self.target, self.since = self.brightness, target, time.monotonic()
 
 
@@ -36,19 +36,19 @@ LAMP = Lamp()
 
 
 def refused(status: int, detail: str) -> web.Response:
-    """Return an error (RFC 9457)."""
+    """Return an error response as application/problem+json (RFC 9457)."""
     return web.json_response(
         {"status": status, "detail": detail}, status=status, content_type="application/problem+json"
     )
 
 
 async def get_lamp(_: web.Request) -> web.Response:
-    """Return the lamp's state."""
+    """Return the response to ``GET /lamp``: brightness and target as JSON."""
     return web.json_response({"brightness": LAMP.brightness, "target": LAMP.target})
 
 
 async def put_lamp(request: web.Request) -> web.Response:
-    """Set the brightness."""
+    """Set the target brightness from a ``PUT /lamp`` request; return the lamp's state, or 400, 415 or 422."""
     if request.content_type != "application/json":
         return refused(415, "the request body must be application/json")
     try:
@@ -62,7 +62,7 @@ async def put_lamp(request: web.Request) -> web.Response:
 
 
 async def get_openapi(_: web.Request) -> web.Response:
-    """Return the description."""
+    """Return the lamp's OpenAPI description as JSON."""
     return web.json_response(OPENAPI)
 
 

@@ -1,4 +1,4 @@
-"""How the self-test starts the lamp."""
+"""The self-test configuration of the lamp's contract pack: how to start a lamp that conforms."""
 
 import sys
 from pathlib import Path

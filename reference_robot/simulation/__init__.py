@@ -1,6 +1,6 @@
-"""The robot itself: a differential-drive base, navigation and the delivery application, as ROS nodes.
+"""The simulated robot: a differential-drive base, navigation and the delivery application, as ROS nodes.
 
-Pure parts: ``office`` (the map), ``planner``, ``pursuit``, ``kinematics``, ``missions``. Nodes on top of
-them: ``base``, ``sensors``, ``frames``, ``navigation``, ``planning``, ``delivery``. ``runner`` puts the nodes together.
-Nothing here knows of the web.
+Modules without ROS: ``office`` (the map), ``planner``, ``pursuit``, ``kinematics``, ``missions``. Modules with ROS
+nodes: ``base``, ``sensors``, ``frames``, ``navigation``, ``planning``, ``delivery``. ``runner`` creates all nodes.
+Nothing in this package depends on the web services.
 """

@@ -1,7 +1,7 @@
-"""The simulated robot as a process of its own: ``python -m reference_robot.simulation``.
+"""The program that simulates the robot: ``python -m reference_robot.simulation``.
 
-Prints ``ready`` on stdout when the robot is up. SIGINT and SIGTERM end it with exit code 0, and so does
-the end of its standard input where that is a pipe: a robot does not outlive the program that started it.
+It prints ``ready`` on stdout when the robot is running. It ends with exit code 0 on SIGINT and SIGTERM. If its standard
+input is a pipe, it also ends when the pipe closes, so that the simulation never outlives the program that started it.
 """
 
 import contextlib
@@ -23,14 +23,14 @@ from reference_robot.ros_arguments import RosCommand
 from reference_robot.simulation.realism import Realism
 from reference_robot.simulation.runner import Simulation
 
-_NICENESS: Final = 5  # the web layer answers first: a real robot's motors do not wait for this machine
+_NICENESS: Final = 5  # the web services run first: on a real robot they share no processor with the motors
 
 
 @click.command(cls=RosCommand)
 @click.option("--domain-id", type=click.IntRange(0, 101), help="ROS domain; ROS_DOMAIN_ID by default.")
 @click.option("--time-scale", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True)
-@click.option("--names", "names_file", type=click.Path(path_type=Path), help="Names of topics and actions.")
-@click.option("--realistic", is_flag=True, help="With slipping wheels, noise, delays; --seed chooses which.")
+@click.option("--names", "names_file", type=click.Path(path_type=Path), help="TOML file of topic and action names.")
+@click.option("--realistic", is_flag=True, help="Simulate slipping wheels, noise and delays; --seed selects the robot.")
 @click.option("--seed", type=int, default=0, show_default=True)
 def main(
     domain_id: int | None,
@@ -41,8 +41,8 @@ def main(
     seed: int,
     ros_arguments: tuple[str, ...],
 ) -> None:
-    """Run the simulated robot until it is told to stop."""
-    # Seen on this machine only, unless the user wants it otherwise.
+    """Run the simulated robot until SIGINT, SIGTERM or the end of standard input."""
+    # The robot is visible on this machine only, unless the environment says otherwise.
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     try:
         names = load_names(names_file)
@@ -54,21 +54,21 @@ def main(
         threading.Thread(target=_await_end_of_stdin, args=(ending,), daemon=True).start()
     with RosRuntime(domain_id, ros_arguments) as ros:
         Simulation(ros, names, time_scale, Realism(seed) if realistic else None)
-        gc.freeze()  # what lives as long as the robot is not looked at again
+        gc.freeze()  # excludes permanent objects from garbage collection
         ros.start()
         click.echo("ready")
         ending.wait()
 
 
 def _give_way() -> None:
-    """Let the web services and their client go first: of a processor's time, and when a message wakes this process.
+    """Lower this process's scheduling priority, so that the web services and their clients run first.
 
-    A batch process waits until whoever runs has nothing to do or has had its turn (sched(7)). Otherwise each publish of
-    the web services would hand over the processor on which a client waits for the answer. Whoever gave it another
-    policy, such as real time, is obeyed.
+    Under the batch policy (sched(7)) a process that a message wakes does not interrupt the running one. Otherwise each
+    message that the web services publish would take the processor from a client waiting for its response. If a user has
+    set another policy, such as real time, the policy is kept.
     """
     os.nice(_NICENESS)
-    with contextlib.suppress(AttributeError, OSError):  # a system that has none, or that does not allow it
+    with contextlib.suppress(AttributeError, OSError):  # the system has no such policy, or forbids it
         if os.sched_getscheduler(0) == os.SCHED_OTHER:
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
@@ -84,7 +84,7 @@ def _await_end_of_stdin(ending: Ending) -> None:
     with contextlib.suppress(OSError):
         while os.read(0, 4096):
             pass
-    ending.bring()
+    ending.trigger()
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The base: takes velocity commands, moves the body, reports odometry, and stops when commands cease."""
+"""The robot's base: obeys velocity commands, moves the body, reports odometry, and stops when commands cease."""
 
 import math
 import time
@@ -12,17 +12,17 @@ from rclpy.qos import QoSProfile
 from reference_robot.names import RosNames
 from reference_robot.simulation.frames import FramePublisher
 from reference_robot.simulation.kinematics import Accelerations, Motion, advance
-from reference_robot.simulation.odometry import OdometryOctets
+from reference_robot.simulation.odometry import SerializedOdometry
 from reference_robot.simulation.office import BODY_RADIUS, DEPOT, OFFICE
 from reference_robot.simulation.realism import Delayed, Realism
 
-HOLD_S: Final = 1.0  # a setpoint is good for this long, by the wall clock whatever the time scale
+HOLD_S: Final = 1.0  # how long a setpoint is valid, by the wall clock at every time scale
 _PERIOD_S: Final = 0.02  # 50 Hz of simulated time
-_SHORTEST_PERIOD_S: Final = 0.004  # of real time: a time scale beyond 5 makes the steps longer instead
+_SHORTEST_PERIOD_S: Final = 0.004  # of real time; above a time scale of 5 the steps become longer instead
 _NANOSECONDS: Final = 10**9
-_LONGEST_STEP_S: Final = 0.1  # of simulated time: a robot whose process was held up does not jump ahead
+_LONGEST_STEP_S: Final = 0.1  # of simulated time: after a delay of the process the robot does not jump ahead
 
-# Variances (m², rad²) of x, y and yaw as a wheeled base with encoders has them; the rest cannot move.
+# Variances (m², rad²) of x, y and yaw, typical for a wheeled base with encoders; other coordinates are fixed.
 _POSE_COVARIANCE: Final = [0.0] * 36
 _TWIST_COVARIANCE: Final = [0.0] * 36
 for _axis, _variance in ((0, 1e-4), (7, 1e-4), (35, 1e-3)):
@@ -31,12 +31,13 @@ for _axis, _variance in ((0, 1e-4), (7, 1e-4), (35, 1e-3)):
 
 
 class Base:
-    """A differential-drive base on the ROS graph; ``time_scale`` makes it up to 25 times faster than real time.
+    """A ROS node's differential-drive base that subscribes to velocity commands and publishes odometry.
 
-    With ``realism`` its wheels slip, and its odometry is what a real robot would believe.
+    ``time_scale`` makes the base up to 25 times faster than real time. With ``realism`` the wheels slip, and the
+    odometry is as inexact as a real robot's.
 
     Attributes:
-        motion: The body's pose and velocity now.
+        motion: The true pose and velocity of the body at present.
     """
 
     def __init__(self, node: Node, names: RosNames, time_scale: float = 1.0, realism: Realism | None = None) -> None:
@@ -56,20 +57,20 @@ class Base:
         odometry.header.frame_id = names.frames.odom
         odometry.pose.covariance = _POSE_COVARIANCE
         odometry.twist.covariance = _TWIST_COVARIANCE
-        self._odometry = OdometryOctets(odometry)
+        self._odometry = SerializedOdometry(odometry)
         self._publisher = node.create_publisher(Odometry, names.topics.odom, 10)
         self._frames = FramePublisher(node, names)
         newest = QoSProfile(depth=1)
         if names.velocity.message == "TwistStamped":
-            node.create_subscription(TwistStamped, names.topics.cmd_vel, self._take_stamped, newest)
+            node.create_subscription(TwistStamped, names.topics.cmd_vel, self._receive_stamped, newest)
         else:
-            node.create_subscription(Twist, names.topics.cmd_vel, self._take, newest)
+            node.create_subscription(Twist, names.topics.cmd_vel, self._receive, newest)
         node.create_timer(max(_PERIOD_S / time_scale, _SHORTEST_PERIOD_S), self._step)
 
-    def _take_stamped(self, command: TwistStamped) -> None:
-        self._take(command.twist)
+    def _receive_stamped(self, command: TwistStamped) -> None:
+        self._receive(command.twist)
 
-    def _take(self, command: Twist) -> None:
+    def _receive(self, command: Twist) -> None:
         setpoint = (command.linear.x, command.angular.z)
         if not all(map(math.isfinite, setpoint)):
             self._node.get_logger().warning(f"refused a velocity command of {setpoint}", throttle_duration_sec=1.0)
@@ -102,4 +103,4 @@ class Base:
     def _report(self, motion: Motion) -> None:
         stamp = divmod(self._clock.now().nanoseconds, _NANOSECONDS)
         self._publisher.publish(self._odometry.filled(stamp, motion))
-        self._frames.tell(stamp, motion)
+        self._frames.publish(stamp, motion)

@@ -1,12 +1,13 @@
-"""The paper's delivery application: a request on a topic makes the robot drive a mission.
+"""The paper's delivery application: each delivery request on a topic makes the robot drive a mission.
 
-A mission goes source → destination → depot, each leg a NavigateToPose goal. It waits while navigation
-has somebody else's goal. A leg that is refused or cannot be driven fails its mission, and the next one begins,
-and so does a leg whose navigation is gone; a leg that is cancelled or displaced from outside fails its mission
-and drops the queue, and so does cancelling somebody else's goal while missions wait: an operator who stops the
-robot wants it to stay stopped.
+A mission has three legs, each a NavigateToPose goal: to the source, the destination and the depot. Missions wait in a
+queue while the navigation follows another client's goal.
 
-It drives any robot with Nav2's action, for it asks for nothing else.
+- The navigation refuses a leg, gives it up, or disappears: the mission fails, and the next mission begins.
+- Another client cancels or displaces a leg: the mission fails, and all waiting missions are dropped. So are they when
+  another client's goal is cancelled while missions wait. An operator who stops the robot wants it to stay stopped.
+
+The application works with every robot that offers Nav2's NavigateToPose action.
 """
 
 import itertools
@@ -34,15 +35,15 @@ from reference_robot.simulation.missions import Missions, MissionState
 from reference_robot.simulation.requests import DeliveryRequests
 
 _CODES: Final = frozenset({COURIER, COFFEE})
-_REPORT_PERIOD_S: Final = 0.05  # at least this between two reports, however fast requests come
-_RETRY_PERIOD_S: Final = 0.2  # after a refused leg, and while navigation's action server is not there
+_REPORT_PERIOD_S: Final = 0.05  # shortest time between two reports
+_RETRY_PERIOD_S: Final = 0.2  # after a refused leg, and while the navigation is not running
 
 _CANCELED: Final = frozenset({GoalStatus.STATUS_CANCELING, GoalStatus.STATUS_CANCELED})
-_REMEMBERED: Final = 100  # legs, and goals of others that were cancelled
+_REMEMBERED: Final = 100  # goal ids of legs, and of other clients' cancelled goals
 
 
 class Delivery:
-    """Runs missions."""
+    """The delivery application: receives requests, drives one mission after another, publishes their states."""
 
     def __init__(self, node: Node, requests: DeliveryRequests, names: RosNames) -> None:
         self._node = node
@@ -50,7 +51,7 @@ class Delivery:
         self._frames = names.frames
         self._missions = Missions()
         self._legs: list[tuple[float, float, float]] = []
-        self._leg = ""  # the id of the goal that is being driven
+        self._leg = ""  # the id of the active goal
         self._own: deque[str] = deque(maxlen=_REMEMBERED)
         self._seen_canceled: deque[str] = deque(maxlen=_REMEMBERED)
         self._knows_goals = False
@@ -63,10 +64,10 @@ class Delivery:
         self._begin_later.cancel()
         self._navigate = ActionClient(node, NavigateToPose, names.actions.navigate_to_pose)
         self._goals = GoalStatuses(node, names.actions.navigate_to_pose, self._note_goals)
-        requests.tell(node, self._take)
+        requests.watch(node, self._add_waiting)
 
-    def _take(self) -> None:
-        for request in self._requests.taken():
+    def _add_waiting(self) -> None:
+        for request in self._requests.waiting():
             self._add(request)
 
     def _add(self, request: DeliveryRequest) -> None:
@@ -81,15 +82,15 @@ class Delivery:
         self._changed()
 
     def _note_goals(self) -> None:
-        """Take up what the navigation tells of its goals, others' among them."""
+        """Process a status report of the navigation's goals, including those of other clients."""
         canceled = [
             goal.identity
             for goal in self._goals.reported
             if goal.status in _CANCELED and goal.identity not in self._own and goal.identity not in self._seen_canceled
         ]
         self._seen_canceled.extend(canceled)
-        # A leg of ours that is cancelled drops the queue when it ends. What the first report has as cancelled was so
-        # before any request, though a request may be taken before the report is.
+        # A cancelled leg drops the queue when it ends (`_leg_ended`). Goals that the first report shows as cancelled
+        # were cancelled before any request, even if a request was read before that report.
         if canceled and self._knows_goals and self._missions.active is None:
             self._missions.abandon()
             self._changed()
@@ -97,18 +98,14 @@ class Delivery:
         if self._goals.losses != self._losses:
             self._losses = self._goals.losses
             if self._leg and self._leg not in {goal.identity for goal in self._goals.active()}:
-                self._fail("the navigation went away")
+                self._fail("the navigation is no longer running")
         self._begin()
 
-    def _is_busy(self) -> bool:
-        """Tell whether navigation has somebody else's goal."""
-        return any(goal.identity not in self._own for goal in self._goals.active())
-
     def _begin(self) -> None:
-        """Begin the next mission, if there is one and navigation is free for it."""
+        """Begin the next waiting mission, provided that the navigation is running and not busy."""
         self._begin_later.cancel()
-        if self._is_busy():
-            return
+        if any(goal.identity not in self._own for goal in self._goals.active()):
+            return  # the navigation follows another client's goal
         if not self._navigate.server_is_ready():
             self._begin_later.reset()
             return
@@ -134,41 +131,41 @@ class Delivery:
         identity = uuid.uuid4()
         self._leg = identity.hex
         self._own.append(self._leg)
-        asked = self._navigate.send_goal_async(goal, goal_uuid=UUID(uuid=list(identity.bytes)))
-        asked.add_done_callback(partial(self._leg_answered, self._leg))
+        sent = self._navigate.send_goal_async(goal, goal_uuid=UUID(uuid=list(identity.bytes)))
+        sent.add_done_callback(partial(self._leg_accepted_or_refused, self._leg))
 
-    def _leg_answered(self, leg: str, answer: Any) -> None:
-        handle = answer.result()
+    def _leg_accepted_or_refused(self, leg: str, response: Any) -> None:
+        handle = response.result()
         if leg != self._leg:
-            return  # its navigation was given up
+            return  # the leg has been given up
         if handle.accepted:
             handle.get_result_async().add_done_callback(partial(self._leg_ended, leg))
         else:
             self._fail("the navigation refused a leg")
 
-    def _leg_ended(self, leg: str, answer: Any) -> None:
+    def _leg_ended(self, leg: str, response: Any) -> None:
         if leg != self._leg:
             return
         self._leg = ""
-        outcome = answer.result()
+        outcome = response.result()
         if outcome.status == GoalStatus.STATUS_SUCCEEDED:
             self._next_leg()
-        elif outcome.result.error_code:  # as Nav2 has it; a goal that was displaced has none
-            self._fail(f"the navigation gave a leg up: {outcome.result.error_msg or outcome.result.error_code}")
+        elif outcome.result.error_code:  # as in Nav2; a displaced goal has no error code
+            self._fail(f"the navigation gave up a leg: {outcome.result.error_msg or outcome.result.error_code}")
         else:
             self._missions.abandon()
             self._changed()
 
     def _fail(self, reason: str) -> None:
-        """Give the mission up, and begin the next one soon."""
+        """End the active mission as failed, and begin the next one after a pause."""
         self._leg = ""
         self._missions.finish(MissionState.FAILED, reason)
         self._changed()
-        # An impossible mission is planned in vain; a queue of them is not to keep the planner busy.
+        # After a pause, so that a queue of impossible missions does not keep the planner busy.
         self._begin_later.reset()
 
     def _changed(self) -> None:
-        """Report what changed: at once, or when the last report is old enough."""
+        """Publish the missions that changed, at most 20 times a second."""
         if time.monotonic() - self._reported_at >= _REPORT_PERIOD_S:
             self._report()
         elif not self._report_is_due:
@@ -180,9 +177,9 @@ class Delivery:
         self._report_is_due = False
         self._reported_at = time.monotonic()
         missions = self._missions
-        told = {
+        report = {
             "taken": missions.taken,
             "dropped": missions.dropped,
             "missions": [mission.plain() for mission in missions.changes()],
         }
-        self._reports.publish(String(data=json.dumps(told)))
+        self._reports.publish(String(data=json.dumps(report)))

@@ -1,4 +1,4 @@
-"""What the robot tells of its frames and its map (REP 105): map → odom → base, and the office as an occupancy grid."""
+"""Publishers of the robot's frames (REP 105: map → odom → base) and of the office's map as an occupancy grid."""
 
 import array
 import math
@@ -17,32 +17,32 @@ from reference_robot.simulation.messages import LATCHED, quaternion_of
 from reference_robot.simulation.office import OFFICE
 
 _RESOLUTION_M: Final = 0.05
-_OCCUPIED: Final = 100  # nav_msgs/OccupancyGrid: a probability in percent
-_PERIOD_S: Final = 0.1  # between transforms, which tf2 interpolates: at 50 Hz they would cost as much as the odometry
-_TRANSFORMS: Final = 100  # depth, as tf2's broadcaster has it
+_OCCUPIED: Final = 100  # probability in percent (nav_msgs/OccupancyGrid)
+_PERIOD_S: Final = 0.1  # between transforms; tf2 interpolates, and 50 Hz would cost as much time as the odometry
+_TRANSFORMS: Final = 100  # queue depth, as in tf2's broadcaster
 
 
 class FramePublisher:
-    """Publishes the transform of the base at 10 Hz, and once, latched, that map and odometry coincide."""
+    """A publisher of the transform odom → base at 10 Hz and, once and latched, of the identity map → odom."""
 
     def __init__(self, node: Node, names: RosNames) -> None:
         self._base = TransformStamped(child_frame_id=names.frames.base)
         self._base.header.frame_id = names.frames.odom
         self._message = TFMessage(transforms=[self._base])
-        self._told_at = -math.inf
+        self._published_at = -math.inf
         self._moving = node.create_publisher(TFMessage, names.topics.tf, _TRANSFORMS)
         self._static = node.create_publisher(TFMessage, names.topics.tf_static, LATCHED)
-        identity = TransformStamped(child_frame_id=names.frames.odom)  # a quaternion's default turns nothing
+        identity = TransformStamped(child_frame_id=names.frames.odom)  # the default quaternion is the identity
         identity.header.stamp = node.get_clock().now().to_msg()
         identity.header.frame_id = names.frames.map
         self._static.publish(TFMessage(transforms=[identity]))
 
-    def tell(self, stamp: tuple[int, int], motion: Motion) -> None:
-        """Publish where the body is at a time (seconds, nanoseconds), unless the last transform is that young."""
+    def publish(self, stamp: tuple[int, int], motion: Motion) -> None:
+        """Publish the transform of the base at a time (seconds, nanoseconds), at most ten times a second."""
         now = time.monotonic()
-        if now - self._told_at < _PERIOD_S:
+        if now - self._published_at < _PERIOD_S:
             return
-        self._told_at = now
+        self._published_at = now
         base = self._base
         base.header.stamp.sec, base.header.stamp.nanosec = stamp
         base.transform.translation.x, base.transform.translation.y = motion.x, motion.y
@@ -51,7 +51,7 @@ class FramePublisher:
 
 
 class MapServer:
-    """Publishes the office's map once, latched, as Nav2's map_server does."""
+    """A publisher of the office's map: one latched OccupancyGrid, as from Nav2's map_server."""
 
     def __init__(self, node: Node, names: RosNames) -> None:
         west, south, east, north = OFFICE.bounds

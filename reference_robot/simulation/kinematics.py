@@ -1,6 +1,6 @@
-"""How a differential-drive body moves: velocity limits, acceleration limits, exact integration of arcs.
+"""The motion of a differential-drive body: velocity limits, acceleration limits, exact integration of arcs.
 
-SI units throughout; angles in radians, counter-clockwise, poses in the map frame.
+All values are in SI units; angles in radians, counter-clockwise; poses in the map frame.
 """
 
 import math
@@ -11,15 +11,15 @@ from typing import Final
 _STRAIGHT: Final = 1e-6  # rad turned in a step; below it an arc's radius is numerically meaningless
 
 
-# What the drive can do. The accelerations let any permitted velocity follow any other within 0.45 s, which is inside
-# the 0.6 s settle time that the robot declares.
+# The limits of the drive. With these accelerations every permitted velocity is reached from every other within 0.45 s,
+# which is less than the declared settle time of 0.6 s.
 MAX_LINEAR: Final = 0.7  # m/s
 MAX_ANGULAR: Final = 2.5  # rad/s
 
 
 @dataclass(frozen=True)
 class Accelerations:
-    """How fast the velocity may change, m/s² and rad/s²."""
+    """The largest accelerations of a drive: linear in m/s², angular in rad/s²."""
 
     linear: float = 4.0
     angular: float = 12.0
@@ -30,7 +30,7 @@ _USUAL: Final = Accelerations()
 
 @dataclass(frozen=True)
 class Motion:
-    """Pose (x, y in m, yaw in rad, -π to π) and velocity (m/s forward, rad/s) of the body."""
+    """The body's pose (x, y in m, yaw in rad, -π to π) and velocity (m/s forward, rad/s)."""
 
     x: float
     y: float
@@ -40,12 +40,12 @@ class Motion:
 
 
 def wrap(angle: float) -> float:
-    """Bring an angle into -π to π."""
+    """Return an equivalent angle between -π and π."""
     return math.remainder(angle, math.tau)
 
 
 def within(value: float, bound: float) -> float:
-    """Clamp a value to ± bound."""
+    """Return the value, limited to the range from -bound to bound."""
     return max(-bound, min(bound, value))
 
 
@@ -56,10 +56,10 @@ def advance(
     is_free: Callable[[float, float], bool],
     accelerations: Accelerations = _USUAL,
 ) -> Motion:
-    """Move on for some seconds towards a velocity setpoint (m/s, rad/s), which is clamped to the limits.
+    """Return the motion after ``seconds`` of approaching a velocity setpoint (m/s, rad/s) within the limits.
 
-    Against a wall the body stays where it is while its wheels go on turning: the velocity is the one
-    that wheel encoders would measure.
+    If a wall is in the way, the body keeps its position while the wheels go on turning: the velocity is what wheel
+    encoders would measure.
     """
     linear = _approach(motion.linear, within(setpoint[0], MAX_LINEAR), accelerations.linear * seconds)
     angular = _approach(motion.angular, within(setpoint[1], MAX_ANGULAR), accelerations.angular * seconds)

@@ -1,4 +1,4 @@
-"""Where the robot is, as its odometry says."""
+"""The robot's present pose, read from its odometry topic."""
 
 from collections.abc import Callable
 
@@ -12,9 +12,9 @@ from reference_robot.simulation.planner import Pose
 
 
 class Localisation:
-    """The robot's last known pose in the map frame, with which the odometry frame coincides.
+    """A subscriber that knows the robot's latest pose in the map frame, which coincides with the odometry frame.
 
-    Odometry comes as octets, and is read when somebody asks: nobody does while the robot has nothing to do.
+    Odometry is kept serialized and is only deserialized in ``pose``, which nobody calls while the robot is idle.
 
     Attributes:
         on_update: Called after each odometry message.
@@ -22,21 +22,21 @@ class Localisation:
 
     def __init__(self, node: Node, names: RosNames) -> None:
         self.on_update: Callable[[], None] | None = None
-        self._octets = b""
-        node.create_subscription(Odometry, names.topics.odom, self._take, 1, raw=True)
+        self._serialized = b""
+        node.create_subscription(Odometry, names.topics.odom, self._receive, 1, raw=True)
 
     def pose(self) -> Pose:
-        """Return x, y (m) and yaw (rad).
+        """Return the robot's x, y (m) and yaw (rad).
 
         Raises:
-            PoseError: No odometry has come yet.
+            PoseError: No odometry has been received yet.
         """
-        if not self._octets:
-            raise PoseError("the robot does not know yet where it is")
-        pose = deserialize_message(self._octets, Odometry).pose.pose
+        if not self._serialized:
+            raise PoseError("the robot has not received its first odometry yet")
+        pose = deserialize_message(self._serialized, Odometry).pose.pose
         return pose.position.x, pose.position.y, yaw_of(pose.orientation)
 
-    def _take(self, octets: bytes) -> None:
-        self._octets = octets
+    def _receive(self, serialized: bytes) -> None:
+        self._serialized = serialized
         if self.on_update is not None:
             self.on_update()

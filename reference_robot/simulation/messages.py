@@ -1,80 +1,73 @@
-"""Between ROS messages and the simulation's plain values."""
+"""Conversions between ROS messages and the plain values of the simulation."""
 
 import math
 from typing import Any, Final
 
 from geometry_msgs.msg import PoseStamped, Quaternion
-from nav_msgs.msg import Path
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
 from reference_robot.names import Frames
-from reference_robot.simulation.office import Floats
 from reference_robot.simulation.planner import Pose
 
-_UNIT_TOLERANCE: Final = 1e-3  # of a quaternion's length, as the contract has it
+_UNIT_TOLERANCE: Final = 1e-3  # of a quaternion's length, as in the contract
 
-# For how long an action's result can be asked for, as Nav2 has it; rclpy's 900 s make every change of a
-# goal's state slower, because each one reports all goals that are remembered.
+# How long an action server keeps a goal's result, as in Nav2. rclpy's default of 900 s slows every change of a goal's
+# state down, because each status report contains all goals that are kept.
 RESULT_TIMEOUT_S: Final = 10
 
-# State that late subscribers get at once: the last message, kept by the publisher.
+# For state: the publisher keeps its last message, and late subscribers receive it at once.
 LATCHED: Final = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 
-# Each report tells what changed, so late subscribers get the last hundred.
+# Each report contains only changes, so late subscribers receive the last hundred reports.
 MISSION_REPORTS: Final = QoSProfile(
     depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 
 
 class PoseError(ValueError):
-    """A pose cannot be used; the message names the offending value."""
+    """An error for a pose that cannot be used; the message names the invalid value."""
 
 
 def yaw_of(quaternion: Quaternion) -> float:
-    """Return the rotation about z in radians."""
+    """Return the rotation of a quaternion about the z axis, in radians."""
     x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def quaternion_of(yaw: float) -> Quaternion:
-    """Return the unit quaternion that turns by yaw radians about z."""
+    """Return the unit quaternion of a rotation by ``yaw`` radians about the z axis."""
     return Quaternion(x=0.0, y=0.0, z=math.sin(yaw / 2), w=math.cos(yaw / 2))
 
 
 def pose_of(stamped: PoseStamped, frames: Frames) -> Pose:
-    """Return x, y (m) and yaw (rad) in the map frame, with which the odometry frame coincides.
+    """Return x, y (m) and yaw (rad) of a PoseStamped in the map or odometry frame, which coincide.
 
     Raises:
-        PoseError: The frame is unknown, or the orientation no unit quaternion.
+        PoseError: The frame is unknown, or the orientation is not a unit quaternion.
     """
     known = (frames.map, frames.odom)
     if stamped.header.frame_id not in known:
-        raise PoseError(f"frame_id {stamped.header.frame_id!r} is unknown; known are {', '.join(known)}")
+        raise PoseError(f"frame_id {stamped.header.frame_id!r} is unknown; the robot knows {', '.join(known)}")
     turn = stamped.pose.orientation
     length = math.hypot(turn.x, turn.y, turn.z, turn.w)
-    if not abs(length - 1.0) <= _UNIT_TOLERANCE:  # so written, NaN fails as well
+    if not abs(length - 1.0) <= _UNIT_TOLERANCE:  # in this form NaN fails too
         raise PoseError(f"the orientation's length is {length:g}, not 1")
     return stamped.pose.position.x, stamped.pose.position.y, yaw_of(turn)
 
 
 def stamped_pose(pose: Pose, header: Header) -> PoseStamped:
-    """Return the PoseStamped of x, y (m), yaw (rad)."""
+    """Return a PoseStamped with the given x, y (m), yaw (rad) and header."""
     message = PoseStamped(header=header)
     message.pose.position.x, message.pose.position.y = float(pose[0]), float(pose[1])
     message.pose.orientation = quaternion_of(float(pose[2]))
     return message
 
 
-def path_message(poses: Floats, header: Header) -> Path:
-    """Return the Path of (k, 3) poses, each in the header's frame."""
-    return Path(header=header, poses=[stamped_pose((x, y, yaw), header) for x, y, yaw in poses])
-
-
 def plain(stamped: PoseStamped) -> dict[str, Any]:
-    """Return a PoseStamped as JSON-ready values under its ROS field names."""
+    """Return a PoseStamped as nested dicts with its ROS field names, ready for JSON."""
     stamp, position, turn = stamped.header.stamp, stamped.pose.position, stamped.pose.orientation
     return {
         "header": {"stamp": {"sec": stamp.sec, "nanosec": stamp.nanosec}, "frame_id": stamped.header.frame_id},

@@ -1,6 +1,6 @@
-"""The delivery application's missions: what is asked, what waits, what drives, what became of the rest.
+"""The missions of the delivery application: a queue, the active mission, and the changes to report.
 
-Pure state, apart from ROS. Overflow rule: when ``capacity`` missions wait, a new request is dropped.
+The module does not use ROS. When ``capacity`` missions are waiting, a new request is dropped.
 """
 
 from collections import deque
@@ -11,11 +11,11 @@ from typing import Any, Final
 
 from reference_robot.deliveries import DeliveryRequest
 
-_REMEMBERED: Final = 100  # changes between two reports
+_REMEMBERED: Final = 100  # changes kept between two reports
 
 
 class MissionState(StrEnum):
-    """Where a mission stands."""
+    """The state of a mission."""
 
     QUEUED = "queued"
     ACTIVE = "active"
@@ -29,9 +29,14 @@ _ALIVE: Final = frozenset({MissionState.QUEUED, MissionState.ACTIVE})
 
 @dataclass(slots=True)
 class Mission:
-    """A request, when it was accepted (seconds and nanoseconds of ROS time), its state, and the reason of a bad end.
+    """A delivery request that the application received, and its progress.
 
-    ``number`` counts the requests from 1.
+    Attributes:
+        request: The delivery request.
+        accepted: When the request was received: seconds and nanoseconds of ROS time.
+        number: The request's sequence number, from 1.
+        state: The present state.
+        reason: Why the mission failed or was dropped; otherwise empty.
     """
 
     request: DeliveryRequest
@@ -41,16 +46,16 @@ class Mission:
     reason: str = ""
 
     def stops(self) -> tuple[tuple[float, float], ...]:
-        """Where the robot goes, in order: source, destination, depot."""
-        asked = self.request
+        """Return the (x, y) positions that the robot drives to, in order: source, destination, depot."""
+        request = self.request
         return (
-            (asked.source_x, asked.source_y),
-            (asked.destination_x, asked.destination_y),
-            (asked.depot_x, asked.depot_y),
+            (request.source_x, request.source_y),
+            (request.destination_x, request.destination_y),
+            (request.depot_x, request.depot_y),
         )
 
     def plain(self) -> dict[str, Any]:
-        """Return JSON-ready values, as they stand on the topic of missions."""
+        """Return the mission as a JSON-ready dict, as published on the topic of missions."""
         return {
             "number": self.number,
             "request": self.request._asdict(),
@@ -61,11 +66,11 @@ class Mission:
 
 
 class Missions:
-    """A queue of at most ``capacity`` missions, the one that drives, and those that changed last.
+    """A queue of at most ``capacity`` missions, the active mission, and the missions that changed lately.
 
     Attributes:
-        active: The mission that drives.
-        taken: How many requests there have been.
+        active: The mission that the robot drives; None if there is none.
+        taken: How many requests have been received.
         dropped: How many of them were dropped.
     """
 
@@ -78,24 +83,27 @@ class Missions:
         self.dropped = 0
 
     def changes(self) -> list[Mission]:
-        """Return the missions that changed since this was asked last: the hundred newest, and all that are alive."""
+        """Return the missions that changed since the last call, newest first, and forget the changes.
+
+        At most a hundred changes are kept; missions that wait or are driven are never left out.
+        """
         changed = sorted(self._changed.values(), key=attrgetter("number"), reverse=True)
         self._changed.clear()
         return changed
 
     def add(self, request: DeliveryRequest, accepted: tuple[int, int]) -> Mission:
-        """Queue a request, or drop it when the queue is full."""
+        """Return a new mission for a request: queued, or dropped if the queue is full."""
         self.taken += 1
         mission = Mission(request, accepted, self.taken)
         if len(self._queue) < self._capacity:
             self._queue.append(mission)
             self._set(mission, MissionState.QUEUED)
         else:
-            self._drop(mission, f"{self._capacity} missions wait already")
+            self._drop(mission, f"the queue is full with {self._capacity} missions")
         return mission
 
     def begin(self) -> Mission | None:
-        """Make the mission that waits longest the active one; None if one is active or none waits."""
+        """Make the longest waiting mission active and return it; None if a mission is active or none waits."""
         if self.active is not None or not self._queue:
             return None
         self.active = self._queue.popleft()
@@ -103,13 +111,13 @@ class Missions:
         return self.active
 
     def finish(self, state: MissionState, reason: str = "") -> None:
-        """End the active mission, done or failed."""
+        """End the active mission, if any, in the state DONE or FAILED."""
         if self.active is not None:
             self._set(self.active, state, reason)
             self.active = None
 
     def abandon(self) -> None:
-        """End the active mission as failed and drop all that wait: somebody wants the robot elsewhere."""
+        """Fail the active mission and drop all waiting ones, because another client controls the robot now."""
         self.finish(MissionState.FAILED, "its goal was cancelled or displaced")
         while self._queue:
             self._drop(self._queue.popleft(), "another goal was cancelled or displaced")
@@ -126,7 +134,7 @@ class Missions:
             self._forget_one()
 
     def _forget_one(self) -> None:
-        """Forget the oldest change of a mission that has ended: a flood must not hide those that wait or drive."""
+        """Forget the oldest change of a mission that has ended; waiting and active missions are kept."""
         for number, mission in self._changed.items():
             if mission.state not in _ALIVE:
                 del self._changed[number]

@@ -1,8 +1,8 @@
-"""Navigation: Nav2's NavigateToPose action, driven through cmd_vel.
+"""Navigation: an action server for Nav2's NavigateToPose that drives the robot through the topic cmd_vel.
 
-Goals are refused with a reason when no path leads there. Of two goals the newer one drives, and the
-displaced one ends ABORTED, as Nav2 has it. Two latched topics tell the rest of the robot what an action
-client cannot see: the active goal, whoever sent it, and why the last refused one was refused.
+The server refuses a goal to which no path leads. A newer goal displaces the active one, which ends as ABORTED, as in
+Nav2. Two latched topics publish what action clients cannot see: the active goal, whichever client sent it, and the
+reason for the last refusal.
 """
 
 import json
@@ -27,27 +27,26 @@ from reference_robot.simulation.progress import PATIENCE_S, Progress
 from reference_robot.simulation.pursuit import CRUISE, EXACT, Command, Pursuit
 
 _FEEDBACK_PERIOD_S: Final = 0.2
-_FAILED_TO_MAKE_PROGRESS: Final = 105  # nav2_msgs/FollowPath's code, which Nav2's navigator hands on
+_FAILED_TO_MAKE_PROGRESS: Final = 105  # code of nav2_msgs/FollowPath, which Nav2's navigator passes on
 
 
 class _DeferringActionServer(ActionServer):
-    """An action server whose goals are executing without a task of their own until they end.
+    """An action server that starts a goal's task only when the goal's result is available.
 
-    rclpy resumes a task that awaits something again and again until it is done, which takes a whole
-    core; so a goal gets its task only when its result is there.
+    rclpy polls a task that awaits something until it is done, which keeps a processor core busy.
     """
 
     def notify_execute(self, goal_handle: Any, execute_callback: Any) -> None:
-        """Note that a goal is executing, and nothing more."""
+        """Do nothing when a goal starts executing; the base class would start a task here."""
 
     def finish(self, goal_handle: Any, result: Any) -> None:
-        """Hand out the result of a goal that is in a final state."""
+        """Send the result of a goal that has reached a final state."""
         super().notify_execute(goal_handle, lambda _: result)
 
 
 @dataclass
 class _Drive:
-    """A goal on its way: its handle, its path, and what progress it makes."""
+    """The goal that the robot is driving to: its handle, its path, and the progress made."""
 
     handle: Any
     pursuit: Pursuit
@@ -58,7 +57,7 @@ class _Drive:
 
 
 class Navigation:
-    """Serves NavigateToPose; each update of the localisation is one step of control."""
+    """The NavigateToPose action server; each odometry message triggers one control step."""
 
     def __init__(
         self,
@@ -76,13 +75,13 @@ class Navigation:
         self._time_scale = time_scale
         self._tolerances = tolerances
         self._drive: _Drive | None = None
-        self._path: Any = None  # of the goal that was accepted last and has not begun
+        self._path: Any = None  # of the last accepted goal, until it begins
         self._stamped = names.velocity.message == "TwistStamped"
         velocity = TwistStamped if self._stamped else Twist
         self._velocities = node.create_publisher(velocity, names.topics.cmd_vel, 1)
         self._current_goals = node.create_publisher(String, names.topics.current_goal, LATCHED)
         self._rejections = node.create_publisher(String, names.topics.last_rejection, LATCHED)
-        self._tell_current_goal()
+        self._publish_current_goal()
         localisation.on_update = self._step
         self._action = _DeferringActionServer(
             node,
@@ -101,9 +100,9 @@ class Navigation:
             self._path = self._planner.plan(self._localisation.pose(), target)
         except (PlanError, PoseError) as error:
             self._node.get_logger().info(f"refused a goal: {error}", throttle_duration_sec=1.0)
-            # Told before the refusal goes out, so that whoever is refused can look up why.
-            told = {"pose": plain(goal.pose), "reason": str(error)}
-            self._rejections.publish(String(data=json.dumps(told)))
+            # Published before the refusal is sent, so that the client can look up the reason.
+            rejection = {"pose": plain(goal.pose), "reason": str(error)}
+            self._rejections.publish(String(data=json.dumps(rejection)))
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT
 
@@ -115,17 +114,17 @@ class Navigation:
             displaced.handle.abort()
             self._action.finish(displaced.handle, NavigateToPose.Result(error_msg="preempted by a newer goal"))
         handle.execute()
-        self._tell_current_goal()
+        self._publish_current_goal()
 
     def _step(self) -> None:
-        """Control once; runs after each odometry message."""
+        """Execute one control step for the active goal; runs after each odometry message."""
         drive = self._drive
         if drive is None:
             return
         if drive.handle.is_cancel_requested:
             if not drive.canceling:
                 drive.canceling = True
-                self._tell_current_goal()
+                self._publish_current_goal()
             self._end(drive, drive.handle.canceled)
             return
         pose = self._localisation.pose()
@@ -140,14 +139,14 @@ class Navigation:
         self._command(command.linear, command.angular)
         if now - drive.reported >= _FEEDBACK_PERIOD_S:
             drive.reported = now
-            self._tell_progress(drive, pose, command, now)
+            self._publish_feedback(drive, pose, command, now)
 
     def _end(self, drive: _Drive, transition: Callable[[], None], error: int = 0, message: str = "") -> None:
         self._drive = None
         self._command(0.0, 0.0)
         transition()
         self._action.finish(drive.handle, NavigateToPose.Result(error_code=error, error_msg=message))
-        self._tell_current_goal()
+        self._publish_current_goal()
 
     def _command(self, linear: float, angular: float) -> None:
         twist = Twist()
@@ -157,7 +156,7 @@ class Navigation:
         else:
             self._velocities.publish(twist)
 
-    def _tell_progress(self, drive: _Drive, pose: Pose, command: Command, now: float) -> None:
+    def _publish_feedback(self, drive: _Drive, pose: Pose, command: Command, now: float) -> None:
         feedback = NavigateToPose.Feedback(
             current_pose=stamped_pose(pose, self._header(self._names.frames.map)),
             navigation_time=Duration(seconds=now - drive.began).to_msg(),
@@ -166,7 +165,7 @@ class Navigation:
         )
         drive.handle.publish_feedback(feedback)
 
-    def _tell_current_goal(self) -> None:
+    def _publish_current_goal(self) -> None:
         drive, text = self._drive, ""
         if drive is not None:
             status = GoalStatus.STATUS_CANCELING if drive.canceling else GoalStatus.STATUS_EXECUTING

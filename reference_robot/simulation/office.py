@@ -1,8 +1,8 @@
-"""The office that the robot drives in: its walls, what is free, and what a laser sees.
+"""The office in which the simulated robot drives: its walls and furniture, free space, and laser distances.
 
-The floor is 28 m by 18 m in the map frame, laid out around the paper's example: the depot stands in a
-lobby, the source in an office north of the corridor, the destination in one south of it. Walls and
-furniture are axis-aligned boxes, so that every question is a vectorised slab test and no grid is needed.
+The floor measures 28 m by 18 m in the map frame and contains the places of the paper's example: the depot in a lobby,
+the source in an office north of the corridor, the destination in an office south of it. Walls and furniture are
+axis-aligned boxes. All geometric queries are vectorised slab tests on these boxes, without a grid.
 """
 
 from collections.abc import Sequence
@@ -60,7 +60,7 @@ _BOXES: Final[list[Box]] = [
     *_wall_along_y(78.0, _CORRIDOR_NORTH, _NORTH),
     *_wall_along_y(59.0, _SOUTH, _CORRIDOR_SOUTH),
     *_wall_along_y(77.5, _SOUTH, _CORRIDOR_SOUTH),
-    # A lift shaft: free inside, and no way in
+    # A lift shaft: free inside, but without an entrance
     *_wall_along_x(45.5, 80.5, _EAST),
     *_wall_along_y(80.5, 45.5, _NORTH),
     # Furniture: the lobby's reception desk and desks in offices
@@ -73,7 +73,7 @@ _BOXES: Final[list[Box]] = [
 
 @dataclass(frozen=True, eq=False)
 class Office:
-    """Boxes that nothing passes through.
+    """A map of axis-aligned obstacles.
 
     Attributes:
         boxes: (n, 4) array of x_min, y_min, x_max, y_max in metres.
@@ -83,33 +83,33 @@ class Office:
 
     @property
     def bounds(self) -> Box:
-        """The outermost x_min, y_min, x_max, y_max."""
+        """The map's x_min, y_min, x_max, y_max in metres."""
         low, high = self.boxes[:, :2].min(axis=0), self.boxes[:, 2:].max(axis=0)
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
     def contains(self, x: float, y: float) -> bool:
-        """Tell whether a point lies on the floor; not for NaN."""
+        """Return whether a point lies within the map's bounds; False for NaN."""
         x_min, y_min, x_max, y_max = self.bounds
         return x_min <= x <= x_max and y_min <= y <= y_max
 
     def grown(self, margin: float) -> "Office":
-        """Return an office whose boxes reach ``margin`` metres further on every side."""
+        """Return an office whose boxes are ``margin`` metres larger on every side."""
         return Office(self.boxes + np.array([-margin, -margin, margin, margin]))
 
     def is_free(self, x: float, y: float) -> bool:
-        """Tell whether a point is in no box."""
+        """Return whether a point lies outside all boxes."""
         inside = (self.boxes[:, :2] < (x, y)) & ((x, y) < self.boxes[:, 2:])
         return not bool(inside.all(axis=1).any())
 
     def free_lines(self, starts: Floats, ends: Floats) -> NDArray[np.bool_]:
-        """Tell for (m, 2) starts and (m, 2) ends which straight lines between them touch no box."""
+        """Return for each of m straight lines, from (m, 2) starts to (m, 2) ends, whether the line touches no box."""
         enter, leave = self._crossings(starts, ends - starts)
         hits = (enter < leave) & (leave > 0.0) & (enter < 1.0)
         free: NDArray[np.bool_] = np.logical_not(hits.any(axis=1))
         return free
 
     def distances(self, x: float, y: float, angles: Floats, longest: float) -> Floats:
-        """Distance to the nearest box from a free point, in each of (m,) directions, at most ``longest``."""
+        """Return the distances from a free point to the nearest box in each of (m,) directions, at most ``longest``."""
         directions = np.column_stack((np.cos(angles), np.sin(angles)))
         enter, leave = self._crossings(np.broadcast_to((x, y), directions.shape), directions)
         ahead = np.where((enter < leave) & (enter > 0.0), enter, longest)
@@ -117,7 +117,7 @@ class Office:
         return nearest
 
     def _crossings(self, starts: Floats, directions: Floats) -> tuple[Floats, Floats]:
-        """Where along each of m lines each of n boxes is entered and left, as (m, n) multiples."""
+        """Return where each of m lines enters and leaves each of n boxes: (m, n) multiples of the direction."""
         slopes = np.where(np.abs(directions) < _PARALLEL, _PARALLEL, directions)[:, None, :]
         to_low = (self.boxes[None, :, :2] - starts[:, None, :]) / slopes
         to_high = (self.boxes[None, :, 2:] - starts[:, None, :]) / slopes

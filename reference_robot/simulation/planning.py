@@ -1,4 +1,4 @@
-"""Plans on request: the nav_msgs/GetPlan service of the paper and Nav2's ComputePathToPose action."""
+"""Path planning for clients: the nav_msgs/GetPlan service of the paper and Nav2's ComputePathToPose action."""
 
 import time
 from typing import Any
@@ -14,12 +14,12 @@ from std_msgs.msg import Header
 
 from reference_robot.names import RosNames
 from reference_robot.simulation.localisation import Localisation
-from reference_robot.simulation.messages import RESULT_TIMEOUT_S, PoseError, path_message, pose_of
+from reference_robot.simulation.messages import RESULT_TIMEOUT_S, PoseError, pose_of, stamped_pose
 from reference_robot.simulation.planner import PlanError, Planner, Pose
 
 
 class Planning:
-    """Answers requests for plans without driving; one that names no start starts where the robot is."""
+    """A ROS service and an action server that return paths without driving; the default start is the robot's pose."""
 
     def __init__(self, node: Node, names: RosNames, planner: Planner, localisation: Localisation) -> None:
         self._node = node
@@ -37,9 +37,9 @@ class Planning:
         )
 
     def _get_plan(self, request: GetPlan.Request, response: GetPlan.Response) -> GetPlan.Response:
-        """Answer with a path, or with an empty one where there is none.
+        """Fill the response with the path in the goal's frame, or with an empty path if there is none.
 
-        A start without a frame_id means the robot's own pose; the plan is in the goal's frame.
+        A start without a frame_id stands for the robot's own pose.
         """
         try:
             start = self._start(request.start if request.start.header.frame_id else None)
@@ -50,7 +50,7 @@ class Planning:
         return response
 
     def _compute_path(self, handle: Any) -> ComputePathToPose.Result:
-        asked = time.monotonic()
+        began = time.monotonic()
         request, result = handle.request, ComputePathToPose.Result()
         try:
             start = self._start(request.start if request.use_start else None)
@@ -59,7 +59,7 @@ class Planning:
             result.error_code, result.error_msg = int(error.failure), str(error)
         except PoseError as error:
             result.error_code, result.error_msg = ComputePathToPose.Result.TF_ERROR, str(error)
-        result.planning_time = Duration(seconds=time.monotonic() - asked).to_msg()
+        result.planning_time = Duration(seconds=time.monotonic() - began).to_msg()
         if result.error_code == ComputePathToPose.Result.NONE:
             handle.succeed()
         else:
@@ -73,9 +73,10 @@ class Planning:
 
     def _plan(self, start: Pose, goal: PoseStamped, tolerance: float) -> Path:
         poses = self._planner.plan(start, pose_of(goal, self._frames), tolerance)
-        path = path_message(poses, self._header(goal.header.frame_id))
+        header = self._header(goal.header.frame_id)
+        path = Path(header=header, poses=[stamped_pose((x, y, yaw), header) for x, y, yaw in poses])
         if not tolerance or _same_point(path.poses[-1], goal):
-            path.poses[-1].pose = goal.pose  # to the last bit, which a yaw there and back is not
+            path.poses[-1].pose = goal.pose  # exactly; converting to yaw and back would round
         return path
 
     def _header(self, frame_id: str) -> Header:

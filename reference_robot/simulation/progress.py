@@ -1,4 +1,4 @@
-"""Whether a robot on its way to a goal gets nearer to it."""
+"""Detection of a robot that gets no nearer to its goal."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import Final
 
 PATIENCE_S: Final = 20.0  # without getting 0.05 m nearer, in simulated time
 _NEARER_M: Final = 0.05
-# A step of control comes with each odometry message, 50 a second. What takes longer held the robot's processes up, and
-# a robot that is held up fails at nothing.
+# A control step follows each odometry message, 50 times a second. A longer interval means that the processes were
+# delayed, which must not count as a lack of progress.
 _STEP_S: Final = 0.1
 
 
 class Progress:
-    """What is left of one goal's way, step by step.
+    """The remaining distance to a goal, followed over time.
 
     Args:
-        now: s of a clock, when the goal was taken.
-        time_scale: simulated seconds in one of these.
+        now: When the goal was accepted, by any clock in seconds.
+        time_scale: Simulated seconds per second of that clock.
     """
 
     def __init__(self, now: float, time_scale: float) -> None:
@@ -27,7 +27,7 @@ class Progress:
         self._waited_s = 0.0
 
     def is_lacking(self, remaining: float, now: float) -> bool:
-        """Take a step at which ``remaining`` m are left; whether it has come no nearer for too long."""
+        """Record the remaining distance in metres; return whether it has not decreased for 20 simulated seconds."""
         self._waited_s += min(now - self._stepped, _STEP_S) * self._time_scale
         self._stepped = now
         if remaining < self._nearest - _NEARER_M:

@@ -1,4 +1,4 @@
-"""Pure pursuit: velocities that take a differential drive along a path and turn it to the final yaw."""
+"""Pure pursuit: velocities that drive a differential-drive robot along a path and turn it to the final yaw."""
 
 import math
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ CRUISE: Final = 0.6  # m/s, below the base's limit
 _TURN: Final = 1.8  # rad/s
 _LOOKAHEAD: Final = 0.4  # m
 EXACT: Final = (0.03, 0.02)  # m, rad
-_DRIFT: Final = 0.1  # m off the goal at which a robot that turns on the spot goes back to driving
-_TURN_ON_SPOT: Final = 0.6  # rad off the course beyond which it stops to turn
-_SEARCH_AHEAD: Final = 8  # path poses in which the nearest one is sought
+_DRIFT: Final = 0.1  # m from the goal beyond which a robot that turns on the spot drives again
+_TURN_ON_SPOT: Final = 0.6  # rad off the course beyond which the robot stops and turns
+_SEARCH_AHEAD: Final = 8  # path poses among which the nearest is searched
 
 
 @dataclass(frozen=True)
 class Command:
-    """A velocity (m/s, rad/s), the path length left (m), and whether the goal is reached."""
+    """A velocity to drive with (m/s, rad/s), the remaining path length (m), and whether the goal is reached."""
 
     linear: float
     angular: float
@@ -29,7 +29,7 @@ class Command:
 
 
 class Pursuit:
-    """Follows one path: (k, 3) poses as the planner returns them, to its end within tolerances in m and rad."""
+    """A controller that follows a planned path, (k, 3) poses, to its end within tolerances (m, rad)."""
 
     def __init__(self, path: Floats, tolerances: tuple[float, float] = EXACT) -> None:
         self._path = path
@@ -40,7 +40,7 @@ class Pursuit:
         self._turning = False
 
     def command(self, x: float, y: float, yaw: float) -> Command:
-        """Return what to do at a pose of the robot."""
+        """Return the next velocity for a robot at the given pose."""
         goal_x, goal_y, goal_yaw = self._path[-1]
         off = math.dist((x, y), (goal_x, goal_y))
         if off < self._near:
@@ -56,12 +56,12 @@ class Pursuit:
         angular = within(3.0 * course, _TURN)
         if abs(course) > _TURN_ON_SPOT:
             return Command(0.0, angular, remaining, arrived=False)
-        # Slower towards the end, so that it stops there, and off the course, so that it cuts no corner.
+        # Slower near the goal, so that the robot stops there, and off the course, so that it cuts no corners.
         linear = min(CRUISE, 1.5 * off + 0.02) * math.cos(course) ** 4
         return Command(linear, angular, remaining, arrived=False)
 
     def _target(self, x: float, y: float) -> tuple[float, float, float]:
-        """Return the path pose that lies a lookahead before the robot, and the length left."""
+        """Return x and y of the path pose that lies the lookahead distance ahead, and the remaining path length."""
         window = self._path[self._nearest : self._nearest + _SEARCH_AHEAD, :2]
         distances = np.hypot(*(window - (x, y)).T)
         self._nearest += int(distances.argmin())

@@ -1,7 +1,7 @@
-"""What a real robot does otherwise than arithmetic: its wheels slip, its odometry is late, noisy and drifts.
+"""The imperfections of a real robot: slipping wheels, and odometry that is slow, noisy and drifts.
 
-Pure: everything is drawn from one seed, so a seed is a robot. The figures are those of small indoor robots with wheel
-encoders, a gyroscope and a localisation that puts the pose right now and then.
+All values are drawn from one seed, so that a seed always gives the same robot. The values are typical for small indoor
+robots with wheel encoders, a gyroscope and a localisation that corrects the pose from time to time.
 """
 
 import math
@@ -12,20 +12,20 @@ from typing import Final
 
 from reference_robot.simulation.kinematics import Accelerations, Motion, wrap
 
-# A command takes so long from the web services to the wheels, s.
+# Shortest and longest delay of a command between the web services and the wheels, s.
 _EARLIEST_S: Final = 0.05
 _LATEST_S: Final = 0.2
-# Standard deviations at rest: m, rad, m/s, rad/s; in motion a share of the speed comes on top of the last two.
+# Standard deviations at rest; in motion a share of the speed is added to those of the velocities.
 _POSITION_M: Final = 0.003
 _HEADING_RAD: Final = 0.003
 _LINEAR_M_S: Final = 0.004
 _ANGULAR_RAD_S: Final = 0.01
 _IN_MOTION: Final = 0.01
-# Localisation puts the pose right once in so long, s, and then is off by this, m.
+# The mean time between two corrections of the pose by localisation, s, and the remaining error, m.
 _SELDOM_S: Final = 30.0
 _AFTER_JUMP_M: Final = 0.03
 
-# How near to a goal navigation has to come that is told of the robot's place so seldom and so late: m, rad.
+# The tolerances at a goal (m, rad) of a navigation whose odometry is this slow and late.
 NEAR_ENOUGH: Final = (0.08, 0.06)
 
 _ACCELERATIONS: Final = Accelerations(linear=2.0, angular=8.0)
@@ -33,12 +33,12 @@ _ACCELERATIONS: Final = Accelerations(linear=2.0, angular=8.0)
 
 @dataclass(frozen=True)
 class Character:
-    """What is one robot's own.
+    """The constant imperfections of one robot.
 
     Attributes:
-        odometry_hz: 5 to 20.
-        slip: share of the way that the wheels turn and the body does not move.
-        drift: share by which each turn is told too great or too small.
+        odometry_hz: Rate of odometry messages, 5 to 20 Hz.
+        slip: The share of the wheels' way by which the body moves less.
+        drift: The relative error of every measured turn.
     """
 
     odometry_hz: float
@@ -47,38 +47,38 @@ class Character:
 
 
 class Realism:
-    """The imperfections of one robot; ``seed`` chooses them.
+    """A generator of one robot's imperfections; ``seed`` selects the robot.
 
     Attributes:
-        character: what stays as it is.
-        accelerations: what its drive can do.
+        character: The robot's constant imperfections.
+        accelerations: The accelerations of the robot's drive.
     """
 
     def __init__(self, seed: int) -> None:
-        self._random = random.Random(seed)  # noqa: S311 - no secret
+        self._random = random.Random(seed)  # noqa: S311 - not for cryptography
         draw = self._random.uniform
         self.character = Character(odometry_hz=draw(5.0, 20.0), slip=draw(0.0, 0.03), drift=draw(-0.02, 0.02))
         self.accelerations = _ACCELERATIONS
         self._next_jump_s = self._random.expovariate(1 / _SELDOM_S)
 
     def lateness(self) -> float:
-        """How long one command is on its way, s."""
+        """Return a random delay of one velocity command, in seconds."""
         return self._random.uniform(_EARLIEST_S, _LATEST_S)
 
     def slipped(self, before: Motion, after: Motion) -> Motion:
-        """Where the body is when its wheels have gone from one place to another."""
+        """Return the body's true motion when slipping wheels turn as far as the way from ``before`` to ``after``."""
         stays = self.character.slip
         return replace(after, x=after.x - stays * (after.x - before.x), y=after.y - stays * (after.y - before.y))
 
     def believed(self, belief: Motion, before: Motion, after: Motion, body: Motion, seconds: float) -> Motion:
-        """Where the robot believes to be after a step of its wheels, by encoders, gyroscope and localisation.
+        """Return the motion that the robot estimates after one step, from encoders, gyroscope and localisation.
 
         Args:
-            belief: the same after the step before.
-            before: where the body was before the step.
-            after: where the wheels would have taken it.
-            body: where the body really is now.
-            seconds: how long the step was.
+            belief: The estimate after the previous step.
+            before: Where the body was before the step.
+            after: Where the body would be now if the wheels did not slip.
+            body: Where the body really is now.
+            seconds: The duration of the step.
         """
         way = math.hypot(after.x - before.x, after.y - before.y) * math.copysign(1.0, after.linear)
         turned = wrap(after.yaw - before.yaw) * (1 + self.character.drift)
@@ -93,7 +93,7 @@ class Realism:
         return Motion(x, y, yaw, after.linear, after.angular)
 
     def noisy(self, belief: Motion) -> Motion:
-        """One sample of the odometry."""
+        """Return an estimated motion with measurement noise added, as one odometry message reports it."""
         off = self._random.gauss
         return Motion(
             belief.x + off(0, _POSITION_M),
@@ -105,19 +105,19 @@ class Realism:
 
 
 class Delayed:
-    """Commands on their way, which arrive in their order, each at its time."""
+    """A queue of velocity commands, each of which arrives at a given time; the order is kept."""
 
     def __init__(self) -> None:
         self._underway: deque[tuple[float, tuple[float, float]]] = deque()
 
     def send(self, arrives: float, command: tuple[float, float]) -> None:
-        """Send a command (m/s, rad/s) that arrives then, s, or right after the one before it."""
+        """Queue a command (m/s, rad/s) that arrives at a time in seconds, but not before the previous command."""
         if self._underway:
             arrives = max(arrives, self._underway[-1][0])
         self._underway.append((arrives, command))
 
     def arrived(self, now: float) -> tuple[float, tuple[float, float]] | None:
-        """Take what has arrived by now: the newest command, and when it came; None where nothing has."""
+        """Remove all commands that have arrived by ``now``; return the newest with its arrival time, or None."""
         newest = None
         while self._underway and self._underway[0][0] <= now:
             newest = self._underway.popleft()

@@ -1,8 +1,8 @@
-"""The delivery requests that come on the topic, taken many at a time.
+"""The delivery requests that arrive on the ROS topic, read in batches.
 
-To wake a thread of Python for each message costs this process 40 µs, and whoever sent it a processor meanwhile: on the
-machine of a small robot that is the processor of the client that waits for its answer. So the first that comes wakes
-one, and what comes in the next 5 ms waits for their end. Fast DDS keeps it, and acknowledges it, until then.
+Waking a Python thread for each message costs this process 40 µs and takes a processor from the sender. On a small
+robot's machine that is the processor of the client that waits for its response. So the first message wakes a thread,
+and messages of the next 5 ms are read together. Until then Fast DDS stores and acknowledges them.
 """
 
 from collections.abc import Callable, Iterator
@@ -15,17 +15,17 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.names import RosNames
-from reference_robot.ros import RosRuntime, taken
+from reference_robot.ros import RosRuntime, waiting_messages
 
-# No request is lost: what has not been taken yet is kept, and a publisher that keeps all as well is held back.
+# No request is lost: unread messages are kept, and a publisher with KEEP_ALL waits when the queue is full.
 _QOS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
-# Many messages at once keep a processor: those of 50 ms for 3 ms, those of 5 for 0.3.
+# A batch occupies a processor: the messages of 50 ms for 3 ms, the messages of 5 ms for 0.3 ms.
 _PAUSE_S: Final = 0.005
-_MOST: Final = 5000  # that Fast DDS keeps; more come only while these are taken
+_MOST: Final = 5000  # messages that Fast DDS keeps; others may arrive while a batch is read
 
 
 class DeliveryRequests:
-    """What has come, to be taken."""
+    """A subscription to the topic of delivery requests that is read in batches."""
 
     def __init__(self, ros: RosRuntime, names: RosNames) -> None:
         self._ros = ros
@@ -34,10 +34,10 @@ class DeliveryRequests:
             DeliveryRequestMsg, names.topics.delivery, lambda _: None, _QOS, raw=True
         )
 
-    def tell(self, node: Node, callback: Callable[[], None]) -> None:
-        """Have it called in a node's thread when some wait."""
+    def watch(self, node: Node, callback: Callable[[], None]) -> None:
+        """Call ``callback`` in a node's thread whenever requests are waiting to be read."""
         self._ros.watch(self._subscription, node, callback, _PAUSE_S)
 
-    def taken(self) -> Iterator[DeliveryRequest]:
-        """Take what waits, oldest first."""
-        return map(DeliveryRequest.of, islice(taken(self._subscription), _MOST))
+    def waiting(self) -> Iterator[DeliveryRequest]:
+        """Yield the waiting requests, oldest first, and remove them from the subscription's queue."""
+        return map(DeliveryRequest.of, islice(waiting_messages(self._subscription), _MOST))

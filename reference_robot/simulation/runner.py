@@ -1,4 +1,4 @@
-"""Puts the simulated robot together: one runtime, its nodes, and their order of construction."""
+"""The assembly of the simulated robot: all its nodes on one ROS runtime."""
 
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
@@ -17,9 +17,9 @@ from reference_robot.simulation.sensors import Sensors
 
 
 class Simulation:
-    """The robot's nodes ``base``, ``navigation`` and ``delivery`` on a runtime; ROS time stays wall time.
+    """The simulated robot: the ROS nodes ``base``, ``navigation`` and ``delivery`` on a runtime. ROS time is wall time.
 
-    With ``realism`` the robot is like a real one.
+    With ``realism`` the robot has the imperfections of a real one.
 
     Raises:
         ValueError: The time scale is not positive.

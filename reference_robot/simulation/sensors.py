@@ -1,6 +1,7 @@
-"""What the robot senses besides its own odometry: laser scan, inertial measurement, battery.
+"""The robot's simulated sensors besides odometry: laser scanner, inertial measurement unit, battery.
 
-Nothing is measured while nobody listens, as image_transport has it: the scan alone would take 1 % of a processor.
+A sensor measures only while its topic has subscribers, as in image_transport. The laser alone would take 1 % of a
+processor.
 """
 
 import array
@@ -36,7 +37,7 @@ _EMPTY_V: Final = 14.0
 
 
 class Sensors:
-    """Publishes what the body senses."""
+    """The publishers of laser scans, inertial measurements and battery state for the body's true motion."""
 
     def __init__(self, node: Node, names: RosNames, motion: Callable[[], Motion]) -> None:
         self._clock = node.get_clock()
@@ -64,7 +65,7 @@ class Sensors:
         for message in (self._scan, self._imu, self._battery):
             message.header.frame_id = names.frames.base
         self._switched_on = time.monotonic()
-        self._before: tuple[float, float] = (0.0, self._switched_on)  # m/s and when
+        self._before: tuple[float, float] = (0.0, self._switched_on)  # the last speed (m/s) and its time
         topics, usual = names.topics, qos_profile_sensor_data
         self._scans = _sensor(node, LaserScan, topics.scan, usual, _SCAN_PERIOD_S, self._look)
         self._imus = _sensor(node, Imu, topics.imu, usual, _IMU_PERIOD_S, self._feel)
@@ -76,7 +77,7 @@ class Sensors:
         motion = self._motion()
         ranges = OFFICE.distances(motion.x, motion.y, self._angles + motion.yaw, _RANGE_MAX_M)
         self._scan.header.stamp = self._clock.now().to_msg()
-        # rclpy takes an array of C floats as it is, where it checks a list number by number.
+        # rclpy copies an array of C floats, but checks every number of a list.
         self._scan.ranges = array.array("f", ranges.astype(np.float32).tobytes())
         self._scans.publish(self._scan)
 
@@ -107,7 +108,7 @@ class Sensors:
 def _sensor(
     node: Node, kind: type, topic: str, qos: QoSProfile, period_s: float, measure: Callable[[], None]
 ) -> Publisher:
-    """Return a publisher for whose subscribers ``measure`` is called once in a period, and for nobody else."""
+    """Return a publisher; ``measure`` is called once per period while the publisher has subscribers."""
     timer = node.create_timer(period_s, measure, autostart=False)
 
     def note_subscribers(change: Any) -> None:

@@ -1,1 +1,1 @@
-"""The paper's layer: ROS publishers and subscribers, REST resources and SOAP services, and no simulation."""
+"""The web services of the paper: ROS publishers and subscribers, REST resources and SOAP services; no simulation."""

@@ -1,10 +1,9 @@
-"""How the layers hang together: one pair of ROS nodes, handed down to every resource and web method (paper)."""
+"""The assembly of the web services: all resources and web methods share one pair of ROS nodes, as in the paper."""
 
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from reference_robot.webservices.configuration import Configuration
-from reference_robot.webservices.http.address import Address, url_of
+from reference_robot.webservices.http.address import Address
 from reference_robot.webservices.http.listening import REST, SOAP, Listening
 from reference_robot.webservices.nodes.calls import RosCalls
 from reference_robot.webservices.nodes.lifecycle import ManagedNode
@@ -30,27 +29,14 @@ from reference_robot.webservices.soap.interface import SoapInterface
 from reference_robot.webservices.soap.publishers import PublishersWebService
 from reference_robot.webservices.soap.subscribers import SubscribersWebService
 
-_STATE_DEADLINE: Final = 1.0  # seconds for a managed node to say its state
+_STATE_DEADLINE: Final = 1.0  # seconds for a managed node to report its state
 
 
-@dataclass(frozen=True)
-class Endpoints:
-    """Where the two interfaces listen: scheme, host, and the ports that were really bound."""
+class Endpoints(NamedTuple):
+    """The base URLs of the REST and SOAP interfaces, with the ports that were bound."""
 
-    scheme: str
-    host: str
-    rest_port: int
-    soap_port: int
-
-    @property
-    def rest(self) -> str:
-        """The base URL of the REST interface."""
-        return url_of(self.host, self.rest_port, self.scheme)
-
-    @property
-    def soap(self) -> str:
-        """The base URL of the SOAP interface."""
-        return url_of(self.host, self.soap_port, self.scheme)
+    rest: str
+    soap: str
 
 
 def interfaces(
@@ -60,9 +46,9 @@ def interfaces(
     endpoints: Endpoints,
     listening: Listening,
 ) -> tuple[RestInterface, SoapInterface, Velocity]:
-    """Return both interfaces, which share the nodes and everything that is known about the robot.
+    """Return the REST interface, the SOAP interface and the Velocity object that both use.
 
-    The third is what drives: to be closed when nobody is served any more, so that the robot stops.
+    Close the Velocity object after the interfaces have stopped, so that the robot stops.
     """
     frames = configuration.frames
     executor, nodes = publishers.node.executor, configuration.nodes

@@ -1,4 +1,4 @@
-"""The one TOML file of the robot: names on the ROS graph, and what the web services need to know besides."""
+"""The configuration file of the robot (TOML): names on the ROS graph, and settings of the web services."""
 
 from pathlib import Path
 
@@ -9,14 +9,14 @@ from reference_robot.names import DEFAULT_NAMES_FILE, RosNames
 
 
 class WebSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The table ``[web]``: the robot's declared figures and the deadlines of the web services.
+    """The table ``[web]``: the robot's limits and the deadlines of the web services.
 
     Attributes:
-        max_linear: Largest magnitude of linear.x that a PUT may ask for, m/s.
-        max_angular: Largest magnitude of angular.z, rad/s.
+        max_linear: Largest magnitude of linear.x in a PUT request, m/s.
+        max_angular: Largest magnitude of angular.z in a PUT request, rad/s.
         hold: How long the robot keeps a velocity that is not renewed, s (its own watchdog enforces it).
         settle: Within what time a new velocity is reached, s; declared, not enforced.
-        deadline: How long to wait for an answer from ROS, s.
+        deadline: How long to wait for a response from ROS, s.
         read_deadline: How long a client may take to send one request, s.
     """
 
@@ -29,15 +29,17 @@ class WebSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Configuration(RosNames, frozen=True, forbid_unknown_fields=True):
-    """Everything that a file may say."""
+    """All tables of the configuration file."""
 
     web: WebSettings = WebSettings()
 
 
 def load_configuration(path: Path | None) -> Configuration:
-    """Read a configuration: the tables of ``names.toml`` and ``[web]``; what it leaves out keeps its default.
+    """Return the configuration from a file; keys that are missing in the file keep their defaults.
+
+    The file has the tables of ``names.toml`` and ``[web]``.
 
     Raises:
-        TomlFileError: The file cannot be read, is no TOML, or has an unknown or unusable key.
+        TomlFileError: The file cannot be read, is not TOML, or has an unknown key or an invalid value.
     """
     return read_toml(path or DEFAULT_NAMES_FILE, Configuration)

@@ -1,4 +1,4 @@
-"""The REST interface: from a request to the resource that it names (paper, ``ros-rs``)."""
+"""The REST interface: finds the resource for a request (paper, ``ros-rs``)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _DELIVERY_PATHS: Final = b"/robot/app/delivery/"
 
 
 class RestInterface(Interface):
-    """Serves resources with a fixed path, and the delivery, which has values in its path."""
+    """The REST interface: resources with fixed paths, and the delivery resource, whose path contains values."""
 
     def __init__(self, resources: Iterable[Resource], delivery: Delivery, admission: Admission) -> None:
         super().__init__(admission)
@@ -27,20 +27,20 @@ class RestInterface(Interface):
         self._delivery = delivery
 
     def scope(self, request: Request) -> Scope:
-        """Return ``deliver`` for deliveries and ``move`` for everything else."""
+        """Return the scope for a request that changes something: ``deliver`` for deliveries, otherwise ``move``."""
         return Scope.DELIVER if request.path.startswith(_DELIVERY_PATHS) else Scope.MOVE
 
     def answer(self, request: Request) -> Response | Awaitable[Response]:
-        """Return the resource's answer.
+        """Return the response of the resource that the request addresses.
 
         Raises:
-            Problem: 404 for an unknown path whatever the method, 405 with Allow for a method that the resource does
-                not offer (RFC 9110 15.5.5, 15.5.6), and what the resource raises.
+            Problem: 404 for an unknown path whatever the method, 405 with Allow for a method that the resource does not
+                offer (RFC 9110 15.5.5, 15.5.6), and every problem that the resource raises.
         """
         handlers = self._fixed.get(request.path)
         if handlers is None:
             if request.method == "PUT" and request.path.startswith(_DELIVERY_PATHS):
-                return self._delivery.put(request)  # the one that has to be fast; it refuses what is not its path
+                return self._delivery.put(request)  # must be fast; refuses an invalid path
             handlers = self._with_values(request.path)
         handler = handlers.get(request.method)
         if handler is not None:

@@ -1,4 +1,4 @@
-"""RobotWebServiceNodesRunner: starts nodes and endpoints, and stops them (paper; apart from the endpoint itself)."""
+"""RobotWebServiceNodesRunner (paper): starts and stops the ROS nodes and the endpoints."""
 
 import asyncio
 import contextlib
@@ -8,6 +8,7 @@ import resource
 import signal
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import uvloop
@@ -16,56 +17,50 @@ from reference_robot.ros import RosRuntime
 from reference_robot.webservices.assembly import Endpoints, interfaces
 from reference_robot.webservices.configuration import Configuration
 from reference_robot.webservices.endpoint import EndpointPublisher, bound
+from reference_robot.webservices.http.address import url_of
 from reference_robot.webservices.http.listening import Listening
 from reference_robot.webservices.http.port import Limits
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 
 _DESCRIPTORS: Final = 8192  # connections and ROS together; the usual soft limit of 1,024 is soon reached
-_TLS_CONNECTIONS: Final = 500  # of each interface: each keeps 280 kB once it has carried something
+_TLS_CONNECTIONS: Final = 500  # per interface; each takes 280 kB once used
 _DISCOVERY: Final = 20.0  # seconds in which a robot that has been started must appear on the graph
 _DISCOVERY_STEP: Final = 0.05
 
 
 class RobotNotFoundError(RuntimeError):
-    """The robot that was started did not appear on the ROS graph."""
+    """An error for a robot that was started but did not appear on the ROS graph."""
 
 
+@dataclass(frozen=True)
 class RobotWebServiceNodesRunner:
-    """Runs the web services of one robot; ``ros_arguments`` are for its nodes."""
+    """The web services of one robot with their ROS nodes; ``ros_arguments`` are passed to these nodes."""
 
-    def __init__(
-        self,
-        configuration: Configuration,
-        listening: Listening,
-        domain_id: int | None,
-        ros_arguments: Sequence[str] = (),
-    ) -> None:
-        self._configuration = configuration
-        self._listening = listening
-        self._domain_id = domain_id
-        self._ros_arguments = ros_arguments
+    configuration: Configuration
+    listening: Listening
+    domain_id: int | None
+    ros_arguments: Sequence[str] = ()
 
     def run(self, ready: Callable[[Endpoints], None], *, wait_for_robot: bool) -> None:
-        """Serve until SIGINT or SIGTERM; ``ready`` is called once, when both interfaces answer.
+        """Serve until SIGINT or SIGTERM; call ``ready`` once, when both interfaces accept requests.
 
         Raises:
-            PortInUseError: A port cannot be had.
-            RobotNotFoundError: ``wait_for_robot``, and none came in time.
+            PortInUseError: A port cannot be bound.
+            RobotNotFoundError: ``wait_for_robot`` is set and no robot appeared in time.
         """
-        configuration = self._configuration
+        configuration, listening = self.configuration, self.listening
         _raise_descriptor_limit()
-        # Fast DDS's default, and no user's setting: the sender's own thread of the asynchronous mode holds a lock that
-        # each publish waits for, which makes one answer in ten 3 ms slower. Other middleware ignores it.
+        # This is Fast DDS's default, and overrides a user's setting. In asynchronous mode each publish waits for a lock
+        # of the sender's thread, which delays one response in ten by 3 ms. Other middleware ignores the variable.
         os.environ["RMW_FASTRTPS_PUBLICATION_MODE"] = "SYNCHRONOUS"
-        listening = self._listening
         host = listening.host
         with (
             bound(host, listening.rest_port) as rest,
             bound(host, listening.soap_port) as soap,
-            RosRuntime(self._domain_id, self._ros_arguments) as ros,
+            RosRuntime(self.domain_id, self.ros_arguments) as ros,
         ):
-            endpoints = Endpoints(listening.scheme, host, rest.getsockname()[1], soap.getsockname()[1])
+            endpoints = Endpoints(*(url_of(host, at.getsockname()[1], listening.scheme) for at in (rest, soap)))
             publishers, subscribers = RobotPublishersNode(ros, configuration), RobotSubscribersNode(ros, configuration)
             ros.start()
             if wait_for_robot:
@@ -78,7 +73,7 @@ class RobotWebServiceNodesRunner:
                 listening.proxies,
                 listening.tls,
             )
-            gc.freeze()  # what lives as long as the robot is not looked at again: that takes 80 ms
+            gc.freeze()  # excludes permanent objects from garbage collection, which would take 80 ms
             with contextlib.closing(velocity):
                 uvloop.run(_serve_until_signalled(publisher, lambda: ready(endpoints)))
 
@@ -97,9 +92,9 @@ async def _serve_until_signalled(publisher: EndpointPublisher, ready: Callable[[
 def _await_robot(publishers: RobotPublishersNode, subscribers: RobotSubscribersNode) -> None:
     missing = {
         "odometry": lambda: subscribers.odometry[0] is not None,
-        "a listener for velocity commands": publishers.find_velocity_subscribers,
+        "a subscriber to velocity commands": publishers.find_velocity_subscribers,
         "a delivery application": publishers.delivery_is_served,
-        "a navigation that takes goals": publishers.navigation_is_served,
+        "a navigation that accepts goals": publishers.navigation_is_served,
     }
     give_up = time.monotonic() + _DISCOVERY
     while missing:

@@ -1,1 +1,1 @@
-"""What both interfaces share of HTTP: requests and answers, negotiation, tokens, and the connection's own limits."""
+"""HTTP for the REST and SOAP interfaces: requests and responses, negotiation, tokens, and limits on connections."""

@@ -1,7 +1,7 @@
-"""Who is let in: requests for this robot, from no foreign page, with a token where tokens are asked for."""
+"""Access control by the head of a request: host name, bearer token and scope, and origin of a web page."""
 
-from collections.abc import Iterable
-from typing import Final, Protocol
+from collections.abc import Callable, Iterable
+from typing import Final
 
 from reference_robot.webservices.http.authorization import Authorization, Scope
 from reference_robot.webservices.http.hosts import AllowedHosts
@@ -10,23 +10,16 @@ from reference_robot.webservices.representation.problems import Problem
 
 SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})  # RFC 9110 9.2.1
 
-_SHOWN: Final = 100  # characters of a client's own word
-
-
-class Scoped(Protocol):
-    """What knows the scope that a request needs."""
-
-    def needed(self, request: Request) -> Scope | None:
-        """Return it; None for what any token may do."""
+_SHOWN: Final = 100  # characters of a client's text in error messages
 
 
 class Admission:
-    """Judges a request by its head.
+    """The access check for the head of every request.
 
     Args:
-        authorization: Who may do what.
-        hosts: The names that the robot answers to.
-        origins: Web origins (RFC 6454) whose pages may command the robot, besides the one that was asked.
+        authorization: The valid tokens and their scopes.
+        hosts: The host names by which clients may address the robot.
+        origins: Web origins (RFC 6454), besides the robot's own, whose pages may send commands to the robot.
     """
 
     def __init__(self, authorization: Authorization, hosts: AllowedHosts, origins: Iterable[str] = ()) -> None:
@@ -34,24 +27,27 @@ class Admission:
         self._allows = hosts.allows
         self._origins = frozenset(origin.encode() for origin in origins)
 
-    def check(self, request: Request, scoped: Scoped) -> None:
-        """Raise the Problem 421, 401 or 403 for a request that is not let in."""
+    def check(self, request: Request, needed: Callable[[Request], Scope | None]) -> None:
+        """Raise the Problem 421, 401 or 403 for a request with a wrong host, token or origin.
+
+        ``needed`` returns the scope that a request needs; None if any valid token is sufficient.
+        """
         if not self._allows(request.authority):
             host = request.authority.decode("latin-1")[:_SHOWN]
-            raise Problem(421, f"this robot is not {host!a}; started with --allowed-host NAME, it answers to NAME too")
-        if self._authorization.is_asked_for:
-            self._authorization.check(request.headers, scoped.needed(request))
+            raise Problem(421, f"this robot is not {host!a}; to allow another NAME, start it with --allowed-host NAME")
+        if self._authorization.is_required:
+            self._authorization.check(request.headers, needed(request))
         if b"origin" in request.headers and request.method not in SAFE:
             self._require_own_origin(request)
 
     def _require_own_origin(self, request: Request) -> None:
-        """Refuse what a page of another origin has a browser send: cross-site request forgery.
+        """Raise the Problem 403 for a command from a web page of another origin (cross-site request forgery).
 
-        Browsers ask before they send what this robot takes (PUT, DELETE, POST of text/xml), and get no leave. This
-        holds where a browser, or something between, forgets to ask.
+        Browsers send a preflight request before PUT, DELETE and POST of text/xml, and get no permission. This check
+        also stops browsers or intermediaries that omit the preflight.
         """
         origin = request.headers[b"origin"]
-        asked_by = origin.partition(b"://")[2].lower()  # nothing, where the origin is null
-        if not (asked_by and asked_by == request.authority.lower()) and origin not in self._origins:
-            told = origin.decode("latin-1")[:_SHOWN]
-            raise Problem(403, f"a page of {told!a} may not command this robot; --public-url names the robot's own")
+        page_host = origin.partition(b"://")[2].lower()  # empty if the origin is null
+        if not (page_host and page_host == request.authority.lower()) and origin not in self._origins:
+            page = origin.decode("latin-1")[:_SHOWN]
+            raise Problem(403, f"a page of {page!a} may not command this robot; --public-url sets the robot's origin")

@@ -1,8 +1,8 @@
-"""The half of a connection that answers: requests in their order, answers out, and how it all ends.
+"""The response half of an HTTP connection: writes responses in the order of the requests, and closes the connection.
 
-What a resource answers at once is written before the parser returns; for what has to wait there is a task, and what the
-client sends meanwhile waits its turn. So many requests may wait; then no more is read, nor while the client does not
-read.
+A response that is available at once is written before the parser returns. Otherwise a task waits for the response, and
+further requests from the client wait in a queue. When the queue is full, or while the client does not read its
+responses, nothing more is read from the connection.
 """
 
 import asyncio
@@ -22,19 +22,19 @@ from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.http.port import Port
 from reference_robot.webservices.http.reading import full
 
-FIELD_OCTETS: Final = 200  # that a field takes besides its own: two objects, and where they are
+FIELD_BYTES: Final = 200  # bytes of memory per field besides its text: two Python objects and their references
 NEVER: Final = math.inf
 
-_LINGER: Final = 2.0  # seconds in which what a refused client still sends is read and dropped
-_PIPELINED: Final = 16  # requests that may wait on a connection before no more is read from it
+_LINGER: Final = 2.0  # seconds for which data from a refused client is read and dropped
+_PIPELINED: Final = 16  # waiting requests at which reading from the connection pauses
 _NO_LINGER: Final = struct.pack("ii", 1, 0)  # SO_LINGER: closing resets the connection
 
 
 class AnsweringConnection(asyncio.Protocol, ABC):
-    """A connection to one port, without the half that makes requests of octets; that derives from it.
+    """A connection to one port that writes responses; a subclass parses the requests.
 
     Attributes:
-        due: When the client must have moved on, by the event loop's clock; infinity while it is the robot's turn.
+        due: The event-loop time by which the client must act; infinity while the robot works on a response.
     """
 
     def __init__(self, port: Port) -> None:
@@ -43,37 +43,37 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         self._now = port.loop.time
         self._transport: asyncio.Transport
         self.due = NEVER
-        self._has_begun = False  # a request arrives
-        # Those that have arrived, and how they end
+        self._has_begun = False  # a request is being received
+        # The requests that have been received, and the end of the connection
         self._waiting: deque[tuple[Request, Response | None, int]] = deque()
         self._task: asyncio.Task[Response] | None = None
-        self._held = 0  # octets of what waits, of what arrives, and of what is not read
-        self._unread = 0  # of them, those of answers
+        self._held = 0  # bytes of waiting and incomplete requests and unread responses
+        self._unread = 0  # bytes of unread responses among them
         self._reading = True
-        self._stalled = False  # the client does not read
-        self._ended = False  # the client sends no more
-        self._leaving = False  # nor is anything more read from it
+        self._stalled = False  # the client does not read its responses
+        self._ended = False  # the client has closed its side
+        self._leaving = False  # nothing more is read from the client
 
     @abstractmethod
     def expire(self) -> None:
-        """End what is overdue."""
+        """End the connection because ``due`` has passed."""
 
-    # The transport's side
+    # Callbacks of the transport
 
     def connection_lost(self, _error: Exception | None) -> None:
-        """Forget what waits; what the robot works on is finished all the same."""
+        """Discard the waiting requests; the request in progress is still completed."""
         self._port.remove(self)
         self._hold(-self._held)
         self._leaving = True
         self._waiting.clear()
 
     def eof_received(self) -> bool:
-        """Keep the connection for the answers that are still to come; under TLS, both sides end at once."""
+        """Return whether the connection stays open for pending responses; under TLS it closes in both directions."""
         self._ended = True
         return self._transport.can_write_eof() and (self._task is not None or bool(self._waiting))
 
     def pause_writing(self) -> None:
-        """Answer no more: the client does not read."""
+        """Stop writing and reading, because the client does not read its responses."""
         self._stalled = True
         self._pause_reading()
         self.due = self._now() + self._port.patience
@@ -83,24 +83,23 @@ class AnsweringConnection(asyncio.Protocol, ABC):
             self._reset()
 
     def resume_writing(self) -> None:
-        """Answer what has waited."""
+        """Continue with the waiting requests, because the client reads again."""
         self._stalled = False
         self._hold(-self._unread)
         self._unread = 0
         self._advance()
 
-    # Answers, in the order of the requests
+    # Responses, in the order of the requests
 
     def _is_busy(self) -> bool:
         return self._task is not None or self._stalled or bool(self._waiting)
 
     def _queue(self, request: Request, response: Response | None) -> None:
-        """Answer a request, or let it wait its turn; ``response`` is set where it has been refused already."""
+        """Answer a request now or put it into the queue; ``response`` is set for a request that is refused."""
         if self._leaving:
-            return  # it follows one that was to be the last
-        if (
-            self._task is None and not self._stalled and not self._waiting
-        ):  # as a rule, so it is not _is_busy that says so
+            return  # the previous request was the last of the connection
+        # Not _is_busy(): this is the usual case, and a call costs time.
+        if self._task is None and not self._stalled and not self._waiting:
             self._serve(request, response)
             return
         weight = _weight(request)
@@ -151,10 +150,11 @@ class AnsweringConnection(asyncio.Protocol, ABC):
             self.due = self._now() + (self._port.patience if self._has_begun else self._port.keep_alive)
 
     def _write(self, request: Request, response: Response) -> None:
-        """Write an answer whole.
+        """Write a complete response.
 
-        ``Server-Timing: app;dur=MS`` is the time from the complete head of the request to the answer, in milliseconds
-        (W3C Server Timing), by which a load test tells the robot's part from the network's.
+        The header ``Server-Timing: app;dur=MS`` (W3C Server Timing) is the time in milliseconds from the complete
+        request head to the response. A load test uses it to separate the robot's share of the latency from the
+        network's.
         """
         keep_alive = request.keep_alive and not self._port.is_stopping
         took = (perf_counter() - request.began) * 1000
@@ -173,18 +173,18 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         elif not self._has_begun and not self._stalled:
             self.due = self._now() + self._port.keep_alive
 
-    # The ends
+    # The end of the connection
 
     def _leave(self) -> None:
-        """Close once everything is written; whoever is still sending gets the time to read the answer.
+        """Close the connection after all writes; a client that is still sending gets time to read its response.
 
-        Closing at once with octets unread would reset the connection, and the answer with it (RFC 9112 9.6).
+        Closing at once with unread bytes would reset the connection, and the response would be lost (RFC 9112 9.6).
         """
         lingers = self._has_begun and not self._ended
         self._leaving = True
         self._waiting.clear()
         if lingers:
-            if self._transport.can_write_eof():  # TLS cannot: there the client goes, or its time is up
+            if self._transport.can_write_eof():  # not under TLS: there the client closes, or `due` passes
                 self._transport.write_eof()
             self.due = self._now() + _LINGER
         else:
@@ -196,19 +196,19 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         self.due = self._now() + self._port.patience
 
     def stop(self) -> None:
-        """Close, unless an answer is under way: that is the connection's last."""
+        """Close the connection if no response is pending; otherwise the pending response will be the last."""
         if not self._is_busy():
             self._close()
 
     def abort(self) -> None:
-        """Drop the connection, and what the robot works on for it."""
+        """Drop the connection and cancel the request in progress."""
         if self._task is not None:
             self._task.cancel()
         self._transport.abort()
 
     def _reset(self) -> None:
-        """Drop the connection, and with it what the kernel would keep for minutes for a client that does not read."""
-        with contextlib.suppress(OSError):  # it may be closed, but for the word of it
+        """Reset the connection, so that the kernel frees its send buffer at once although the client does not read."""
+        with contextlib.suppress(OSError):  # the socket may be closed already
             self._transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _NO_LINGER)
         self._transport.abort()
 
@@ -218,13 +218,13 @@ class AnsweringConnection(asyncio.Protocol, ABC):
             self.due = NEVER
             self._transport.pause_reading()
 
-    def _hold(self, octets: int) -> None:
-        self._held += octets
-        self._port.held.octets += octets
+    def _hold(self, size: int) -> None:
+        self._held += size
+        self._port.held.size += size
 
 
 def _weight(request: Request) -> int:
-    """Return what a request takes, in octets."""
+    """Return the memory that a request occupies, in bytes."""
     fields = request.headers.items()
-    head = sum(FIELD_OCTETS + len(name) + len(value) for name, value in fields)
+    head = sum(FIELD_BYTES + len(name) + len(value) for name, value in fields)
     return len(request.path) + len(request.query) + head + len(request.body)

@@ -1,4 +1,4 @@
-"""Bearer tokens (RFC 6750): with a token file, both interfaces ask for a token in it, and for its scope."""
+"""Bearer tokens (RFC 6750): with a token file, REST and SOAP require a valid token with the necessary scope."""
 
 import hmac
 import re
@@ -14,11 +14,11 @@ _CHALLENGE: Final = ((b"www-authenticate", _REALM),)
 _INVALID: Final = ((b"www-authenticate", _REALM + b', error="invalid_token"'),)
 
 _TOKEN: Final = re.compile(r"[!-~]+")  # printable ASCII without spaces
-_COMMENT: Final = "# "  # no token has a space in it
+_COMMENT: Final = "# "  # cannot be the start of a token, because tokens contain no space
 
 
 class Scope(StrEnum):
-    """What a token is good for (RFC 6749 3.3)."""
+    """The permissions that a token can have (RFC 6749 3.3)."""
 
     READ = "read"
     MOVE = "move"
@@ -29,54 +29,54 @@ EVERYTHING: Final = frozenset(Scope)
 
 
 class TokenFileError(ValueError):
-    """The token file cannot be used; the message says why."""
+    """An error for a token file that cannot be used; the message gives the reason."""
 
 
 class Authorization:
-    """Lets requests through that carry a token with the scope that they need; all of them where there are no tokens.
+    """The check of bearer tokens; without tokens every request is allowed.
 
     Attributes:
-        is_asked_for: Whether there are tokens.
+        is_required: Whether a token is required.
     """
 
     def __init__(self, tokens: Mapping[str, frozenset[Scope]] | None) -> None:
-        self.is_asked_for = tokens is not None
+        self.is_required = tokens is not None
         self._tokens = [(token.encode(), scopes) for token, scopes in (tokens or {}).items()]
 
     def check(self, headers: dict[bytes, bytes], scope: Scope | None) -> None:
-        """Raise the 401 of RFC 9110 15.5.2 for a request without a token, and the 403 for one without the scope.
+        """Raise the Problem 401 for a missing or unknown token (RFC 9110 15.5.2), or 403 for a token without the scope.
 
         Args:
             headers: Field values by lower-case name.
-            scope: What the request needs; None for what any token may do.
+            scope: The scope that the request needs; None if any valid token is sufficient.
         """
         scheme, _, sent = headers.get(b"authorization", b"").partition(b" ")
         if scheme.lower() != b"bearer":
-            raise Problem(401, "this robot asks for a bearer token in the Authorization field", _CHALLENGE)
+            raise Problem(401, "this robot requires a bearer token in the Authorization field", _CHALLENGE)
         sent, granted = sent.strip(), None
-        for token, scopes in self._tokens:  # all of them, so that the time tells nothing
+        for token, scopes in self._tokens:  # compare with all, so that the time reveals nothing
             if hmac.compare_digest(sent, token):
                 granted = scopes
         if granted is None:
-            raise Problem(401, "the bearer token in the Authorization field is none of this robot's", _INVALID)
+            raise Problem(401, "this robot does not know the bearer token in the Authorization field", _INVALID)
         if scope is not None and scope not in granted:
             challenge = _REALM + b', error="insufficient_scope", scope="%b"' % scope.encode()
             raise Problem(
                 403,
-                f"the bearer token is good for {' and '.join(sorted(granted))}; this needs the scope {scope}",
+                f"the request needs the scope {scope}; the bearer token has {' and '.join(sorted(granted))}",
                 ((b"www-authenticate", challenge),),
             )
 
 
 def read_tokens(path: Path) -> dict[str, frozenset[Scope]]:
-    """Return the scopes of each token that a file holds.
+    """Return the tokens of a file with their scopes.
 
-    A line is a token and its scopes, separated by white space: ``TOKEN read deliver``. A token alone is good for
-    everything. Empty lines count for nothing, nor do those that start with a hash and a space.
+    Each line has a token and its scopes, separated by white space: ``TOKEN read deliver``. A token without scopes has
+    all of them. Empty lines, and lines that start with a hash and a space, are ignored.
 
     Raises:
-        TokenFileError: The file cannot be read, or a line is something else. No message quotes a line: it may be a
-            secret.
+        TokenFileError: The file cannot be read, or a line has another form. The message never quotes a line, which may
+            contain a secret.
     """
     try:
         lines = path.read_text(encoding="ascii").splitlines()
@@ -90,8 +90,8 @@ def read_tokens(path: Path) -> dict[str, frozenset[Scope]]:
         token, *scopes = line.split()
         if not _TOKEN.fullmatch(token) or not EVERYTHING.issuperset(scopes):
             raise TokenFileError(
-                f"the token file {path}, line {number}, must be a token of printable ASCII and, after it, its scopes "
-                f"of {', '.join(Scope)}; a token alone has them all"
+                f"the token file {path}, line {number}, must have a token of printable ASCII and then its scopes, "
+                f"of {', '.join(Scope)}; a token without scopes has all of them"
             )
         if token in tokens:
             raise TokenFileError(f"the token file {path}, line {number}, repeats a token")

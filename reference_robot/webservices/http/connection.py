@@ -1,16 +1,16 @@
-"""One connection: octets in, requests answered in their order, octets out.
+"""One HTTP connection: parses requests and enforces limits; the base class writes the responses in order.
 
-An ``asyncio.Protocol`` on httptools' parser. The content is complete before a resource sees its request. What keeps
-strangers from using the robot up:
+The class is an ``asyncio.Protocol`` on httptools' parser. A resource gets a request only when its body is complete.
+These limits keep clients from exhausting the robot:
 
-- sizes: of the target, of the head, of the content, of what is read and dropped after a refusal; and of all that
-  clients make the robot keep: half a request, one that waits, an answer that nobody reads;
-- times: ``due`` is when the client must have moved on, whatever it is about: sending a request, reading answers, asking
-  for something. There is no state of a connection without it but one: the robot works on an answer;
-- turns: so many requests may wait on a connection; then no more is read from it, nor while the client does not read.
+- Sizes: of the request target, the head, the body, the data dropped after a refusal, and all data that is kept for
+  clients: incomplete requests, waiting requests, and responses that a client does not read.
+- Times: ``due`` is the deadline for the client's next step, such as sending a request or reading responses. Only while
+  the robot works on a response is there no deadline.
+- Waiting requests: when too many wait on a connection, or while the client does not read, nothing more is read.
 
-Answers and turns are in ``answering``. A base class and not an object of its own: a call through one would be made
-several times for each request.
+``answering`` contains the base class. Inheritance is used because calls to a separate object, several for each request,
+would cost time.
 """
 
 import asyncio
@@ -18,7 +18,7 @@ from typing import Final, cast
 
 from httptools import HttpParserCallbackError, HttpParserError, HttpRequestParser
 
-from reference_robot.webservices.http.answering import FIELD_OCTETS, AnsweringConnection
+from reference_robot.webservices.http.answering import FIELD_BYTES, AnsweringConnection
 from reference_robot.webservices.http.interface import described
 from reference_robot.webservices.http.messages import BODY_LIMIT, Field, Request
 from reference_robot.webservices.http.port import Port
@@ -33,38 +33,37 @@ from reference_robot.webservices.http.reading import (
     readable,
     require_bounded,
     require_old_version,
-    require_short_head,
 )
 from reference_robot.webservices.representation.problems import Problem, not_yet
 
-_DRAINED: Final = 16 * BODY_LIMIT  # octets of refused content that are dropped before the line is cut
-_UNREAD: Final = 16 * 1024  # octets of answers that wait for the client before it counts as one that does not read
+_DRAINED: Final = 16 * BODY_LIMIT  # bytes of a refused body that are dropped before the connection is closed
+_UNREAD: Final = 16 * 1024  # bytes of unread responses at which a client counts as not reading
 _CONTINUE: Final = b"HTTP/1.1 100 Continue\r\n\r\n"
 
 
 class HttpConnection(AnsweringConnection):
-    """A connection to one port, and the half of it that makes requests of octets."""
+    """A connection to one port that parses requests and answers them."""
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)
         self._admit = port.interface.admit
         self._parser = HttpRequestParser(self)
-        self._is_proxied = False  # by a proxy that is trusted
-        # The request that arrives
+        self._is_proxied = False  # the peer is a trusted proxy
+        # The request that is being received
         self._in_head = True
-        self._head_octets = 0
+        self._head_size = 0
         self._target = b""
         self._fields: list[Field] = []
         self._request: Request | None = None
         self._content: bytes | bytearray = b""
-        self._is_refused = False  # it has its answer, and its content is dropped
+        self._is_refused = False  # the error response is sent, and the rest of the body is dropped
         self._dropped = 0
-        self._arriving = 0  # octets that are held for it
+        self._arriving = 0  # bytes kept for this request
 
-    # The transport's side
+    # Callbacks of the transport
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Start the clock: a client that connects must also ask."""
+        """Register the connection and start the deadline for its first request; refuse one connection too many."""
         self._transport = cast("asyncio.Transport", transport)
         self._transport.set_write_buffer_limits(_UNREAD)
         self._is_proxied = self._port.proxies.include(transport.get_extra_info("peername"))
@@ -73,13 +72,13 @@ class HttpConnection(AnsweringConnection):
             self._refuse(not_yet("too many connections"))
 
     def data_received(self, data: bytes) -> None:
-        """Take octets."""
+        """Feed received bytes to the parser; answer invalid requests with an error."""
         if self._leaving:
             return
         if self._in_head:
             if not self._has_begun:
                 data = readable(data)
-            self._head_octets += len(data)
+            self._head_size += len(data)
         try:
             self._parser.feed_data(data)
         except HttpParserCallbackError as error:
@@ -91,30 +90,30 @@ class HttpConnection(AnsweringConnection):
             if self._has_begun:
                 self._hold_arriving()
 
-    # The parser's side: an exception is the way out of its callbacks
+    # Callbacks of the parser; an exception stops it
 
     def on_message_begin(self) -> None:
-        """Start the clock for a request."""
+        """Start the deadline for receiving the request that begins."""
         self._has_begun = True
         if not self._stalled:
             self.due = self._now() + self._port.patience
 
     def on_url(self, url: bytes) -> None:
-        """Bound the request target."""
+        """Store a part of the request target; raise the Problem 414 if the target is too long."""
         self._target += url
         if len(self._target) > TARGET_LIMIT:
-            raise Problem(414, f"the request target exceeds {TARGET_LIMIT} octets")
+            raise Problem(414, f"the request target exceeds {TARGET_LIMIT} bytes")
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """Keep a field, unless it is a trailer."""
+        """Store a header field; trailer fields are ignored."""
         if self._in_head:
             self._fields.append((name.lower(), value.rstrip()))
 
     def on_headers_complete(self) -> None:
-        """Refuse what can be refused by its head; else ask for the content if the client waits for that."""
+        """Refuse a request with an invalid head; otherwise send 100 Continue if the client waits for that status."""
         fields = self._fields
-        if self._head_octets > HEAD_LIMIT:
-            require_short_head(fields)
+        if self._head_size > HEAD_LIMIT and sum(len(name) + len(value) for name, value in fields) > HEAD_LIMIT:
+            raise head_too_large()
         self._in_head = False
         headers, parser = dict(fields), self._parser
         request = Request(parser.get_method().decode(), self._target, headers, keep_alive=parser.should_keep_alive())
@@ -127,7 +126,7 @@ class HttpConnection(AnsweringConnection):
             if b"host" not in headers:
                 require_old_version(parser.get_http_version())
             self._admit(request)
-            if b"content-length" in headers:  # digits only: the parser has seen to that
+            if b"content-length" in headers:  # digits only: the parser has checked that
                 require_bounded(int(headers[b"content-length"]))
         except Problem as problem:
             self._refuse_one(request, problem)
@@ -136,15 +135,15 @@ class HttpConnection(AnsweringConnection):
             self._transport.write(_CONTINUE)
 
     def on_body(self, body: bytes) -> None:
-        """Keep content, or drop what nobody wants."""
+        """Store a part of the body, or drop it if the request has been refused."""
         request = self._request
         if request is None or self._is_refused:
             self._dropped += len(body)
             if self._dropped > _DRAINED:
-                raise Problem(413, f"the content exceeds {BODY_LIMIT} octets")
+                raise Problem(413, f"the body exceeds {BODY_LIMIT} bytes")
             return
         if not self._content:
-            self._content = body  # all of it, as a rule
+            self._content = body  # usually the whole body
         else:
             if isinstance(self._content, bytes):
                 self._content = bytearray(self._content)
@@ -157,11 +156,11 @@ class HttpConnection(AnsweringConnection):
             self._refuse_one(request, problem)
 
     def on_message_complete(self) -> None:
-        """Hand the request over, and be ready for the next."""
+        """Answer or queue the complete request, and prepare for the next one."""
         request, refused = self._request, self._is_refused
         self._has_begun = self._is_refused = False
         self._in_head = True
-        self._head_octets = 0
+        self._head_size = 0
         self._target = b""
         self._fields = []
         self._request = None
@@ -178,19 +177,19 @@ class HttpConnection(AnsweringConnection):
             self._content = b""
         self._queue(request, None)
 
-    # The ends
+    # The end of the connection
 
     def _refuse_one(self, request: Request, problem: Problem) -> None:
-        """Refuse a request whose content is still to come."""
+        """Answer a request with an error before its body is complete; the rest of the body will be dropped."""
         self._is_refused = True
         self._content = b""
         self._queue(request, described(problem, request.headers.get(b"accept")))
 
     def _refuse(self, problem: Problem) -> None:
-        """Refuse what is no request, or too long a one, and read no more."""
+        """Answer bytes that are not a valid request with an error, and read nothing more."""
         if self._leaving:
             return
-        if self._is_refused:  # it has its answer
+        if self._is_refused:  # the error response has been sent
             self._leave()
             return
         self._has_begun = True
@@ -198,7 +197,7 @@ class HttpConnection(AnsweringConnection):
         self._leaving = True
 
     def expire(self) -> None:
-        """End what is overdue; a client that is still sending is told so by a 408 (RFC 9110 15.5.9)."""
+        """End the connection because ``due`` has passed; answer 408 if a request is incomplete (RFC 9110 15.5.9)."""
         if self._transport.is_closing() or self._stalled:
             self._reset()
         elif self._has_begun and not self._leaving:
@@ -207,14 +206,14 @@ class HttpConnection(AnsweringConnection):
             self._close()
 
     def _hold_arriving(self) -> None:
-        """Count what there is of a request that is not complete."""
+        """Count the memory of the incomplete request; refuse the request if its head is too large or memory is full."""
         if self._in_head:
-            if not self._head_octets:  # it began in the middle of a segment
-                self._head_octets = len(self._target) + sum(len(name) + len(value) for name, value in self._fields)
-            if self._head_octets > HEAD_LIMIT:
+            if not self._head_size:  # the head began in the middle of a segment
+                self._head_size = len(self._target) + sum(len(name) + len(value) for name, value in self._fields)
+            if self._head_size > HEAD_LIMIT:
                 self._refuse(head_too_large())
                 return
-        weight = self._head_octets + FIELD_OCTETS * len(self._fields) + len(self._content)
+        weight = self._head_size + FIELD_BYTES * len(self._fields) + len(self._content)
         self._hold(weight - self._arriving)
         self._arriving = weight
         if self._in_head and self._port.is_full():

@@ -1,8 +1,8 @@
-"""The names by which a robot is asked: what is not one of them is somebody's trick, or a mistake.
+"""The host names by which clients may address the robot; other names are rejected as DNS rebinding or a mistake.
 
-DNS rebinding: a page of evil.example lets its name point to the robot, and the browser takes the robot for the page's
-own server. The Host field is what gives it away, for it still says evil.example. An address in its place is no trick:
-whoever is asked by an address is at that address.
+In DNS rebinding, a page of evil.example changes its DNS entry to the robot's address, so that the browser treats the
+robot as the page's own server. The Host field reveals the attack, because it still contains evil.example. A Host field
+with an IP address is safe, because no DNS entry is involved.
 """
 
 import ipaddress
@@ -22,10 +22,10 @@ _LOCALHOST: Final = "localhost"
 
 
 class AllowedHosts:
-    """Tells whether the robot answers to a host: loopback's names, any address, and the given names.
+    """The set of host names that the robot accepts: localhost, every IP address, and the given names.
 
     Args:
-        names: Further names; ``.example.org`` stands for all names below example.org, ``*`` for all there are.
+        names: Further names; ``.example.org`` stands for all names below example.org, ``*`` for all names.
     """
 
     def __init__(self, names: Iterable[str] = ()) -> None:
@@ -36,34 +36,34 @@ class AllowedHosts:
         self.allows = lru_cache(maxsize=256)(self._allows)
 
     def _allows(self, authority: bytes) -> bool:
-        if self._is_open or not authority:  # HTTP/1.0 names none; browsers do not speak it
+        if self._is_open or not authority:  # HTTP/1.0 has no Host field; browsers do not use HTTP/1.0
             return True
-        told = AUTHORITY.fullmatch(authority.decode("latin-1"))
-        if told is None:
+        parts = AUTHORITY.fullmatch(authority.decode("latin-1"))
+        if parts is None:
             return False
-        if told["ipv6"] is not None or _is_address(told["name"]):
+        if parts["ipv6"] is not None or _is_address(parts["name"]):
             return True
-        name = told["name"].lower().rstrip(".")
+        name = parts["name"].lower().rstrip(".")
         return name == _LOCALHOST or name in self._names or name.endswith(self._endings)
 
 
 def is_host_pattern(text: str) -> bool:
-    """Tell whether a text is what ``AllowedHosts`` takes: a name, a domain with a dot before it, or an asterisk."""
+    """Return whether a text is valid for ``AllowedHosts``: a host name, a domain after a dot, or an asterisk."""
     return text == ANY or _NAME.fullmatch(text) is not None
 
 
 def own_names() -> list[str]:
-    """Return the names that this machine gives itself: its own, and that of multicast DNS (RFC 6762)."""
+    """Return this machine's host names: its own, and the multicast DNS name (RFC 6762)."""
     name = socket.gethostname()
     return [name] if "." in name else [name, f"{name}.local"]
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether all addresses of a host are this machine's alone."""
+    """Return whether all addresses of a host are loopback addresses, which other machines cannot reach."""
     try:
         found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
     except OSError:
-        return False  # whoever binds it says what is wrong
+        return False  # binding the address will report the error
     return all(ipaddress.ip_address(str(address[0])).is_loopback for *_, address in found)
 
 

@@ -1,8 +1,9 @@
-"""An interface: see who is let in, answer, and never show a traceback."""
+"""The base class of the REST and SOAP interfaces: access check, response, and errors without tracebacks."""
 
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Awaitable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
+from functools import partial
 from typing import Any, Final
 
 from reference_robot.webservices.http.admission import SAFE, Admission
@@ -15,53 +16,54 @@ _LOGGER: Final = logging.getLogger(__name__)
 
 
 class Interface(ABC):
-    """What answers the requests of one port; subclasses turn a request into an answer."""
+    """An interface that answers the requests to one port; subclasses implement ``answer`` and ``scope``."""
 
     def __init__(self, admission: Admission) -> None:
         self._admission = admission
 
     @abstractmethod
     def answer(self, request: Request) -> Response | Awaitable[Response]:
-        """Return the answer, at once or awaited; a Problem that it raises becomes the answer."""
+        """Return the response or an awaitable of it; a raised Problem becomes the response."""
 
     def admit(self, request: Request) -> None:
-        """Raise a Problem for a request whose head already says that it is not answered."""
-        self._admission.check(request, self)
+        """Raise a Problem if the head of a request fails the access check."""
+        self._admission.check(request, self.needed)
 
     @abstractmethod
     def scope(self, request: Request) -> Scope:
-        """Return what a token must be good for to change something by this request."""
+        """Return the token scope that a request which changes something needs."""
 
     def needed(self, request: Request) -> Scope | None:
-        """Return what a token must be good for; None where any will do."""
+        """Return the token scope that a request needs; None if any valid token is sufficient."""
         if request.method in SAFE:
             return None if request.method == "OPTIONS" else Scope.READ
         return self.scope(request)
 
     def respond(self, request: Request) -> Response | Coroutine[Any, Any, Response]:
-        """Return the answer to an admitted request: at once, unless something has to be waited for; never raises."""
+        """Return the response to an admitted request, or a coroutine if ROS must be waited for; never raises."""
         try:
             outcome = self.answer(request)
-        except Exception as error:  # noqa: BLE001 - whatever went wrong, the client gets an answer
+        except Exception as error:  # noqa: BLE001 - after any error the client gets a response
             return _failed(request, error)
-        return outcome if isinstance(outcome, Response) else _awaited(request, outcome)
+        return outcome if isinstance(outcome, Response) else awaited(outcome, partial(_failed, request))
 
 
-async def _awaited(request: Request, outcome: Awaitable[Response]) -> Response:
+async def awaited(outcome: Awaitable[Response], failed: Callable[[Exception], Response]) -> Response:
+    """Return the awaited response, or the response that ``failed`` returns for an error."""
     try:
         return await outcome
-    except Exception as error:  # noqa: BLE001 - as above
-        return _failed(request, error)
+    except Exception as error:  # noqa: BLE001 - after any error the client gets a response
+        return failed(error)
 
 
 def _failed(request: Request, error: Exception) -> Response:
     if isinstance(error, Problem):
         return described(error, request.headers.get(b"accept"))
-    _LOGGER.error("no answer to %s %r", request.method, request.path[:200], exc_info=error)
-    return described(Problem(500, "the robot failed to answer; its log says why"), None)
+    _LOGGER.error("cannot respond to %s %r", request.method, request.path[:200], exc_info=error)
+    return described(Problem(500, "an internal error of the robot; the robot's log has the details"), None)
 
 
 def described(problem: Problem, accept: bytes | None) -> Response:
-    """Return a problem as an answer, in the format that the client likes better (RFC 9457 3)."""
+    """Return a problem as a response, in the format that the client prefers (RFC 9457 3)."""
     media_type = problem_format(accept)
     return content(problem.status, media_type, problem.written(media_type), (*problem.headers, (b"vary", b"accept")))

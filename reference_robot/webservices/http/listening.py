@@ -1,4 +1,4 @@
-"""How a robot is reached: where it listens, by which names and addresses clients come, and who may do what."""
+"""The network settings of the robot: addresses, host names, public URLs, proxies, tokens and TLS."""
 
 import ipaddress
 import ssl
@@ -17,17 +17,17 @@ SOAP: Final = "soap"
 
 
 class ListeningError(ValueError):
-    """The robot must not, or cannot, be reached as asked; the message names the option and says what to do."""
+    """An error in a network option; the message names the option and a remedy."""
 
 
 @dataclass(frozen=True)
 class Listening:
-    """Addresses to bind, and everything about who may call; port 0 takes a free one.
+    """The addresses to bind and the rules for access; port 0 selects a free port.
 
     Attributes:
-        public_urls: Base URLs that clients are told, by interface, without a trailing slash.
-        allowed_hosts: Names that the robot answers to, besides those that it has.
-        tls: What is needed for HTTPS; None for HTTP.
+        public_urls: Base URLs given to clients, by interface, without a trailing slash.
+        allowed_hosts: Names that clients may use, besides the robot's own.
+        tls: The TLS settings for HTTPS; None for HTTP.
     """
 
     host: str
@@ -45,7 +45,7 @@ class Listening:
         return "http" if self.tls is None else "https"
 
     def admission(self) -> Admission:
-        """Return who is let in."""
+        """Return the access check for requests."""
         public = [urlsplit(url) for url in self.public_urls.values()]
         named = [self.host, *own_names(), *(url.hostname or "" for url in public), *self.allowed_hosts]
         return Admission(
@@ -56,16 +56,16 @@ class Listening:
 
 
 def require_guarded(host: str, authorization: Authorization) -> None:
-    """Raise the ListeningError for a host that lets other machines command a robot that asks for no token."""
-    if not authorization.is_asked_for and not is_loopback(host):
+    """Raise the ListeningError if other machines could command the robot without a token."""
+    if not authorization.is_required and not is_loopback(host):
         raise ListeningError(
-            f"--host {host} lets everybody on its network drive this robot, for no token is asked for: "
-            "give --token-file FILE, or --insecure if that is what you want"
+            f"--host {host} would let everybody on its network drive this robot without a token: "
+            "give --token-file FILE, or --insecure to allow that"
         )
 
 
 def host_patterns(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of ``--allowed-host``; raises the ListeningError for what is none."""
+    """Return the names of ``--allowed-host``; raise the ListeningError for an invalid name."""
     allowed = tuple(names)
     for name in allowed:
         if not is_host_pattern(name):
@@ -77,10 +77,10 @@ def host_patterns(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def public_urls(given: Iterable[str]) -> dict[str, str]:
-    """Return the base URL of each interface from ``URL``, which is both's, ``rest=URL`` and ``soap=URL``.
+    """Return the base URL of each interface from values such as ``URL`` (for both), ``rest=URL`` and ``soap=URL``.
 
     Raises:
-        ListeningError: One is no base URL of HTTP, or an interface has two.
+        ListeningError: A value is not an HTTP base URL, or an interface has two URLs.
     """
     urls: dict[str, str] = {}
     for text in given:
@@ -99,7 +99,7 @@ def public_urls(given: Iterable[str]) -> dict[str, str]:
 
 
 def trusted_proxies(given: Iterable[str]) -> TrustedProxies:
-    """Return the proxies of ``--trusted-proxy``; raises the ListeningError for what is no address or network."""
+    """Return the proxies of ``--trusted-proxy``; raise the ListeningError for an invalid address or network."""
     networks = []
     for text in given:
         try:
@@ -114,7 +114,7 @@ def trusted_proxies(given: Iterable[str]) -> TrustedProxies:
 def _is_base_url(text: str) -> bool:
     try:
         url = urlsplit(text)
-        url.port  # noqa: B018 - raises for what is no port
+        url.port  # noqa: B018 - raises for an invalid port
     except ValueError:
         return False
     return (

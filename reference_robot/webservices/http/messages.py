@@ -1,4 +1,4 @@
-"""A request as a resource or service sees it, and its answer."""
+"""HTTP requests as resources and services get them, and HTTP responses."""
 
 from functools import lru_cache
 from http import HTTPStatus
@@ -9,7 +9,7 @@ from httptools import parse_url
 
 from reference_robot.webservices.representation.problems import Problem
 
-BODY_LIMIT: Final = 1024 * 1024  # octets; the contract allows 64 KiB to 10 MiB
+BODY_LIMIT: Final = 1024 * 1024  # bytes; the contract allows 64 KiB to 10 MiB
 
 Field = tuple[bytes, bytes]
 
@@ -18,31 +18,36 @@ _SLASH: Final = ord("/")
 
 
 class Request:
-    """One HTTP request, with its content.
+    """One HTTP request with its body.
 
     Attributes:
-        method: As sent, in upper case.
-        authority: Host and port that were asked for: the target's where it is absolute (RFC 9112 3.2.2), else the Host
-            field's, empty where there is none; behind a trusted proxy those that the proxy was asked for.
-        scheme: ``http`` or ``https`` where a trusted proxy says so, else empty: the port's own.
-        path: The raw path, percent-encoding and all, in octets.
-        query: The raw query, without its question mark.
-        headers: Field values by lower-case name; several lines of one field are joined by a comma.
-        body: The content, complete once the request is answered.
-        keep_alive: Whether the client wants to send another one on its connection.
+        method: The method as sent, in upper case.
+        authority: The host and port that the client addressed: from an absolute request target (RFC 9112 3.2.2), else
+            from the Host field; empty without either. Behind a trusted proxy, the host that the client sent to the
+            proxy.
+        scheme: ``http`` or ``https`` if a trusted proxy reports it; otherwise empty, and the port's scheme applies.
+        path: The raw path as bytes, with its percent-encoding.
+        query: The raw query, without the question mark.
+        headers: Field values by lower-case name; repeated fields are joined by a comma.
+        body: The body; complete when the request is answered.
+        keep_alive: Whether the client wants to keep the connection open for further requests.
         began: When the head was complete, by ``time.perf_counter``.
     """
 
     __slots__ = ("authority", "began", "body", "headers", "keep_alive", "method", "path", "query", "scheme")
 
     def __init__(self, method: str, target: bytes, headers: dict[bytes, bytes], *, keep_alive: bool) -> None:
-        """Take over a head; raises httptools' HttpParserInvalidURLError for a target that is none (RFC 9112 3.2)."""
+        """Create a request from its head.
+
+        Raises:
+            httptools' HttpParserInvalidURLError: The request target is invalid (RFC 9112 3.2).
+        """
         self.method = method
         self.authority = headers.get(b"host", b"")
         self.scheme = ""
         if target[0] == _SLASH and b"#" not in target:
             self.path, _, self.query = target.partition(b"?")
-        else:  # the absolute form, the asterisk, or a fragment, which has no business here
+        else:  # the absolute form, the asterisk, or an invalid fragment
             url = parse_url(target)
             self.path, self.query = url.path or b"/", url.query or b""
             if url.host:
@@ -54,19 +59,19 @@ class Request:
         self.began = perf_counter()
 
     def content(self) -> bytes:
-        """Return the content; raises the Problem 415 for a content coding (RFC 9110 8.4)."""
+        """Return the body; raise the Problem 415 if it has a content coding (RFC 9110 8.4)."""
         coding = self.headers.get(b"content-encoding")
         if coding is None or coding.lower() == b"identity":
             return self.body
         raise Problem(
             415,
-            f"Content-Encoding {coding.decode('latin-1')[:80]!a} is not read here",
+            f"Content-Encoding {coding.decode('latin-1')[:80]!a} is not supported",
             ((b"accept-encoding", b"identity"),),
         )
 
 
 class Response:
-    """One answer: its head as it goes over the wire, but for what each connection adds, and its content."""
+    """A response: its serialized head, without the fields that each connection adds, and its body."""
 
     __slots__ = ("body", "head", "status")
 
@@ -79,7 +84,7 @@ class Response:
 
 
 def content(status: int, media_type: str, body: bytes, headers: tuple[Field, ...] = ()) -> Response:
-    """Return an answer with content and the field that says what it is."""
+    """Return a response with a body and its Content-Type."""
     return Response(status, ((b"content-type", _type_field(media_type)), *headers), body)
 
 

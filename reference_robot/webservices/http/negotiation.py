@@ -1,4 +1,4 @@
-"""Which format a client wants: the Accept field (RFC 9110 12.5.1)."""
+"""Content negotiation: the response format that a client's Accept field selects (RFC 9110 12.5.1)."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -9,22 +9,22 @@ from reference_robot.webservices.representation.writing import JSON, XML
 
 @lru_cache(maxsize=256)
 def chosen(accept: bytes | None, offers: Sequence[str]) -> str:
-    """Return the media type that the client likes best, among equals the earliest; it likes any if it sent no Accept.
+    """Return the offered media type that the client prefers, the first of equals; without Accept, the first offer.
 
     Raises:
-        Problem: 406, where no offer is acceptable (RFC 9110 15.5.7).
+        Problem: 406, if no offer is acceptable (RFC 9110 15.5.7).
     """
     ranges = _ranges(accept)
     best = max(offers, key=lambda offer: _quality(ranges, offer))  # max keeps the first of equals
     if _quality(ranges, best) > 0:
         return best
     field = (accept or b"").decode("latin-1")
-    raise Problem(406, f"Accept: {field[:200]!a} excludes all that this resource offers: {', '.join(offers)}")
+    raise Problem(406, f"Accept: {field[:200]!a} excludes all formats of this resource: {', '.join(offers)}")
 
 
 @lru_cache(maxsize=256)
 def problem_format(accept: bytes | None) -> str:
-    """Return the media type of error answers: XML where the client likes it better, else JSON."""
+    """Return the media type for error responses: XML if the client prefers XML to JSON, otherwise JSON."""
     ranges = _ranges(accept)
     likes_json = max(_quality(ranges, JSON), _quality(ranges, PROBLEM_JSON))
     likes_xml = max(_quality(ranges, XML), _quality(ranges, PROBLEM_XML))
@@ -32,7 +32,7 @@ def problem_format(accept: bytes | None) -> str:
 
 
 def _ranges(accept: bytes | None) -> dict[str, float]:
-    """Return the quality of each media range; a member that breaks the grammar counts for nothing."""
+    """Return the weight of each media range in an Accept field; members without a slash are ignored."""
     if accept is None or not accept.strip():
         return {"*/*": 1.0}
     ranges: dict[str, float] = {}
@@ -49,7 +49,7 @@ def _ranges(accept: bytes | None) -> dict[str, float]:
 
 
 def _qvalue(text: str) -> float:
-    """Return a weight (RFC 9110 12.4.2: 0 to 1, at most three decimals); what is no weight counts as 0."""
+    """Return a weight (RFC 9110 12.4.2: 0 to 1, at most three decimals); 0 for an invalid weight."""
     whole, _, decimals = text.partition(".")
     if whole not in {"0", "1"} or (decimals and not (decimals.isascii() and decimals.isdigit())):
         return 0.0
@@ -57,7 +57,7 @@ def _qvalue(text: str) -> float:
 
 
 def _quality(ranges: dict[str, float], offer: str) -> float:
-    """Return the weight of the most specific range that matches (RFC 9110 12.5.1)."""
+    """Return the weight of the most specific media range that matches an offer (RFC 9110 12.5.1)."""
     for media_range in (offer, offer.partition("/")[0] + "/*", "*/*"):
         if media_range in ranges:
             return ranges[media_range]

@@ -1,4 +1,4 @@
-"""What the connections of one port share, and what all of them together may use."""
+"""The state that the connections of one port share, and their limits."""
 
 import asyncio
 import time
@@ -11,29 +11,29 @@ from reference_robot.webservices.http.proxies import TrustedProxies
 
 
 class Client(Protocol):
-    """A connection, as the port's clock sees it: ``due`` is when it expires, by the event loop's time."""
+    """A connection as seen by its port; ``due`` is the event-loop time at which the connection expires."""
 
     due: float
 
     def expire(self) -> None:
-        """End what is overdue."""
+        """End the connection because ``due`` has passed."""
 
     def stop(self) -> None:
-        """Close, unless an answer is under way: that is the connection's last."""
+        """Close the connection if no response is pending; otherwise the pending response will be the last."""
 
     def abort(self) -> None:
-        """Drop the connection, and what the robot works on for it."""
+        """Drop the connection and cancel the request in progress."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What clients may use.
+    """The limits on clients.
 
     Attributes:
-        patience: Seconds that a client may take to send one request, and to read answers.
-        keep_alive: Seconds that an idle connection is kept for its next request.
-        connections: Of one port; two ports of them and ROS stay within the runner's 8,192 descriptors.
-        held: Octets that all connections together may make the robot keep.
+        patience: Seconds that a client may take to send one request, and to read responses.
+        keep_alive: Seconds that an idle connection is kept open for its next request.
+        connections: Connections per port; two full ports and ROS need fewer file descriptors than the runner's 8,192.
+        held: Bytes that the robot keeps for all connections together.
     """
 
     patience: float
@@ -43,28 +43,28 @@ class Limits:
 
 
 class Held:
-    """What clients make the robot keep: half a request, one that waits, an answer that nobody reads.
+    """The memory kept for clients: incomplete requests, waiting requests, and responses that a client does not read.
 
     Attributes:
-        octets: Of all connections that share it, those of several ports too.
+        size: Bytes kept for all connections of the ports that share this object.
     """
 
     def __init__(self) -> None:
-        self.octets = 0
+        self.size = 0
 
 
 class Port:
-    """The interface behind a port, its connections, their common clock and their common limits.
+    """An interface with its connections, their common clock and their common limits.
 
     Args:
-        interface: What answers.
-        limits: What clients may use.
-        held: What is kept for clients; several ports may share it.
-        proxies: Whose word on what was asked is taken.
+        interface: The interface that answers the requests.
+        limits: The limits on clients.
+        held: The memory counter; several ports may share one.
+        proxies: The proxies whose X-Forwarded fields are trusted.
 
     Attributes:
-        date: The Date field, less than two seconds old (RFC 9110 6.6.1).
-        is_empty: Set while there are no connections.
+        date: The Date header field, less than two seconds old (RFC 9110 6.6.1).
+        is_empty: An event that is set while there are no connections.
     """
 
     def __init__(
@@ -84,40 +84,40 @@ class Port:
         self._clients: set[Client] = set()
 
     def add(self, client: Client) -> bool:
-        """Register a connection; return False where there are too many."""
+        """Register a connection; return False if there are too many."""
         self._clients.add(client)
         self.is_empty.clear()
         return len(self._clients) <= self._limits.connections
 
     def has_room_for(self, more: int) -> bool:
-        """Tell whether so many more connections may come."""
+        """Return whether ``more`` further connections are within the limit."""
         return len(self._clients) + more <= self._limits.connections
 
     def remove(self, client: Client) -> None:
-        """Forget a connection that is closed."""
+        """Remove a closed connection."""
         self._clients.discard(client)
         if not self._clients:
             self.is_empty.set()
 
     def is_full(self) -> bool:
-        """Tell whether more is kept for clients than may be."""
-        return self.held.octets > self._limits.held
+        """Return whether more memory is kept for clients than the limit."""
+        return self.held.size > self._limits.held
 
     def tick(self) -> None:
-        """Look at the clock."""
+        """Update the Date field, and end all connections whose time is over; called every half second."""
         self.date = _date()
         now = self.loop.time()
         for client in [client for client in self._clients if client.due <= now]:
             client.expire()
 
     def stop(self) -> None:
-        """Take no more requests."""
+        """Close idle connections; the others close after their pending response."""
         self.is_stopping = True
         for client in list(self._clients):
             client.stop()
 
     def abort(self) -> None:
-        """Drop what is left."""
+        """Drop all remaining connections."""
         for client in list(self._clients):
             client.abort()
 

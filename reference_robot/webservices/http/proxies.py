@@ -1,4 +1,4 @@
-"""What proxies say of the request that they were sent: taken from those that are trusted, and from nobody else."""
+"""X-Forwarded-Proto and X-Forwarded-Host, which are accepted from trusted proxies only."""
 
 from collections.abc import Iterable
 from ipaddress import IPv4Network, IPv6Network, ip_address
@@ -10,25 +10,25 @@ _SCHEMES: Final = {b"http": "http", b"https": "https"}
 
 
 class TrustedProxies:
-    """The networks in which trusted proxies are."""
+    """The IP networks of the trusted proxies."""
 
     def __init__(self, networks: Iterable[IPv4Network | IPv6Network] = ()) -> None:
         self._networks = tuple(networks)
 
     def include(self, peer: Any) -> bool:
-        """Tell whether a socket's peer is one; ``peer`` is its address as ``getpeername`` gives it, or None."""
+        """Return whether a socket's peer is a trusted proxy; ``peer`` is its ``getpeername`` address, or None."""
         if not self._networks or not peer:
             return False
         address = ip_address(str(peer[0]).partition("%")[0])
-        # A socket of both families shows clients of IPv4 in addresses of IPv6 (RFC 4291 2.5.5.2).
+        # A dual-stack socket reports IPv4 clients as IPv4-mapped IPv6 addresses (RFC 4291 2.5.5.2).
         address = getattr(address, "ipv4_mapped", None) or address
         return any(address in network for network in self._networks)
 
 
 def take_forwarded(request: Request) -> None:
-    """Let a request that comes by a trusted proxy be what the proxy was asked: X-Forwarded-Proto and X-Forwarded-Host.
+    """Set scheme and host of a request to the values in X-Forwarded-Proto and X-Forwarded-Host.
 
-    Of a list, the last member is taken: that is the word of the proxy itself, which adds to what it was sent.
+    The last member of a list is used, because the trusted proxy itself appends it to what it received.
     """
     host = _last(request.headers.get(b"x-forwarded-host"))
     if host:

@@ -1,4 +1,4 @@
-"""What the HTTP parser must not see as it came, and what a complete head must be."""
+"""Adjustments to a request before parsing, and checks of its complete head."""
 
 import re
 from typing import Final
@@ -6,10 +6,10 @@ from typing import Final
 from reference_robot.webservices.http.messages import BODY_LIMIT, Field
 from reference_robot.webservices.representation.problems import Problem, not_yet
 
-TARGET_LIMIT: Final = 8000  # octets (RFC 9110 4.1 asks for at least that)
-HEAD_LIMIT: Final = 64 * 1024  # octets: request line and fields (RFC 6585 5)
+TARGET_LIMIT: Final = 8000  # bytes (RFC 9110 4.1 requires at least that)
+HEAD_LIMIT: Final = 64 * 1024  # bytes: request line and fields (RFC 6585 5)
 
-# Fields of which a request has at most one (RFC 9110 5.3; 9112 3.2 for Host).
+# Fields that may occur only once in a request (RFC 9110 5.3; 9112 3.2 for Host).
 _SINGLE: Final = frozenset({b"host", b"content-type", b"content-length", b"authorization"})
 
 _SERVED: Final = (b"GET ", b"PUT ", b"POST ", b"DELETE ", b"HEAD ", b"OPTIONS ")
@@ -18,14 +18,13 @@ _METHOD: Final = re.compile(rb"[!#$%&'*+.^_`|~0-9A-Za-z-]++(?= [^ \r\n]+ HTTP/1\
 
 
 def readable(data: bytes) -> bytes:
-    """Return the first octets of a request as the parser takes them.
+    """Return the first bytes of a request, changed so that the HTTP parser accepts them.
 
-    A method that no resource offers becomes TRACE, which is one of them: the parser refuses methods that it does not
-    know, and so they get what every unsupported method gets, 405, or 404 (RFC 9110 15.5.6).
+    A method that no resource offers is replaced by TRACE. The parser would reject unknown methods; so they get the same
+    405 or 404 as any unsupported method (RFC 9110 15.5.6).
 
-    The Upgrade field gets a name that says nothing: the robot upgrades to nothing and may ignore it (RFC 9110 7.8), but
-    the parser would take the content for another protocol's octets. Java's HttpClient asks for h2c with every first
-    request.
+    The Upgrade field is renamed, because the parser would read the body as data of another protocol. The robot supports
+    no upgrades and may ignore the field (RFC 9110 7.8). Java's HttpClient requests h2c with every first request.
     """
     if not data.startswith(_SERVED):
         method = _METHOD.match(data)
@@ -37,10 +36,10 @@ def readable(data: bytes) -> bytes:
 
 
 def fields_by_name(fields: list[Field]) -> dict[bytes, bytes]:
-    """Return field values by lower-case name, several lines joined; for a head in which names occur twice.
+    """Return field values by lower-case name, with repeated fields joined by a comma.
 
     Raises:
-        Problem: 400 for a single field that is repeated.
+        Problem: 400 for a repeated field that may occur only once.
     """
     headers: dict[bytes, bytes] = {}
     for name, value in fields:
@@ -53,34 +52,28 @@ def fields_by_name(fields: list[Field]) -> dict[bytes, bytes]:
     return headers
 
 
-def require_short_head(fields: list[Field]) -> None:
-    """Raise the Problem 431 for fields beyond the limit."""
-    if sum(len(name) + len(value) for name, value in fields) > HEAD_LIMIT:
-        raise head_too_large()
-
-
 def head_too_large() -> Problem:
-    """Return the refusal of a head that is too long (RFC 6585 5)."""
-    return Problem(431, f"the head of the request exceeds {HEAD_LIMIT} octets")
+    """Return the Problem 431 for a head that is too long (RFC 6585 5)."""
+    return Problem(431, f"the head of the request exceeds {HEAD_LIMIT} bytes")
 
 
 def require_old_version(version: str) -> None:
-    """Raise the Problem 400 for a head without a Host field, which HTTP/1.0 does not know."""
+    """Raise the Problem 400 for a missing Host field, unless the version is HTTP/1.0, which has no Host field."""
     if version != "1.0":
         raise Problem(400, "the request has no Host field (RFC 9112 3.2)")
 
 
-def require_bounded(octets: int) -> None:
-    """Raise the Problem 413 for so much content (RFC 9110 15.5.14)."""
-    if octets > BODY_LIMIT:
-        raise Problem(413, f"{octets} octets exceed the limit of {BODY_LIMIT} octets")
+def require_bounded(size: int) -> None:
+    """Raise the Problem 413 if the body's size exceeds the limit (RFC 9110 15.5.14)."""
+    if size > BODY_LIMIT:
+        raise Problem(413, f"the body of {size} bytes exceeds the limit of {BODY_LIMIT} bytes")
 
 
 def no_request(error: BaseException) -> Problem:
-    """Return the refusal of what the parser does not take (RFC 9112 2.2)."""
-    return Problem(400, f"no valid HTTP request: {error}")
+    """Return the Problem 400 for bytes that the parser rejects (RFC 9112 2.2)."""
+    return Problem(400, f"the request is not valid HTTP: {error}")
 
 
 def full() -> Problem:
-    """Return the refusal of what there is no room for (RFC 9110 15.6.4)."""
-    return not_yet("clients make the robot keep as much as it can")
+    """Return the Problem 503 for a request that would exceed the memory kept for clients (RFC 9110 15.6.4)."""
+    return not_yet("the memory for requests of clients is full")

@@ -1,4 +1,4 @@
-"""The server of one port: listens, keeps the clock, and stops in order."""
+"""The HTTP server of one port: accepts connections, ends overdue ones, and shuts down in order."""
 
 import asyncio
 import contextlib
@@ -11,9 +11,9 @@ from reference_robot.webservices.http.connection import HttpConnection
 from reference_robot.webservices.http.port import Port
 from reference_robot.webservices.http.tls import accept
 
-_BACKLOG: Final = 1024  # connections that may arrive at once
+_BACKLOG: Final = 1024  # connections that may wait to be accepted
 _TICK: Final = 0.5  # seconds
-_LAST_WORDS: Final = 2.0  # seconds for answers under way when the robot stops
+_LAST_WORDS: Final = 2.0  # seconds for pending responses when the robot stops
 
 
 async def serve(
@@ -23,14 +23,14 @@ async def serve(
     stop: asyncio.Event,
     context: ssl.SSLContext | None = None,
 ) -> None:
-    """Answer requests, setting ``started``, until ``stop`` is set; answers under way are finished then.
+    """Serve requests until ``stop`` is set; requests in progress are finished, for at most two seconds.
 
     Args:
-        port: What is behind the listener.
-        listener: A socket that listens.
-        started: Is set once requests are answered.
-        stop: Ends it.
-        context: What is needed for TLS; None for connections without.
+        port: The interface behind the listener, with its connections and limits.
+        listener: A listening socket.
+        started: An event that is set once requests are served.
+        stop: The event that ends the server.
+        context: The TLS settings; None for plain HTTP.
     """
     listener.listen(_BACKLOG)
     end_listening: Callable[[], object]

@@ -1,4 +1,4 @@
-"""TLS: the certificate that a server shows, and connections until both sides have agreed."""
+"""TLS: the server's certificate, and the handshakes of new connections."""
 
 import asyncio
 import contextlib
@@ -12,27 +12,27 @@ from reference_robot.webservices.http.connection import HttpConnection
 from reference_robot.webservices.http.port import Port
 
 _LOGGER: Final = logging.getLogger(__name__)
-_SHUTDOWN: Final = 2.0  # seconds for the other side's goodbye
-_PAUSE: Final = 0.1  # seconds, where no more connections can be had
+_SHUTDOWN: Final = 2.0  # seconds for the client's close_notify
+_PAUSE: Final = 0.1  # seconds after a failed accept
 
 
 class TlsFileError(ValueError):
-    """The certificate or its key cannot be used; the message names the file and says why."""
+    """An error for a certificate or key that cannot be used; the message names the file and the reason."""
 
 
 class _EncryptedKeyError(Exception):
-    """The key asks for a password."""
+    """An error for a private key that is encrypted with a password."""
 
 
 def server_context(certificate: Path, key: Path) -> ssl.SSLContext:
-    """Return what a server needs for TLS 1.2 and 1.3.
+    """Return the TLS settings of a server for TLS 1.2 and 1.3.
 
     Args:
-        certificate: PEM, the server's own first and then those that lead to an authority.
-        key: PEM, the private key of the first; not encrypted, for nobody is there to be asked for a password.
+        certificate: A PEM file with the server's certificate first, and then its chain.
+        key: A PEM file with the private key of the first certificate, without a password.
 
     Raises:
-        TlsFileError: A file cannot be read or holds something else, or the two do not belong together.
+        TlsFileError: A file cannot be read or has other contents, or key and certificate do not belong together.
     """
     for option, path in (("--tls-cert", certificate), ("--tls-key", key)):
         try:
@@ -41,17 +41,17 @@ def server_context(certificate: Path, key: Path) -> ssl.SSLContext:
             raise TlsFileError(f"{option} {path} cannot be read: {error.strerror}") from error
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
-    context.options |= ssl.OP_NO_RENEGOTIATION  # a client could make the robot compute for ever
+    context.options |= ssl.OP_NO_RENEGOTIATION  # repeated renegotiation could occupy the robot's processor
     context.set_alpn_protocols(["http/1.1"])
     try:
-        # By itself first: the error of both together does not say which it was.
+        # Load the certificate alone first: load_cert_chain's error does not say which file is wrong.
         ssl.create_default_context().load_verify_locations(certificate)
     except ssl.SSLError as error:
         raise TlsFileError(f"--tls-cert {certificate} holds no certificate in PEM: {_reason(error)}") from error
     try:
         context.load_cert_chain(certificate, key, password=_refuse_password)
     except _EncryptedKeyError as error:
-        raise TlsFileError(f"--tls-key {key} is encrypted; openssl pkey -in {key} writes it in the clear") from error
+        raise TlsFileError(f"--tls-key {key} is encrypted; decrypt it with openssl pkey -in {key}") from error
     except ssl.SSLError as error:
         why = _reason(error)
         if "mismatch" in why:
@@ -69,21 +69,21 @@ def _reason(error: ssl.SSLError) -> str:
 
 
 async def accept(port: Port, listener: socket.socket, context: ssl.SSLContext) -> None:
-    """Take connections until it is cancelled; while both sides agree, they count among the port's already.
+    """Accept connections and perform their TLS handshakes until cancelled; handshakes count as connections of the port.
 
-    ``create_server(ssl=...)`` would do, if it told anybody of those that never get so far.
+    ``create_server(ssl=...)`` does not count connections whose handshake is not complete.
     """
     handshakes: set[asyncio.Task[None]] = set()
     try:
         while True:
             try:
                 client, _ = await port.loop.sock_accept(listener)
-            except OSError as error:  # no descriptor is left, or the client has gone
-                _LOGGER.warning("cannot take a connection: %s", error)
+            except OSError as error:  # no file descriptor is left, or the client has disconnected
+                _LOGGER.warning("cannot accept a connection: %s", error)
                 await asyncio.sleep(_PAUSE)
                 continue
             if not port.has_room_for(len(handshakes) + 1):
-                client.close()  # there is no way yet to say why
+                client.close()  # no response is possible before the handshake
                 continue
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             handshake = port.loop.create_task(_agree(port, client, context))
@@ -96,7 +96,7 @@ async def accept(port: Port, listener: socket.socket, context: ssl.SSLContext) -
 
 
 async def _agree(port: Port, client: socket.socket, context: ssl.SSLContext) -> None:
-    # What fails is no TLS, none that both speak, or none in time: the line is cut by then.
+    # The handshake fails if the client does not use TLS, shares no version, or is too slow; the socket is then closed.
     with contextlib.suppress(OSError):
         await port.loop.connect_accepted_socket(
             lambda: HttpConnection(port),

@@ -1,1 +1,1 @@
-"""Pure ROS nodes: all publishers, and all subscribers. No web code (paper, section on the meta-models)."""
+"""ROS nodes without web code: all publishers, and all subscribers (paper, section on the meta-models)."""

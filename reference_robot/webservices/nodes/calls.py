@@ -1,4 +1,4 @@
-"""Asking ROS from the web server's event loop: hand over, wait with a deadline, come back."""
+"""Calls of ROS services and actions from the web server's event loop, with a deadline."""
 
 import asyncio
 from collections.abc import Callable
@@ -11,10 +11,10 @@ from reference_robot.webservices.representation.problems import not_yet
 
 
 class RosCalls:
-    """Calls services and actions for the event loop, and waits ``deadline`` seconds for an answer.
+    """A caller of ROS services and actions that waits at most ``deadline`` seconds for each response.
 
-    A call begins in the executor's thread: rclpy's action client registers a request after it has sent it, so an
-    answer taken meanwhile by another thread would be dropped as unexpected.
+    A call starts in the executor's thread. rclpy's action client registers a request only after sending it, so a
+    response that another thread received in between would be dropped as unexpected.
     """
 
     def __init__(self, executor: Executor, deadline: float) -> None:
@@ -22,17 +22,21 @@ class RosCalls:
         self._deadline = deadline
 
     async def result(self, begin: Callable[[], Future], what: str) -> Any:
-        """Return what ROS answers to ``begin``, which runs in the executor's thread; ``what`` is the partner's name.
+        """Return the ROS response to the call that ``begin`` starts in the executor's thread.
+
+        Args:
+            begin: Starts the call; returns its future.
+            what: The called service or action, for the error message.
 
         Raises:
-            Problem: 503, when no answer came within the deadline.
+            Problem: 503, if there is no response within the deadline.
         """
         loop = asyncio.get_running_loop()
         answer: asyncio.Future[Any] = loop.create_future()
 
         def settle(outcome: Any, error: BaseException | None) -> None:
             if answer.done():
-                return  # too late: nobody waits any more
+                return  # too late: the deadline has passed
             if error is not None:
                 answer.set_exception(error)
             else:
@@ -45,7 +49,7 @@ class RosCalls:
         def start() -> None:
             try:
                 future = begin()
-            except Exception as error:  # noqa: BLE001 - it belongs to the caller, not to the executor's thread
+            except Exception as error:  # noqa: BLE001 - raised in the caller, not in the executor's thread
                 hand_over(None, error)
                 return
             future.add_done_callback(
@@ -57,4 +61,4 @@ class RosCalls:
             async with asyncio.timeout(self._deadline):
                 return await answer
         except TimeoutError as error:
-            raise not_yet(f"{what} did not answer within {self._deadline:g} s") from error
+            raise not_yet(f"{what} did not respond within {self._deadline:g} s") from error

@@ -1,4 +1,4 @@
-"""Whether the managed nodes of a navigation are active: inactive ones are there, and refuse whatever they are asked."""
+"""The lifecycle states of the navigation's managed nodes; inactive nodes refuse every request."""
 
 from typing import Final
 
@@ -14,7 +14,7 @@ _SILENT: Final = "silent"
 
 
 class ManagedNode:
-    """A node with a lifecycle (ROS 2 design, "Managed nodes"), by its name; one that has none counts as active."""
+    """A named ROS node that may have a lifecycle (ROS 2 design, "Managed nodes"); without one it counts as active."""
 
     def __init__(self, node: Node, calls: RosCalls, name: str) -> None:
         self._calls = calls
@@ -22,7 +22,10 @@ class ManagedNode:
         self._states = node.create_client(GetState, f"{name}/get_state")
 
     async def state(self) -> str:
-        """Return its state's name, such as "active"; "unmanaged" without a lifecycle, "silent" without an answer."""
+        """Return the node's state, such as "active".
+
+        "unmanaged" means that the node has no lifecycle, "silent" that it does not respond.
+        """
         if not self._states.service_is_ready():
             return _UNMANAGED
         try:
@@ -33,7 +36,7 @@ class ManagedNode:
         return "active" if reply.current_state.id == State.PRIMARY_STATE_ACTIVE else label or "unknown"
 
     async def require_active(self) -> None:
-        """Raise the 503 for a node that is there and not active."""
+        """Raise the Problem 503 if the node has a lifecycle and is not active."""
         state = await self.state()
         if state not in {"active", _UNMANAGED}:
             raise not_yet(f"the robot's {self._name} is {state}, not active")

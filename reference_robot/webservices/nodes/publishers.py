@@ -1,4 +1,4 @@
-"""RobotPublishersNode: everything that the web services send into ROS."""
+"""RobotPublishersNode: the ROS node through which the web services send messages, goals and cancellations."""
 
 from time import monotonic
 from typing import Any, Final
@@ -18,15 +18,15 @@ from reference_robot.deliveries import DeliveryRequest
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
 
-# Each accepted request is exactly one message (contract, ROS side): nothing gives way before it is acknowledged.
+# Each accepted request is exactly one message (contract, ROS side): keep every message until it is acknowledged.
 _DELIVERY_QOS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL)
-# A KEEP_ALL writer of Fast DDS holds 5,000 messages. At the next it asks its readers what they have, which takes
-# milliseconds; with one that has fallen behind, publish holds the event loop for 0.1 s, and fails. Then it is left
-# alone for so many seconds. Not asked beforehand by wait_for_all_acked: unasked, readers acknowledge every 3 s.
+# A KEEP_ALL writer of Fast DDS holds 5,000 messages. If it is full, publish waits for acknowledgements. That takes
+# milliseconds or, with a reader that has fallen behind, blocks the event loop for 0.1 s and fails. Publishing then
+# pauses for so many seconds. wait_for_all_acked does not help: readers acknowledge only every 3 s on their own.
 _RECOVERY: Final = 0.5
-# Of velocities the newest alone counts: one that waited would drive the robot by yesterday's wish.
+# Only the newest velocity counts; an older one that waited in a queue must not drive the robot.
 _VELOCITY_QOS: Final = QoSProfile(depth=1)
-_LAST_WORD: Final = Duration(seconds=0.5)  # for a robot to take its last velocity
+_LAST_WORD: Final = Duration(seconds=0.5)  # time for a robot to receive its last velocity
 _VELOCITY_TYPES: Final[dict[str, Any]] = {
     "geometry_msgs/msg/Twist": Twist,
     "geometry_msgs/msg/TwistStamped": TwistStamped,
@@ -34,16 +34,16 @@ _VELOCITY_TYPES: Final[dict[str, Any]] = {
 
 
 class RobotPublishersNode:
-    """All publishers, and the clients of the actions that move the robot."""
+    """The ROS node with all publishers and with the clients of the navigation action."""
 
     def __init__(self, ros: RosRuntime, names: RosNames) -> None:
         self.node = ros.create_node("robot_publishers")
         self._names = names
         self._delivery = self.node.create_publisher(DeliveryRequestMsg, names.topics.delivery, _DELIVERY_QOS)
-        # rclpy's Publisher does no more than this, but for keeping itself from being destroyed meanwhile: 0.4 µs each
-        # time. Ours is destroyed when nobody is served any more.
+        # rclpy's Publisher does the same, but takes 0.4 µs more per call to guard against its own destruction. This
+        # publisher is destroyed only after all serving has ended.
         self._count_readers = self._delivery.handle.get_subscription_count
-        self._publish_octets = self._delivery.handle.publish_raw
+        self._publish_serialized = self._delivery.handle.publish_raw
         self._behind_until = 0.0
         self._velocity: dict[str, Any] = {}
         self._navigation = ActionClient(self.node, NavigateToPose, names.actions.navigate_to_pose)
@@ -54,16 +54,16 @@ class RobotPublishersNode:
     # The delivery application
 
     def delivery_is_served(self) -> bool:
-        """Tell whether anybody on the graph takes delivery requests."""
+        """Return whether any node subscribes to delivery requests."""
         return bool(self._count_readers())
 
     def publish_delivery(self, request: DeliveryRequest) -> bool:
-        """Publish one delivery request; return False, with nothing published, while readers cannot keep up."""
+        """Publish a delivery request; return False without publishing while the subscribers cannot keep up."""
         now = monotonic()
         if now < self._behind_until:
             return False
         try:
-            self._publish_octets(request.octets())
+            self._publish_serialized(request.serialized())
         except rclpy_c.RCLError:
             self._behind_until = now + _RECOVERY
             return False
@@ -72,9 +72,9 @@ class RobotPublishersNode:
     # Velocity
 
     def find_velocity_subscribers(self) -> bool:
-        """Tell whether a robot takes velocity commands, and have a publisher of the type that it takes.
+        """Return whether a robot subscribes to velocity commands; create the publisher of the type that it needs.
 
-        The type is the subscriber's: Twist on Nav2 as it comes with Jazzy, TwistStamped on a TurtleBot 3.
+        The subscriber determines the type: Twist for Nav2 in Jazzy, TwistStamped for a TurtleBot 3.
         """
         if any(publisher.get_subscription_count() for publisher in self._velocity.values()):
             return True
@@ -86,7 +86,7 @@ class RobotPublishersNode:
         return any(publisher.get_subscription_count() for publisher in self._velocity.values())
 
     def publish_velocity(self, twist: Twist) -> bool:
-        """Publish one velocity command, in each type that a subscriber takes; return whether all went out."""
+        """Publish a velocity command in each type that has subscribers; return False if publishing failed."""
         sent = True
         for kind, publisher in self._velocity.items():
             if not publisher.get_subscription_count():
@@ -101,7 +101,7 @@ class RobotPublishersNode:
         return sent
 
     def await_velocity_taken(self) -> None:
-        """Wait until robots have the velocity that was published last, for half a second at most."""
+        """Wait until all robots have received the last velocity command, but at most half a second."""
         for publisher in self._velocity.values():
             publisher.wait_for_all_acked(_LAST_WORD)
 
@@ -114,26 +114,26 @@ class RobotPublishersNode:
     # Navigation
 
     def navigation_is_served(self) -> bool:
-        """Tell whether an action server takes goals."""
+        """Return whether an action server for NavigateToPose goals is running."""
         return bool(self._navigation.server_is_ready())
 
     def send_goal(self, identity: bytes, pose: PoseStamped) -> Future:
-        """Send a goal under a UUID's 16 octets, in the executor's thread; the future holds rclpy's ClientGoalHandle."""
+        """Send a goal with a 16-byte UUID, from the executor's thread; the future holds rclpy's ClientGoalHandle."""
         return self._navigation.send_goal_async(NavigateToPose.Goal(pose=pose), goal_uuid=UUID(uuid=list(identity)))
 
     def cancel_goal(self, identity: bytes) -> Future:
-        """Cancel a goal, whoever sent it; the future holds a CancelGoal response."""
+        """Cancel the goal of any client; the future holds a CancelGoal response."""
         request = CancelGoal.Request()
         request.goal_info.goal_id.uuid = list(identity)
         return self._cancel.call_async(request)
 
     def cancel_all_goals(self) -> Future:
-        """Cancel all goals, whoever sent them: an id and a stamp of zeros (action_msgs/CancelGoal)."""
+        """Cancel all goals of all clients: an id and a stamp of zeros (action_msgs/CancelGoal)."""
         return self._cancel.call_async(CancelGoal.Request())
 
 
 def _published(publisher: Any, message: Any) -> bool:
-    """Publish a message; return False where the middleware could not take it within its own deadline."""
+    """Publish a message; return False if the middleware could not accept it within its own deadline."""
     try:
         publisher.publish(message)
     except rclpy_c.RCLError:

@@ -1,4 +1,4 @@
-"""RobotSubscribersNode: everything that the web services learn from ROS."""
+"""RobotSubscribersNode: the ROS node through which the web services receive the robot's state."""
 
 from collections import deque
 from collections.abc import Callable
@@ -26,27 +26,26 @@ _NAVIGATION_PACKAGES: Final = frozenset({"nav_msgs", "nav2_msgs", "map_msgs", "s
 
 
 class RobotSubscribersNode:
-    """All subscribers, the queries of the graph, and the clients of the planners.
+    """The ROS node with all subscribers, the queries of the ROS graph, and the clients of the planners.
 
-    Callbacks run in the executor's thread and only keep the message that came last: one reference, which the event
-    loop's thread reads. What a message means is worked out by whoever is asked for it.
+    Callbacks run in the executor's thread and only store the last message: one reference, which the event loop's thread
+    reads. Messages are interpreted when a request needs them.
 
     Attributes:
-        odometry: The octets of the odometry received last, to be read by whoever asks, None before the first; and when
-            they were received, by ``time.monotonic``.
-        on_odometry: Is called with the octets then, in the executor's thread.
-        mission_reports: The JSON of what changed in the missions (see ``names.toml``), oldest first, to be taken off.
-        goals: The goals of the robot's navigation, whoever sent them.
-        map_transform: Where the odometry frame lies in the map.
-        current_goal: The JSON of the goal that the robot follows, empty when it follows none; None where the robot
-            does not tell, as Nav2.
-        last_rejection: The JSON of the goal refused last, and why; empty before the first.
+        ros: The runtime of the node; while its threads hang, the stored messages are out of date.
+        odometry: The last odometry, serialized (None before the first), and its time of arrival by ``time.monotonic``.
+        on_odometry: Called with each serialized odometry message, in the executor's thread.
+        mission_reports: Reports of changed missions as JSON (see ``names.toml``), oldest first; readers remove them.
+        goals: The goals of the robot's navigation, from every client.
+        map_transform: The transform from the map to the odometry frame.
+        current_goal: The active goal as JSON, empty if there is none; None if the robot does not publish it, as Nav2.
+        last_rejection: The last refused goal and the reason, as JSON; empty before the first refusal.
     """
 
     def __init__(self, ros: RosRuntime, names: RosNames) -> None:
         self.node = ros.create_node("robot_subscribers")
-        self._ros = ros
-        self._namespace = self.node.get_namespace().rstrip("/") + "/"  # several robots may be on one graph
+        self.ros = ros
+        self._namespace = self.node.get_namespace().rstrip("/") + "/"  # a graph may contain several robots
         self.odometry: tuple[bytes | None, float] = (None, 0.0)
         self.on_odometry: Callable[[bytes], None] = lambda _: None
         self.mission_reports: deque[str] = deque(maxlen=_MISSION_REPORTS)
@@ -59,31 +58,23 @@ class RobotSubscribersNode:
         self.node.create_subscription(
             String, topics.missions, lambda report: self.mission_reports.append(report.data), _MISSIONS_QOS
         )
-        for told in ("current_goal", "last_rejection"):
-            keep = partial(self._keep_text, told)
-            self.node.create_subscription(String, getattr(topics, told), keep, _LATCHED_QOS)
+        for name in ("current_goal", "last_rejection"):
+            keep = partial(self._keep_text, name)
+            self.node.create_subscription(String, getattr(topics, name), keep, _LATCHED_QOS)
         self._planner_service = self.node.create_client(GetPlan, names.services.get_plan)
         self._planner_action = ActionClient(self.node, ComputePathToPose, names.actions.compute_path_to_pose)
 
-    def _keep_odometry(self, octets: bytes) -> None:
-        self.on_odometry(octets)
-        self.odometry = octets, monotonic()
+    def _keep_odometry(self, serialized: bytes) -> None:
+        self.on_odometry(serialized)
+        self.odometry = serialized, monotonic()
 
     def _keep_text(self, attribute: str, message: String) -> None:
         setattr(self, attribute, message.data)
 
-    def silence(self) -> float:
-        """Return for how many seconds ROS's threads have shown no sign of life; up to 0.5 s is usual."""
-        return self._ros.silence()
-
-    def hangs(self) -> bool:
-        """Tell whether ROS's threads hang, so that nothing that is kept here is to be believed."""
-        return self._ros.hangs()
-
     # The graph
 
     def sensors(self) -> list[dict[str, str]]:
-        """Return name, topic and type of each topic of sensor data in the robot's namespace that has a publisher."""
+        """Return name, topic and type of each sensor_msgs topic in the robot's namespace that has a publisher."""
         return [
             {"name": topic.removeprefix("/"), "topic": topic, "type": types[0]}
             for topic, types in sorted(self.node.get_topic_names_and_types())
@@ -93,30 +84,30 @@ class RobotSubscribersNode:
         ]
 
     def navigation_services(self) -> list[dict[str, str]]:
-        """Return name and type of every service of the robot's navigation; those inside actions are not among them."""
+        """Return name and type of each navigation service in the robot's namespace, except those inside actions."""
         return [
             {"name": name, "type": types[0]}
             for name, types in sorted(self.node.get_service_names_and_types())
             if name.startswith(self._namespace)
             and types[0].partition("/")[0] in _NAVIGATION_PACKAGES
             and "/_" not in name
-            and self.node.count_services(name)  # a name that only a client waits for is no service
+            and self.node.count_services(name)  # a service name without a server has only clients
         ]
 
     # Planning
 
     def plan_service_is_served(self) -> bool:
-        """Tell whether a GetPlan service is there: a Nav2 of Jazzy has none."""
+        """Return whether a GetPlan service is running; Nav2 in Jazzy has none."""
         return bool(self._planner_service.service_is_ready())
 
     def plan_action_is_served(self) -> bool:
-        """Tell whether a ComputePathToPose action is there."""
+        """Return whether a ComputePathToPose action server is running."""
         return bool(self._planner_action.server_is_ready())
 
     def ask_plan_service(self, request: GetPlan.Request) -> Future:
-        """Ask the service; the future holds a GetPlan response."""
+        """Call the GetPlan service; the future holds the response."""
         return self._planner_service.call_async(request)
 
     def ask_plan_action(self, goal: ComputePathToPose.Goal) -> Future:
-        """Ask the action; the future holds rclpy's ClientGoalHandle. Call it in the executor's thread."""
+        """Send a ComputePathToPose goal, from the executor's thread; the future holds rclpy's ClientGoalHandle."""
         return self._planner_action.send_goal_async(goal)

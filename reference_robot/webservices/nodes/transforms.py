@@ -1,4 +1,4 @@
-"""Where the odometry frame lies in the map, as the robot's localisation tells it (REP 105)."""
+"""The transform from the map to the odometry frame, as the robot's localisation publishes it (REP 105)."""
 
 from typing import Any, Final
 
@@ -14,25 +14,26 @@ _STATIC: Final = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOC
 
 
 class MapTransform:
-    """Keeps the transform from the map to the odometry frame, in the executor's thread.
+    """A subscriber that keeps the latest transform from the map to the odometry frame.
 
-    No tf2 listener: one transform is asked for, of the tens that a robot tells a hundred times a second. So messages
-    come as octets, and one is read only if the map's name stands in it, which costs a hundredth.
+    Only one transform is needed out of the many that a robot publishes up to a hundred times a second. So there is no
+    tf2 listener: a message is deserialized only if its bytes contain the map's frame id, which takes a hundredth of the
+    time.
 
     Attributes:
-        latest: The geometry_msgs/Transform told last; None where nobody tells it.
+        latest: The last geometry_msgs/Transform; None before the first.
     """
 
     def __init__(self, node: Node, names: RosNames) -> None:
         self.latest: Any = None
         self._parent = names.frames.map
         self._child = names.frames.odom
-        self._mark = self._parent.encode() + b"\0"  # as strings end in CDR
-        node.create_subscription(TFMessage, names.topics.tf, self._take, _MOVING, raw=True)
-        node.create_subscription(TFMessage, names.topics.tf_static, self._take, _STATIC, raw=True)
+        self._mark = self._parent.encode() + b"\0"  # CDR strings end with a zero byte
+        node.create_subscription(TFMessage, names.topics.tf, self._receive, _MOVING, raw=True)
+        node.create_subscription(TFMessage, names.topics.tf_static, self._receive, _STATIC, raw=True)
 
-    def _take(self, octets: bytes) -> None:
-        if self._mark in octets:
-            for stamped in deserialize_message(octets, TFMessage).transforms:
+    def _receive(self, serialized: bytes) -> None:
+        if self._mark in serialized:
+            for stamped in deserialize_message(serialized, TFMessage).transforms:
                 if (stamped.header.frame_id, stamped.child_frame_id) == (self._parent, self._child):
                     self.latest = stamped.transform

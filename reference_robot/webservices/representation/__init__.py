@@ -1,4 +1,4 @@
-"""ROS messages as JSON, XML and text, and back: shapes, strict reading, writing.
+"""Conversion between ROS messages and JSON, XML and text: types of fields, strict reading, writing.
 
-Between ROS and the wire stands *plain data*: dicts by field name, lists, str, int, float and bool.
+All conversions pass through *plain data*, as json.loads returns it: dicts by field name, lists, str, int, float, bool.
 """

@@ -1,4 +1,4 @@
-"""Whether plain data that came over the wire has the shape that the contract asks for."""
+"""The check that JSON or XML data from a client has the fields, types and value ranges that the contract requires."""
 
 import math
 from typing import Any, Final
@@ -10,7 +10,12 @@ _SHOWN: Final = 120
 
 
 def checked(shape: Shape, plain: Any, where: str = "") -> Any:
-    """Return the data with every real number as a float; ``where`` is the field's path, empty at the root.
+    """Return parsed JSON or XML data that has the required shape (types of its fields), with real numbers as float.
+
+    Args:
+        shape: The required shape.
+        plain: The parsed data: dicts, lists, str, int, float and bool.
+        where: The path of the field for error messages; empty for the whole body.
 
     Raises:
         Problem: 422, with a detail that names the field and the value (RFC 9110 15.5.21).
@@ -19,12 +24,12 @@ def checked(shape: Shape, plain: Any, where: str = "") -> Any:
 
 
 def refused(where: str, plain: Any, why: str) -> Problem:
-    """Return the 422 that names a field and its value."""
+    """Return the Problem 422 for an invalid field, with its path, its value and the rule ``why``."""
     return Problem(422, f"{where or 'the body'} {why}, not {shown(plain)}")
 
 
 def shown(plain: Any) -> str:
-    """Return a value as it can stand in an error message: printable, and short however long it was."""
+    """Return a value as text for an error message: printable ASCII, at most 120 characters and an ellipsis."""
     text = ascii(plain)
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}… ({len(text)} characters)"
 
@@ -41,7 +46,7 @@ def _real(_shape: Real, plain: Any, where: str) -> float:
 
 
 def _whole(shape: Whole, plain: Any, where: str) -> int:
-    # JSON knows one kind of number: 4.0 is 4.
+    # JSON has only one kind of number: 4.0 equals 4.
     number = int(plain) if type(plain) is float and plain.is_integer() else plain
     if type(number) is int and shape.lowest <= number <= shape.highest:
         return number

@@ -1,4 +1,4 @@
-"""Between ROS messages and plain data."""
+"""Conversion between ROS messages and plain data (dicts, lists, str, int, float, bool)."""
 
 import math
 from collections.abc import Callable
@@ -10,10 +10,10 @@ from reference_robot.webservices.representation.shapes import Record, Series, Sh
 
 
 def reader_of(message: Any) -> Callable[[Any], dict[str, Any]]:
-    """Return a function from a message of this class to plain data.
+    """Return a function that converts ROS messages of a class to dicts, lists and numbers.
 
-    The function raises the Problem 503, naming the field, for a value that is not finite: such a one never leaves the
-    robot (contract, REST).
+    The function raises the Problem 503 for a value that is not finite, and names its field: such values must not be
+    sent to clients (contract, REST).
     """
     shape = shape_of(message)
     read = _reader(shape)
@@ -29,7 +29,7 @@ def reader_of(message: Any) -> Callable[[Any], dict[str, Any]]:
 def _require_finite(plain: Any, where: str) -> None:
     if isinstance(plain, float):
         if not math.isfinite(plain):
-            raise not_yet(f"what the robot tells is not finite: {where} is {plain}")
+            raise not_yet(f"the robot measured a value that is not finite: {where} is {plain}")
     elif isinstance(plain, dict):
         for name, value in plain.items():
             _require_finite(value, f"{where}.{name}")
@@ -39,7 +39,7 @@ def _require_finite(plain: Any, where: str) -> None:
 
 
 def message_from(shape: Record, plain: dict[str, Any]) -> Any:
-    """Return the ROS message that checked plain data stands for; fields left out keep ROS's defaults."""
+    """Return the ROS message for a checked dict of its fields; missing fields keep ROS's defaults."""
     return shape.message(**{name: _value(shape.field(name), value) for name, value in plain.items()})
 
 
@@ -59,6 +59,6 @@ def _reader(shape: Shape) -> Callable[[Any], Any]:
         if isinstance(shape.item, (Record, Series)):
             read_item = _reader(shape.item)
             return lambda items: [read_item(item) for item in items]
-        # NumPy arrays and array.array hold ROS's numeric arrays; both hand out Python numbers.
+        # ROS's numeric arrays are NumPy arrays or array.array; tolist of both returns Python numbers.
         return lambda items: items.tolist() if hasattr(items, "tolist") else list(items)
     return lambda value: value

@@ -1,4 +1,4 @@
-"""Refusals, as RFC 9457 describes them."""
+"""Error responses as problem details (RFC 9457)."""
 
 from http import HTTPStatus
 from typing import Final
@@ -10,11 +10,11 @@ from reference_robot.webservices.representation.writing import text_of, write_js
 PROBLEM_JSON: Final = "application/problem+json"
 PROBLEM_XML: Final = "application/problem+xml"
 
-_NAMESPACE: Final = "urn:ietf:rfc:7807"  # RFC 9457 appendix B keeps RFC 7807's
+_NAMESPACE: Final = "urn:ietf:rfc:7807"  # RFC 9457 appendix B keeps the namespace of RFC 7807
 
 
 class Problem(Exception):  # noqa: N818 - RFC 9457's own name for it
-    """A request is refused: 4xx for the client's fault, 5xx for the robot's; the detail names field and value."""
+    """An error response: 4xx for errors of the client, 5xx for the robot's; the detail names field and value."""
 
     def __init__(self, status: int, detail: str, headers: tuple[tuple[bytes, bytes], ...] = ()) -> None:
         super().__init__(detail)
@@ -23,7 +23,7 @@ class Problem(Exception):  # noqa: N818 - RFC 9457's own name for it
         self.headers = headers
 
     def members(self) -> dict[str, str | int]:
-        """Return the members of the problem details object (RFC 9457 3.1)."""
+        """Return the members of the problem details object (RFC 9457 3.1): type, title, status, detail."""
         return {
             "type": "about:blank",
             "title": HTTPStatus(self.status).phrase,
@@ -32,7 +32,7 @@ class Problem(Exception):  # noqa: N818 - RFC 9457's own name for it
         }
 
     def written(self, media_type: str) -> bytes:
-        """Return the problem in one of its two media types."""
+        """Return the problem as a body of media type application/problem+json or application/problem+xml."""
         if media_type == PROBLEM_JSON:
             return write_json(self.members())
         root = etree.Element("problem", xmlns=_NAMESPACE)
@@ -42,5 +42,5 @@ class Problem(Exception):  # noqa: N818 - RFC 9457's own name for it
 
 
 def not_yet(detail: str) -> Problem:
-    """Return the 503 for what the robot cannot say or do yet (RFC 9110 15.6.4)."""
+    """Return the Problem 503 with Retry-After for a temporary inability of the robot (RFC 9110 15.6.4)."""
     return Problem(503, detail, ((b"retry-after", b"1"),))

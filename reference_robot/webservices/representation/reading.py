@@ -1,4 +1,4 @@
-"""Request bodies as plain data: strict JSON (RFC 8259) and XML in the form that the robot sends."""
+"""Parsing of request bodies into dicts, lists and numbers: strict JSON (RFC 8259), and XML as the robot sends it."""
 
 import codecs
 import json
@@ -18,17 +18,17 @@ from reference_robot.webservices.representation.xml_input import parsed
 
 ACCEPTED: Final = (JSON, XML)
 
-# The contract's grammar of a number, in paths, queries and XML alike; ASCII digits only. Possessive, for what follows a
-# number is never part of one.
+# The contract's grammar of a number in paths, queries and XML; ASCII digits only. The quantifiers are
+# possessive, because the text after a number never belongs to it.
 NUMBER: Final = r"[+-]?+(?:[0-9]++(?:\.[0-9]++)?+|\.[0-9]++)(?:[eE][+-]?+[0-9]++)?+"
 _REAL: Final = re.compile(NUMBER)
-_WHOLE: Final = re.compile(r"[+-]?[0-9]{1,40}")  # far beyond 64 bits; Python refuses to read 5,000 digits
-_DIGITS_READ: Final = 400  # an integer with more is beyond every double
+_WHOLE: Final = re.compile(r"[+-]?[0-9]{1,40}")  # more than 64 bits; Python refuses 5,000 digits
+_DIGITS_READ: Final = 400  # an integer with more digits exceeds every double
 _XML_SPACE: Final = " \t\r\n"
 
 
 class _Beyond:
-    """A JSON number that no double holds; prints as it was sent."""
+    """A JSON number that is too large for a double; its repr is the text that the client sent."""
 
     def __init__(self, lexeme: str) -> None:
         self.lexeme = lexeme
@@ -38,10 +38,12 @@ class _Beyond:
 
 
 def read(body: bytes, content_type: bytes | None, shape: Record) -> dict[str, Any]:
-    """Return a request body, its size already bounded, as plain data of the given shape.
+    """Return a JSON or XML request body as a dict that has the required shape (types of its fields).
+
+    The caller has limited the body's size.
 
     Raises:
-        Problem: 415 for another media type, 400 for what is no JSON or XML at all, 422 for the wrong shape or value.
+        Problem: 415 for another media type, 400 for a body that is not JSON or XML, 422 for a wrong shape or value.
     """
     media_type, charset = parsed_content_type(content_type)
     if media_type == JSON:
@@ -58,7 +60,7 @@ def read(body: bytes, content_type: bytes | None, shape: Record) -> dict[str, An
 
 @lru_cache(maxsize=256)
 def parsed_content_type(field: bytes | None) -> tuple[str, str | None]:
-    """Return media type and charset in lower case (RFC 9110 8.3.1); the charset is None where none is given."""
+    """Return media type and charset of a Content-Type in lower case (RFC 9110 8.3.1); the charset may be None."""
     media_type, *parameters = (field or b"").decode("latin-1").lower().split(";")
     for parameter in parameters:
         name, _, value = parameter.partition("=")
@@ -68,11 +70,11 @@ def parsed_content_type(field: bytes | None) -> tuple[str, str | None]:
 
 
 def read_json(body: bytes) -> Any:
-    """Return a JSON text as plain data; a number that no double holds stays an object of its own.
+    """Return the value of a JSON text; numbers too large for a double become ``_Beyond`` objects.
 
     Raises:
-        Problem: 400 for a byte order mark, octets that are not UTF-8, what is no JSON (NaN and Infinity among it) and
-            nesting too deep to be read; 422 for a name that occurs twice in one object.
+        Problem: 400 for a byte order mark, invalid UTF-8, invalid JSON (including NaN and Infinity) and too deep
+            nesting; 422 for a name that occurs twice in one object.
     """
     if body.startswith(codecs.BOM_UTF8):
         raise Problem(400, "the body begins with a byte order mark (RFC 8259 8.1)")
@@ -85,7 +87,7 @@ def read_json(body: bytes) -> Any:
             parse_int=_whole,
         )
     except UnicodeDecodeError as error:
-        raise Problem(400, f"the body is not UTF-8: {error.reason} at octet {error.start}") from error
+        raise Problem(400, f"the body is not UTF-8: {error.reason} at byte {error.start}") from error
     except json.JSONDecodeError as error:
         raise Problem(400, f"the body is not JSON: {error.msg} at line {error.lineno} column {error.colno}") from error
     except RecursionError as error:
@@ -101,7 +103,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _refuse_constant(name: str) -> None:
-    raise Problem(400, f"{name} is no JSON number (RFC 8259 6)")
+    raise Problem(400, f"{name} is not a JSON number (RFC 8259 6)")
 
 
 def _real(lexeme: str) -> float | _Beyond:
@@ -114,7 +116,7 @@ def _whole(lexeme: str) -> int | _Beyond:
 
 
 def _from_element(element: etree._Element, shape: Any, where: str) -> Any:
-    """Return an element as plain data; what does not fit stays text and is refused by the check of shapes."""
+    """Return the value of an XML element; a value of a wrong type remains text, which ``checked`` refuses later."""
     if element.attrib:
         raise Problem(422, f"unknown attribute {shown(next(iter(element.attrib)))} of {where}")
     if isinstance(shape, Record):
@@ -155,4 +157,4 @@ def _refuse_text(text: str | None, where: str) -> None:
 
 def _unsupported(what: str) -> Problem:
     accepted = ", ".join(ACCEPTED)
-    return Problem(415, f"{what} is not read here; send {accepted} in UTF-8", ((b"accept", accepted.encode()),))
+    return Problem(415, f"{what} is not supported; send {accepted} in UTF-8", ((b"accept", accepted.encode()),))

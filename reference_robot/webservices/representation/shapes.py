@@ -1,4 +1,4 @@
-"""What a representation consists of: shapes, taken from ROS message classes or declared by hand."""
+"""Shapes: the types and value ranges of fields in JSON and XML, most of them derived from ROS message classes."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from rosidl_parser.definition import AbstractNestedType, AbstractString, Array, 
 
 @dataclass(frozen=True)
 class Real:
-    """A finite IEEE 754 double (ROS float32 and float64)."""
+    """The type of a field that holds a finite IEEE 754 double (ROS float32 and float64)."""
 
 
 @dataclass(frozen=True)
 class Whole:
-    """An integer within the bounds of its ROS type, both inclusive."""
+    """The type of a field that holds an integer between the bounds of its ROS type, both inclusive."""
 
     lowest: int
     highest: int
@@ -25,7 +25,7 @@ class Whole:
 
 @dataclass(frozen=True)
 class Text:
-    """A string whose length in characters lies within the bounds, both inclusive."""
+    """The type of a field that holds a string; the bounds of its length in characters are inclusive."""
 
     shortest: int = 0
     longest: int | None = None
@@ -33,12 +33,12 @@ class Text:
 
 @dataclass(frozen=True)
 class Truth:
-    """A boolean."""
+    """The type of a field that holds a boolean."""
 
 
 @dataclass(frozen=True)
 class Series:
-    """A list of items; ``length`` is set for ROS arrays of fixed size."""
+    """The type of a field that holds a list of items; ``length`` is set for ROS arrays of fixed size."""
 
     item: Shape
     length: int | None = None
@@ -46,9 +46,9 @@ class Series:
 
 @dataclass(frozen=True)
 class Record:
-    """Fields by name, in the order of the ROS definition.
+    """The type of an object with named fields, in the order of the ROS definition.
 
-    ``optional`` fields may be left out in input; ``message`` is the ROS class, where there is one.
+    ``optional`` names the fields that input may omit; ``message`` is the ROS class, if there is one.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Record:
     message: Any = field(default=None, compare=False)
 
     def field(self, name: str) -> Shape | None:
-        """Return the shape of a field, or None where the record has no such field."""
+        """Return the type of a field; None if the record has no such field."""
         return dict(self.fields).get(name)
 
 
@@ -69,16 +69,16 @@ _WHOLE_NUMBERS: Final = {
     for bits in (8, 16, 32, 64)
 } | {"octet": Whole(0, 255)}
 
-# The contract's fine print: a stamp may be left out everywhere in input, and then means now.
+# The contract's fine print: input may omit every stamp; the present time is used instead.
 _OPTIONAL: Final = {"std_msgs/Header": frozenset({"stamp"})}
 
 
 @cache
 def shape_of(message: Any) -> Record:
-    """Return the shape of a message class that rosidl generated.
+    """Return the types of the fields of a ROS message class that rosidl generated.
 
     Raises:
-        TypeError: The class has a field of a type that no web service carries (wide characters, long double).
+        TypeError: A field has a type that the web services do not support (wide characters, long double).
     """
     names = tuple(message.get_fields_and_field_types())
     shapes = tuple(_shape(slot) for slot in message.SLOT_TYPES)

@@ -1,12 +1,12 @@
-"""XML from outside, parsed so that nothing in it can reach beyond itself.
+"""Safe parsing of XML from clients.
 
-No entity is resolved, nothing is fetched, no DTD is loaded, the tree stays within libxml2's ordinary limits (depth
-256), and a document with a DOCTYPE or a processing instruction is refused (WS-I Basic Profile 1.1 R1008, R1009).
-The size is bounded before a body comes here.
+No entity is resolved, nothing is fetched, no DTD is loaded, and libxml2's usual limits apply (depth 256). A document
+with a DOCTYPE or a processing instruction is refused (WS-I Basic Profile 1.1 R1008, R1009). The caller has limited the
+document's size.
 
-libxml2 keeps every name that it has met for as long as the thread lives that met it. So documents with new names are
-parsed in a thread of their own once there have been many: strangers cannot fill the robot's memory with names. A few
-names are learnt again and again, so that after such strangers a client with a prefix of its own is soon known.
+libxml2 keeps every name that a thread has parsed until that thread ends. A client that sends ever new names could fill
+the robot's memory. So the main thread learns only a limited number of names, which slowly grows; a document with more
+new names is parsed in a thread of its own.
 """
 
 import codecs
@@ -20,32 +20,32 @@ from lxml import etree
 
 from reference_robot.webservices.representation.problems import Problem
 
-# The XML declaration; and a DOCTYPE that nothing but white space, comments and instructions precedes. Both match
-# possessively, so that no document makes them backtrack.
+# The XML declaration, and a DOCTYPE after only white space, comments and processing instructions. Possessive
+# quantifiers prevent slow backtracking.
 _DECLARED: Final = re.compile(rb"<\?xml\s")
 _DECLARATION: Final = re.compile(rb"""\A<\?xml\s[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]++)["']""")
 _DOCTYPE: Final = re.compile(rb"\A(?:\s++|<\?(?s:.*?)\?>|<!--(?s:.*?)-->)*+<!DOCTYPE")
 
-# WS-I R1012 and XML 1.0 4.3.3: every receiver reads UTF-8 and UTF-16. ASCII is part of UTF-8.
+# WS-I R1012 and XML 1.0 4.3.3: every receiver must read UTF-8 and UTF-16. ASCII is a subset of UTF-8.
 _UTF8: Final = frozenset({"utf-8", "ascii"})
 _UTF16: Final = frozenset({"utf-16", "utf-16-le", "utf-16-be"})
 
-# Attributes that one document may have in all. libxml2 before 2.12 compares those of an element pairwise.
+# The largest number of attributes in a document. libxml2 before 2.12 compares an element's attributes pairwise.
 _MOST_ATTRIBUTES: Final = 1000
 _LEAST_ATTRIBUTE: Final = len(' a=""')
 
-_ELEMENT_NAME: Final = re.compile(rb"<([^\x00-\x20/>!?]++)")  # \s would be looked up for each octet
-_LONGEST_NAME: Final = 100  # octets
-_NEW_NAMES: Final = 32  # that one document may teach; a client's own messages have fewer
+_ELEMENT_NAME: Final = re.compile(rb"<([^\x00-\x20/>!?]++)")  # faster than \s, which needs a table look-up per byte
+_LONGEST_NAME: Final = 100  # bytes
+_NEW_NAMES: Final = 32  # new names per document; ordinary messages have fewer
 
 
 class KnownNames:
-    """The names that the main thread's parser has met, and what it may still learn.
+    """The XML names that the main thread's parser has stored, and a budget for new ones.
 
     Args:
-        at_once: How many may be learnt at once.
-        interval: Seconds after which one more may be learnt: some 0.9 MB a day, should strangers take them all.
-        clock: Where the time comes from, in seconds.
+        at_once: The largest budget of new names.
+        interval: Seconds after which the budget grows by one name: at most some 0.9 MB a day.
+        clock: The source of the time in seconds.
     """
 
     def __init__(
@@ -59,9 +59,12 @@ class KnownNames:
         self._counted_at = clock()
 
     def has_all(self, text: bytes) -> bool:
-        """Tell whether a document brings no new names, or few enough to learn them."""
+        """Return whether the main thread may parse a document: its new names, if any, are within the budget.
+
+        The new names then count as known.
+        """
         names = _ELEMENT_NAME.findall(text)
-        # What precedes an equals sign names an attribute; words of a text may be among it, which does no harm.
+        # The word before an equals sign is an attribute's name, or harmlessly a word of a text.
         for before in text.split(b"=")[:-1]:
             names += before.rsplit(None, 1)[-1:]
         return self._known.issuperset(names) or self._learns(set(names) - self._known)
@@ -82,12 +85,12 @@ _known_names: Final = KnownNames()
 
 def _new_parser() -> etree.XMLParser:
     return etree.XMLParser(
-        encoding="utf-8",  # decided before parsing, whatever the declaration says
+        encoding="utf-8",  # the text has been converted; the declaration is ignored
         resolve_entities=False,
         no_network=True,
         load_dtd=False,
         huge_tree=False,
-        remove_comments=True,  # so that a value with a comment in it is one text
+        remove_comments=True,  # otherwise a comment would split a value into two texts
     )
 
 
@@ -95,11 +98,11 @@ _PARSER: Final = _new_parser()
 
 
 def parsed(body: bytes, charset: str | None = None) -> etree._Element:
-    """Return the root element; the media type's charset outranks the document's own word (RFC 7303 3.2).
+    """Return the root element of an XML document; the media type's charset overrides its declaration (RFC 7303 3.2).
 
     Raises:
-        Problem: 400 where the document is malformed, 415 where its encoding is neither UTF-8 nor UTF-16, and 400
-            where it has a DOCTYPE or a processing instruction, or far too many attributes.
+        Problem: 400 for a malformed document, a DOCTYPE, a processing instruction or too many attributes; 415 for an
+            encoding other than UTF-8 and UTF-16.
     """
     text = _as_utf8(body, charset)
     if b"<!DOCTYPE" in text and _DOCTYPE.match(text):
@@ -127,22 +130,22 @@ def _as_utf8(body: bytes, charset: str | None) -> bytes:
     try:
         codec = name if name in _UTF8 else codecs.lookup(name).name
     except (LookupError, ValueError) as error:
-        raise Problem(415, f"unknown charset {name!a}; XML is read as UTF-8 or UTF-16") from error
+        raise Problem(415, f"unknown charset {name!a}; send XML in UTF-8 or UTF-16") from error
     if codec in _UTF8:
         return body.removeprefix(codecs.BOM_UTF8)
     if codec not in _UTF16:
-        raise Problem(415, f"charset {name!a}; XML is read as UTF-8 or UTF-16 (WS-I BP R1012)")
+        raise Problem(415, f"charset {name!a} is not supported; send XML in UTF-8 or UTF-16 (WS-I BP R1012)")
     try:
         text = body.decode(codec)
     except UnicodeDecodeError as error:
-        raise Problem(400, f"the body is not {name}: {error.reason} at octet {error.start}") from error
+        raise Problem(400, f"the body is not {name}: {error.reason} at byte {error.start}") from error
     return text.removeprefix("\ufeff").encode("utf-8", "surrogatepass")
 
 
 def _own_encoding(body: bytes) -> str:
-    """Return what the document says of itself (XML 1.0 appendix F): byte order mark, first octets, declaration."""
+    """Return a document's encoding from its byte order mark, first bytes or declaration (XML 1.0 appendix F)."""
     if body[:1] == b"<" and body[1:2] not in b"?\0":
-        return "utf-8"  # as almost all of them
+        return "utf-8"  # the usual case
     if body.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
     if body.startswith(b"<\0"):

@@ -1,1 +1,1 @@
-"""One class per REST resource of Table 1, the delivery application's two, and the descriptions."""
+"""The REST resources: those of Table 1, the delivery application's two, and the descriptions."""

@@ -1,4 +1,4 @@
-"""The delivery application's resources: the paper's PUT, and the list of what was accepted."""
+"""The delivery application's resources: the paper's PUT request, and the list of accepted deliveries."""
 
 import re
 from typing import Final
@@ -13,7 +13,7 @@ from reference_robot.webservices.representation.reading import NUMBER
 from reference_robot.webservices.resources.resource import NO_CONTENT, Resource, represented, wanted_format
 from reference_robot.webservices.robot.deliveries import Deliveries, UnusableFieldError
 
-# The values of the path, in the order of the message's fields and by the path template's names.
+# The path template's names of the values, in the order of the message's fields.
 _NAMES: Final = ("code", *PATH_NAMES)
 _PREFIX: Final = "/robot/app/delivery/"
 _ANY: Final = re.compile((f"{_PREFIX}([^/]*)" + "".join(f"/{name}/([^/]*)" for name in PATH_NAMES)).encode())
@@ -25,7 +25,7 @@ _NUMBER: Final = re.compile(NUMBER.encode())
 
 
 class Delivery(Resource):
-    """PUT publishes one DeliveryRequestMsg. The only resource with values in its path."""
+    """The resource whose PUT publishes one DeliveryRequestMsg; its path contains the message's values."""
 
     path = _PREFIX + "{code}" + "".join(f"/{name}/{{{name}}}" for name in PATH_NAMES)
 
@@ -34,11 +34,11 @@ class Delivery(Resource):
 
     @staticmethod
     def owns(path: bytes) -> bool:
-        """Tell whether a raw path has this resource's form, whatever its values."""
+        """Return whether a raw URL path has the form of a delivery path, whatever its values."""
         return _ANY.fullmatch(path) is not None
 
     def put(self, request: Request) -> Response:
-        """Accept a delivery, 204; a body is ignored. 422 for codes other than 3 and 4 and for bad numbers."""
+        """Publish a delivery and return 204; raise the Problem 422 for an unknown code or an invalid number."""
         match = _WELL_FORMED.fullmatch(request.path)
         sent = _spelled_out(request.path) if match is None else match.groups()
         try:
@@ -50,7 +50,7 @@ class Delivery(Resource):
 
 
 class DeliveryList(Resource):
-    """The requests accepted last, newest first, with their state: an extension of the contract."""
+    """The resource that lists the latest accepted deliveries with their states: an extension of the contract."""
 
     path = _PREFIX
 
@@ -58,15 +58,15 @@ class DeliveryList(Resource):
         self._deliveries = deliveries
 
     def get(self, request: Request) -> Response:
-        """Return the list."""
+        """Return the list of deliveries, newest first."""
         return represented(self._deliveries.listed(), "Deliveries", wanted_format(request))
 
 
 def _spelled_out(path: bytes) -> tuple[bytes, ...]:
-    """Return the values one by one, percent-decoded; what is no number is refused by its name."""
+    """Return the percent-decoded values of a delivery path; raise the Problem 422 that names an invalid value."""
     match = _ANY.fullmatch(path)
     if match is None:
-        raise Problem(404, "no such delivery")
+        raise Problem(404, "there is no resource at this delivery path")
     code, *coordinates = values = tuple(unquote_to_bytes(group) for group in match.groups())
     if not _CODE.fullmatch(code):
         raise Problem(422, f"code must be an integer, not {shown(_text(code))}")

@@ -1,6 +1,6 @@
-"""/openapi.json and /application.wadl: the contract's files, with the robot's own extension in them.
+"""/openapi.json and /application.wadl: the contract's descriptions, with the robot's health resource added.
 
-They are served with the address under which they were asked for.
+They contain the address that the client used, or the robot's public URL.
 """
 
 import json
@@ -19,7 +19,7 @@ _WADL_NAMESPACE: Final = "{http://wadl.dev.java.net/2009/02}"
 
 
 class OpenApi(Resource):
-    """The OpenAPI description, as JSON."""
+    """The OpenAPI description as JSON."""
 
     path = "/openapi.json"
 
@@ -29,13 +29,13 @@ class OpenApi(Resource):
         self._document: dict[str, Any] = document | {"paths": document["paths"] | {Health.path: Health.described}}
 
     def get(self, request: Request) -> Response:
-        """Return the description with this robot as its server."""
+        """Return the OpenAPI description with this robot's URL as the server."""
         document = self._document | {"servers": [{"url": self._address(request)}]}
         return content(200, "application/json", json.dumps(document, default=str).encode())
 
 
 class Wadl(Resource):
-    """The WADL description."""
+    """The WADL description of the REST interface."""
 
     path = "/application.wadl"
 
@@ -46,7 +46,7 @@ class Wadl(Resource):
             resources.append(_health())
 
     def get(self, request: Request) -> Response:
-        """Return the description with this robot as its base."""
+        """Return the WADL description with this robot's URL as the base."""
         for resources in self._document.iter(f"{_WADL_NAMESPACE}resources"):
             resources.set("base", self._address(request) + "/")
         body = etree.tostring(self._document, encoding="utf-8", xml_declaration=True)

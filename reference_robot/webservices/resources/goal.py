@@ -1,4 +1,4 @@
-"""/robot/navigation/action/goal/: sending and cancelling a goal location."""
+"""/robot/navigation/action/goal/: the active navigation goal, which clients read, send and cancel."""
 
 from typing import Final
 
@@ -12,7 +12,7 @@ _CREATED: Final = 201
 
 
 class Goal(Resource):
-    """The active goal, move_base_msgs/MoveBaseActionGoal with the status that the robot adds."""
+    """The active goal as a move_base_msgs/MoveBaseActionGoal, with a status that the robot adds."""
 
     path = "/robot/navigation/action/goal/"
 
@@ -21,7 +21,7 @@ class Goal(Resource):
         self._location = address.location(self.path)
 
     def get(self, request: Request) -> Response:
-        """Return the active goal; 404 when there is none."""
+        """Return the active goal; raise the Problem 404 if there is none."""
         media_type = wanted_format(request)
         goal = self._goals.current()
         if goal is None:
@@ -29,13 +29,13 @@ class Goal(Resource):
         return represented(goal, GOAL.name, media_type)
 
     async def put(self, request: Request) -> Response:
-        """Send a goal; 201 with Location for a new one, 202 where it preempts another, 200 for a repeat."""
+        """Send a goal to the navigation; return 201 for a new goal, 202 if it displaces another, 200 for a repeat."""
         media_type = wanted_format(request)
         status, goal = await self._goals.send(sent(request, GOAL))
         location = ((b"location", self._location),) if status == _CREATED else ()
         return represented(goal, GOAL.name, media_type, status, location)
 
     async def delete(self, _request: Request) -> Response:
-        """Cancel the active goal; 404 when there is none."""
+        """Cancel the active goal and return 204; raise the Problem 404 if there is none."""
         await self._goals.cancel()
         return NO_CONTENT

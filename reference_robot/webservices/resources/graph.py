@@ -1,4 +1,4 @@
-"""/robot/sensors/ and /robot/navigation/services/: what is on the robot's graph."""
+"""/robot/sensors/ and /robot/navigation/services/: lists of topics and services on the ROS graph."""
 
 from collections.abc import Callable
 
@@ -7,7 +7,7 @@ from reference_robot.webservices.resources.resource import Resource, represented
 
 
 class GraphList(Resource):
-    """A list of what is on the graph, made anew for each request; ``root`` is its name in XML."""
+    """A list of topics or services that is read from the ROS graph for each request; ``root`` is its XML element."""
 
     def __init__(self, path: str, root: str, entries: Callable[[], list[dict[str, str]]]) -> None:
         self.path = path
@@ -15,5 +15,5 @@ class GraphList(Resource):
         self._entries = entries
 
     def get(self, request: Request) -> Response:
-        """Return the list."""
+        """Return the list in the format that the client prefers."""
         return represented(self._entries(), self._root, wanted_format(request))

@@ -1,4 +1,4 @@
-"""/robot/health/: what is there and how old, an extension of this robot's."""
+"""/robot/health/: which parts of the robot are available, and how old their data is; an extension of this robot."""
 
 from typing import Any, Final
 
@@ -13,7 +13,7 @@ _PART: Final = {
     "properties": {
         "available": {"type": "boolean"},
         "age": {"type": "number", "minimum": 0, "description": "Seconds since the last message."},
-        "silence": {"type": "number", "minimum": 0, "description": "Seconds without a sign of life."},
+        "silence": {"type": "number", "minimum": 0, "description": "Seconds since the ROS threads were last active."},
         "state": {"type": "string", "description": "State of the managed node, or unmanaged, silent, unknown."},
         "by": {"type": "string", "enum": ["service", "action"]},
     },
@@ -28,19 +28,19 @@ _SCHEMA: Final = {
 
 
 class Health(Resource):
-    """The robot's health; it is answered 200 whatever it says, for the question has been answered."""
+    """The robot's health; the status is 200 even if the robot is unhealthy."""
 
     path = "/robot/health/"
-    # As it stands under its path in an OpenAPI description.
+    # The entry for this path in the OpenAPI description.
     described: Final[dict[str, Any]] = {
         "get": {
             "operationId": "getHealth",
             "tags": ["extension"],
-            "summary": "What of the robot is there, and how old what is known of it is",
-            "description": "Not in the contract: this robot's own.",
+            "summary": "The available parts of the robot, and the age of their data",
+            "description": "An extension of this robot; not in the contract.",
             "responses": {
                 "200": {
-                    "description": "A record for each part, and healthy for all together.",
+                    "description": "An object for each part, and healthy for the whole robot.",
                     "content": {
                         JSON: {"schema": _SCHEMA},
                         XML: {"schema": _SCHEMA},
@@ -57,6 +57,6 @@ class Health(Resource):
         self._health = health
 
     async def get(self, request: Request) -> Response:
-        """Return the report."""
+        """Return the health report in the format that the client prefers."""
         media_type = wanted_format(request)
         return represented(await self._health.report(), "Health", media_type)

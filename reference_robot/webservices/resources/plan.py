@@ -1,4 +1,4 @@
-"""/robot/navigation/service/plan: a plan to a given pose."""
+"""/robot/navigation/service/plan: a path to the pose in the query string."""
 
 import math
 import re
@@ -18,7 +18,7 @@ _NUMBERS: Final = (*_REQUIRED, "yaw", "tolerance", "start_x", "start_y", "start_
 
 
 class Plan(Resource):
-    """A nav_msgs/GetPlan response for the pose in the query."""
+    """The resource that returns a nav_msgs/GetPlan response for the pose in the query string."""
 
     path = "/robot/navigation/service/plan"
 
@@ -26,18 +26,18 @@ class Plan(Resource):
         self._planner = planner
 
     async def get(self, request: Request) -> Response:
-        """Return a plan; 422 where there is none."""
+        """Return a plan; raise the Problem 422 if no path leads to the pose."""
         media_type = wanted_format(request)
         return represented(await self._planner.plan(_query(request.query)), "GetPlan", media_type)
 
 
 def _query(raw: bytes) -> PlanQuery:
-    """Read the parameters; those of other names are ignored, as is usual in queries.
+    """Return the plan query from a raw query string; unknown parameters are ignored.
 
-    A plus sign stands for itself: no parameter holds a space for which forms would write it.
+    A plus sign is not decoded as a space, because no parameter can contain a space.
 
     Raises:
-        Problem: 400 for a parameter given twice, 422 for a missing one and for what is no finite number.
+        Problem: 400 for a repeated parameter, 422 for a missing parameter or a number that is invalid or not finite.
     """
     found: dict[str, str] = {}
     for part in raw.split(b"&"):

@@ -1,4 +1,4 @@
-"""/robot/pose/: the robot's pose."""
+"""/robot/pose/: the robot's pose and velocity from its odometry."""
 
 from functools import partial
 from typing import Final
@@ -11,7 +11,7 @@ _WRITERS: Final = {media_type: partial(represented, root="Odometry", media_type=
 
 
 class Pose(Resource):
-    """The odometry received last, nav_msgs/Odometry in full."""
+    """The latest odometry as a complete nav_msgs/Odometry."""
 
     path = "/robot/pose/"
 
@@ -19,5 +19,5 @@ class Pose(Resource):
         self._odometry = odometry
 
     def get(self, request: Request) -> Response:
-        """Return the odometry; 503 before the first."""
+        """Return the odometry; raise the Problem 503 before the first message."""
         return self._odometry.written(_WRITERS[wanted_format(request)])

@@ -1,4 +1,4 @@
-"""What all REST resources share."""
+"""The base class of all REST resources, and the reading and writing of their representations."""
 
 from collections.abc import Awaitable, Callable
 from typing import Any, Final
@@ -16,28 +16,28 @@ _LIVE: Final = ((b"vary", b"accept"), (b"cache-control", b"no-store"))
 
 
 class Resource:
-    """A resource: a path, and a method ``get``, ``put`` or ``delete`` for each HTTP method that it offers.
+    """A REST resource: a path, and a method ``get``, ``put`` or ``delete`` for each supported HTTP method.
 
-    A handler returns its answer, or an awaitable of it; it raises a Problem to refuse.
+    Each method returns a response or an awaitable of it, and raises a Problem for an error response.
     """
 
     path: str
 
     def handlers(self) -> dict[str, Callable[[Request], Response | Awaitable[Response]]]:
-        """Return the handlers by HTTP method; HEAD is GET without content (RFC 9110 9.3.2)."""
+        """Return the handlers by HTTP method; HEAD uses the handler of GET (RFC 9110 9.3.2)."""
         offered = {name.upper(): getattr(self, name) for name in ("get", "put", "delete") if hasattr(self, name)}
         return offered | ({"HEAD": offered["GET"]} if "GET" in offered else {})
 
 
 def wanted_format(request: Request) -> str:
-    """Return the format that the client likes best; raises the 406."""
+    """Return the media type that the client prefers; raise the Problem 406 if none is acceptable."""
     return chosen(request.headers.get(b"accept"), FORMATS)
 
 
 def represented(
     plain: Any, root: str, media_type: str, status: int = 200, headers: tuple[tuple[bytes, bytes], ...] = ()
 ) -> Response:
-    """Return plain data as an answer; in XML, ``root`` names the root element: the ROS type."""
+    """Return a response with a dict or list as JSON, XML or text; ``root`` names the XML root element, the ROS type."""
     if media_type == JSON:
         body = write_json(plain)
     elif media_type == XML:
@@ -48,5 +48,5 @@ def represented(
 
 
 def sent(request: Request, shape: Record) -> dict[str, Any]:
-    """Return the content of a request as plain data of the given shape; raises 415, 400 and 422."""
+    """Return the JSON or XML request body as a dict of the required shape; raise the Problem 415, 400 or 422."""
     return read(request.content(), request.headers.get(b"content-type"), shape)

@@ -1,4 +1,4 @@
-"""/robot/velocity/ and /robot/velocity/linear/."""
+"""/robot/velocity/ and /robot/velocity/linear/: the measured velocity, and velocity commands."""
 
 from geometry_msgs.msg import Twist, Vector3
 
@@ -9,7 +9,7 @@ from reference_robot.webservices.robot.velocity import Velocity as RobotVelocity
 
 
 class Velocity(Resource):
-    """The measured velocity, geometry_msgs/Twist; PUT sets a new one."""
+    """The measured velocity as a geometry_msgs/Twist; PUT commands a new velocity."""
 
     path = "/robot/velocity/"
 
@@ -17,11 +17,11 @@ class Velocity(Resource):
         self._velocity = velocity
 
     def get(self, request: Request) -> Response:
-        """Return what the robot measures; 503 before the first odometry."""
+        """Return the measured velocity; raise the Problem 503 without current odometry."""
         return represented(self._velocity.measured(), "Twist", wanted_format(request))
 
     async def put(self, request: Request) -> Response:
-        """Set all six components; 200 with the accepted Twist."""
+        """Command all six components of the velocity; return 200 with the accepted Twist."""
         media_type = wanted_format(request)
         twist = sent(request, shape_of(Twist))
         await self._velocity.command(twist)
@@ -29,7 +29,7 @@ class Velocity(Resource):
 
 
 class LinearVelocity(Resource):
-    """The linear part, geometry_msgs/Vector3; PUT leaves the angular part as it was."""
+    """The linear part of the velocity as a geometry_msgs/Vector3; PUT keeps the commanded angular part."""
 
     path = "/robot/velocity/linear/"
 
@@ -37,11 +37,11 @@ class LinearVelocity(Resource):
         self._velocity = velocity
 
     def get(self, request: Request) -> Response:
-        """Return what the robot measures; 503 before the first odometry."""
+        """Return the measured linear velocity; raise the Problem 503 without current odometry."""
         return represented(self._velocity.measured()["linear"], "Vector3", wanted_format(request))
 
     async def put(self, request: Request) -> Response:
-        """Set the three linear components; 200 with the accepted Vector3."""
+        """Command the three linear components of the velocity; return 200 with the accepted Vector3."""
         media_type = wanted_format(request)
         linear = sent(request, shape_of(Vector3))
         await self._velocity.command_linear(linear)

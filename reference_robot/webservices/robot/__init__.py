@@ -1,1 +1,1 @@
-"""The robot as both interfaces see it: deliveries, goals, velocity, pose and plans. Nothing of REST or SOAP."""
+"""The functions of the robot that REST and SOAP share: deliveries, goals, velocity, pose and plans."""

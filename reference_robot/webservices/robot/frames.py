@@ -1,4 +1,4 @@
-"""Poses from one frame into another; quaternions as ROS has them, (x, y, z, w)."""
+"""Transformation of poses between coordinate frames; quaternions in ROS's order (x, y, z, w)."""
 
 from typing import TypeAlias
 
@@ -8,7 +8,7 @@ _Vector: TypeAlias = tuple[float, float, float]
 
 
 def moved(transform: Transform, pose: Pose) -> Pose:
-    """Return a pose in the transform's parent frame that is given in its child frame."""
+    """Return a pose, given in the child frame of a transform, in its parent frame."""
     x, y, z = _turned(transform.rotation, (pose.position.x, pose.position.y, pose.position.z))
     away = transform.translation
     return Pose(
@@ -18,7 +18,7 @@ def moved(transform: Transform, pose: Pose) -> Pose:
 
 
 def inverse(transform: Transform) -> Transform:
-    """Return the transform back."""
+    """Return the inverse of a transform."""
     turn, away = transform.rotation, transform.translation
     back = Quaternion(x=-turn.x, y=-turn.y, z=-turn.z, w=turn.w)
     x, y, z = _turned(back, (-away.x, -away.y, -away.z))
@@ -26,10 +26,7 @@ def inverse(transform: Transform) -> Transform:
 
 
 def _turned(turn: Quaternion, vector: _Vector) -> _Vector:
-    """Return the vector turned by a unit quaternion: v + 2wt + 2(u x t) with t = u x v.
-
-    Exact for no turn at all.
-    """
+    """Return a vector rotated by a unit quaternion: v + 2wt + 2(u x t) with t = u x v; exact for the identity."""
     axis = (turn.x, turn.y, turn.z)
     once = _cross(axis, vector)
     twice = _cross(axis, once)

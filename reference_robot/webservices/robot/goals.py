@@ -1,4 +1,4 @@
-"""The life of a goal: sent, repeated, preempted, cancelled, ended. One goal is current at a time, or none."""
+"""The life of a navigation goal: sent, repeated, displaced, cancelled, ended. At most one goal is current at a time."""
 
 import asyncio
 import contextlib
@@ -22,11 +22,11 @@ from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import message_from
 from reference_robot.webservices.representation.problems import Problem, not_yet
 from reference_robot.webservices.representation.shapes import Record, Text, shape_of
-from reference_robot.webservices.robot.reported_goals import STATUS_TEXTS, told_goal, untold_goal
+from reference_robot.webservices.robot.reported_goals import STATUS_TEXTS, goal_from_report, goal_from_status
 from reference_robot.webservices.robot.target_poses import require_pose
 
 _GOAL_ID: Final = Record("GoalID", (("stamp", shape_of(Time)), ("id", Text(1, 255))), optional=frozenset({"stamp"}))
-# move_base_msgs/MoveBaseActionGoal, a type of ROS 1 that only the web interface still knows.
+# move_base_msgs/MoveBaseActionGoal, a ROS 1 type that only the web interface uses.
 GOAL: Final = Record(
     "MoveBaseActionGoal",
     (
@@ -38,15 +38,19 @@ GOAL: Final = Record(
 )
 
 _REMEMBERED: Final = 100
-_REASON_COMES_WITHIN: Final = 0.3  # seconds after a refusal in which its reason may still arrive
+_REASON_COMES_WITHIN: Final = 0.3  # seconds to wait for the reason of a refusal
 _REASON_STEP: Final = 0.02
 
 
 @dataclass(frozen=True)
 class _Goal:
-    """A goal that the robot accepted from us; ``handle`` is rclpy's, which follows its status.
+    """A goal that the robot accepted from these web services.
 
-    ``losses`` is how many action servers had gone when it was accepted.
+    Attributes:
+        identity: The goal's UUID in ROS, 16 bytes.
+        described: The goal as a plain MoveBaseActionGoal.
+        handle: rclpy's ClientGoalHandle, which follows the goal's status.
+        losses: How many action servers had disappeared when the goal was accepted.
     """
 
     identity: bytes
@@ -57,11 +61,11 @@ class _Goal:
     @property
     def status(self) -> int:
         reported: int = self.handle.status
-        return reported or GoalStatus.STATUS_ACCEPTED  # 0: accepted, and no status has come yet
+        return reported or GoalStatus.STATUS_ACCEPTED  # 0: accepted, but no status received yet
 
 
 class Goals:
-    """The goal resource's life cycle, on the event loop's thread; ``frames`` are those in which poses are taken."""
+    """The goals of the goal resource, on the event loop's thread; target poses must be in one of ``frames``."""
 
     def __init__(
         self,
@@ -77,39 +81,40 @@ class Goals:
         self._navigator = navigator
         self._frames = frames
         self._own: _Goal | None = None
-        self._sending = 0  # how many goals the navigation is being asked to take, or will be next
+        self._sending = 0  # goals that are being sent, or wait to be sent
         self._cancels = 0
-        # Goals that are ours, or were cancelled: what the robot tells of its current goal may lag behind.
+        # Ids of our own and of cancelled goals, because the robot's report of its goal may lag behind.
         self._known: deque[str] = deque(maxlen=_REMEMBERED)
         self._one_at_a_time = asyncio.Lock()
 
     def current(self) -> dict[str, Any] | None:
-        """Return the active goal as a plain MoveBaseActionGoal with its status, or None.
+        """Return the active goal as the dict of a MoveBaseActionGoal with its status, or None.
 
         Raises:
-            Problem: 503 while ROS's thread hangs: what the robot does now is not known then.
+            Problem: 503 while the ROS thread hangs, because the robot's present state is unknown.
         """
-        if self._subscribers.hangs():
-            raise not_yet(f"ROS has not been heard of for {self._subscribers.silence():.1f} s: the goal is not known")
+        ros = self._subscribers.ros
+        if ros.hangs():
+            raise not_yet(f"ROS has been silent for {ros.silence():.1f} s: the goal is unknown")
         own = self._active_own()
         if own is not None:
             return own.described | {"status": {"code": own.status, "text": STATUS_TEXTS[own.status]}}
         return self._foreign()
 
     def is_active(self) -> bool:
-        """Tell whether the robot follows a goal, whoever sent it."""
+        """Return whether the robot follows a goal of any client."""
         return self.current() is not None
 
     async def send(self, wanted: dict[str, Any]) -> tuple[int, dict[str, Any]]:
-        """Send a plain MoveBaseActionGoal of the right shape, unless it is the current one already.
+        """Send the goal in a dict of a MoveBaseActionGoal to the navigation, unless it is the current goal already.
 
         Returns:
-            The HTTP status and the goal as the robot holds it: 200 for a repeat, 201 for a new goal, 202 where it
-            displaces another one.
+            The HTTP status and the goal as the robot holds it: 200 for a repeat, 201 for a new goal, 202 if it
+                displaces another goal.
 
         Raises:
-            Problem: 422 for a pose that cannot be taken or a goal that the robot refuses, 409 for the current goal's
-                id with another pose, 503 while no navigation is there.
+            Problem: 422 for an invalid pose or a goal that the robot refuses, 409 for the current goal's id with
+                another pose, 503 while no navigation is running.
         """
         require_pose(wanted["goal"]["target_pose"], self._frames, "goal.target_pose")
         cancels = self._cancels
@@ -128,26 +133,26 @@ class Goals:
                 raise Problem(409, f"goal_id.id {identity!a} is the current goal's, which has another target_pose")
             return 200, current
         own = self._own = await self._accepted(self._filled_in(wanted), cancels)
-        # A goal where the robot already stands may have ended by now: then it is no longer current.
+        # A goal at the robot's present pose may have ended already; then there is no current goal.
         sent = self.current() or own.described | {"status": {"code": 1, "text": "accepted"}}
         return (201 if current is None else 202), sent
 
     async def cancel(self) -> None:
-        """Cancel the active goal, whoever sent it, and one that is being sent; it waits for no other request.
+        """Cancel the active goal of any client, and a goal that is being sent; do not wait for other requests.
 
         Raises:
-            Problem: 404 when there is none, 409 when the robot will not cancel it, 503 when it does not answer.
+            Problem: 404 if there is no goal, 409 if the robot refuses to cancel it, 503 if the robot does not respond.
         """
         current, own, sending = self.current(), self._own, self._sending
         if current is None and not sending:
             raise Problem(404, "the robot follows no goal")
         self._cancels += 1
-        # All of them: another one may have displaced the goal that we know of a moment ago.
+        # Cancel all goals: another goal may have displaced the known one a moment ago.
         doomed = [goal.identity for goal in self._subscribers.goals.active()]
         reply = await self._calls.result(self._publishers.cancel_all_goals, "the navigation's cancel service")
         if current is not None and reply.return_code == CancelGoal.Response.ERROR_REJECTED:
             raise Problem(409, f"the navigation refuses to cancel goal {current['goal_id']['id']!a}")
-        # Cancelled, unknown or ended: in each case it is current no longer.
+        # The goal is cancelled, unknown or ended: in each case no longer current.
         if self._own is own:
             self._own = None
         self._known.extend(doomed if current is None else [*doomed, current["goal_id"]["id"]])
@@ -155,7 +160,7 @@ class Goals:
     def _active_own(self) -> _Goal | None:
         own = self._own
         if own is None or not self._publishers.navigation_is_served():
-            return None  # without a navigation, nobody follows it
+            return None  # without a navigation no goal is followed
         goals = self._subscribers.goals
         is_lost = own.losses != goals.losses and own.identity.hex() not in {goal.identity for goal in goals.active()}
         if is_lost or own.status not in STATUS_TEXTS:
@@ -163,20 +168,20 @@ class Goals:
         return own
 
     def _foreign(self) -> dict[str, Any] | None:
-        """Return a goal that somebody else sent: a mission of the robot's own, or a goal of another client's."""
+        """Return the active goal that another client or a mission of the robot has sent, or None."""
         if not self._publishers.navigation_is_served():
             return None
-        told = self._subscribers.current_goal
-        if told == "":
-            return None  # it says itself that it follows none
-        goal = told_goal(told) if told else None
+        report = self._subscribers.current_goal
+        if report == "":
+            return None  # the robot reports that it follows no goal
+        goal = goal_from_report(report) if report else None
         if goal is None:
             unknown = [goal for goal in self._subscribers.goals.active() if goal.identity not in self._known]
-            goal = untold_goal(unknown[-1]) if unknown else None
+            goal = goal_from_status(unknown[-1]) if unknown else None
         return None if goal is None or goal["goal_id"]["id"] in self._known else goal
 
     def _filled_in(self, wanted: dict[str, Any]) -> dict[str, Any]:
-        """Return the goal with what the client may leave out: stamps mean now, the id is a new one."""
+        """Return the goal with optional fields added: the present time for stamps, and a new id."""
         seconds, nanoseconds = self._publishers.node.get_clock().now().seconds_nanoseconds()
         now = {"stamp": {"sec": seconds, "nanosec": nanoseconds}}
         target = wanted["goal"]["target_pose"]
@@ -187,10 +192,19 @@ class Goals:
         }
 
     async def _accepted(self, described: dict[str, Any], cancels: int) -> _Goal:
-        """Have the navigation take a goal, unless there was a DELETE after the first ``cancels`` of them."""
+        """Return the goal after the navigation has accepted it.
+
+        Args:
+            described: The goal as a plain MoveBaseActionGoal.
+            cancels: The number of DELETE requests when the goal's request arrived.
+
+        Raises:
+            Problem: 409 if a DELETE request has arrived since; 422 if the navigation refuses the goal; 503 without a
+                navigation.
+        """
         if not self._publishers.navigation_is_served():
-            raise not_yet("the robot has no navigation that takes goals")
-        identity = uuid.uuid4().bytes  # ROS's own: an id of the web may come again for another goal
+            raise not_yet("the robot has no navigation that accepts goals")
+        identity = uuid.uuid4().bytes  # not the client's id, which may be reused for another goal
         self._known.append(identity.hex())
         losses = self._subscribers.goals.losses
         pose = message_from(shape_of(PoseStamped), described["goal"]["target_pose"])
@@ -199,13 +213,13 @@ class Goals:
             handle = await self._calls.result(lambda: self._publishers.send_goal(identity, pose), "the navigation")
         except Problem:
             with contextlib.suppress(ValueError):
-                self._known.remove(identity.hex())  # should it be taken yet, it is nobody's that we know of
+                self._known.remove(identity.hex())  # if it is accepted later, it counts as another client's
             raise
         if not handle.accepted:
             await self._navigator.require_active()
             reason = await self._reason(described["goal"]["target_pose"])
             raise Problem(422, f"goal.target_pose is refused by the navigation: {reason}")
-        if self._cancels != cancels:  # it may have been taken after the DELETE had reached the navigation
+        if self._cancels != cancels:  # the goal may have been accepted after the DELETE
             cancel = self._publishers.cancel_goal
             await self._calls.result(lambda: cancel(identity), "the navigation's cancel service")
         self._require_wanted(cancels)
@@ -213,19 +227,19 @@ class Goals:
 
     def _require_wanted(self, cancels: int) -> None:
         if self._cancels != cancels:
-            raise Problem(409, "the goal was cancelled, by a DELETE, before the navigation had taken it")
+            raise Problem(409, "a DELETE request cancelled the goal before the navigation had accepted it")
 
     async def _reason(self, target: dict[str, Any]) -> str:
-        """Return why the robot refused a goal, which ours tells on a topic of its own; Nav2 does not."""
+        """Return why the robot refused a goal; the reference robot publishes the reason on a topic, Nav2 does not."""
         for _ in range(round(_REASON_COMES_WITHIN / _REASON_STEP)):
             try:
-                told = json.loads(self._subscribers.last_rejection or "{}")
-                if told.get("pose") == target:
-                    return str(told["reason"])
+                rejection = json.loads(self._subscribers.last_rejection or "{}")
+                if rejection.get("pose") == target:
+                    return str(rejection["reason"])
             except (ValueError, KeyError, AttributeError):
                 break
             await asyncio.sleep(_REASON_STEP)
-        return "it gave no reason"
+        return "no reason was given"
 
 
 def _destination(goal: dict[str, Any]) -> tuple[str, Any]:

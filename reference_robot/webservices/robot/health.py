@@ -1,6 +1,7 @@
-"""What of the robot is there, and how old what is known of it is."""
+"""The health report: which parts of the robot are available, and how old their data is."""
 
 import asyncio
+from dataclasses import dataclass
 from typing import Any
 
 from reference_robot.webservices.nodes.lifecycle import ManagedNode
@@ -9,52 +10,41 @@ from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.robot.odometry import OLDEST, LatestOdometry
 
 
+@dataclass(frozen=True)
 class Health:
-    """Looks at everything that requests depend on."""
+    """A reporter on all parts of the robot that requests depend on."""
 
-    def __init__(
-        self,
-        publishers: RobotPublishersNode,
-        subscribers: RobotSubscribersNode,
-        odometry: LatestOdometry,
-        navigator: ManagedNode,
-        planner: ManagedNode,
-    ) -> None:
-        self._publishers = publishers
-        self._subscribers = subscribers
-        self._odometry = odometry
-        self._navigator = navigator
-        self._planner = planner
+    publishers: RobotPublishersNode
+    subscribers: RobotSubscribersNode
+    odometry: LatestOdometry
+    navigator: ManagedNode
+    planner: ManagedNode
 
     async def report(self) -> dict[str, Any]:
-        """Return a record for each part with ``available`` in it, ages in seconds, and ``healthy`` for all together.
+        """Return a dict with ``available``, and ages in seconds, for each part, and ``healthy`` for the whole robot.
 
-        A robot is healthy while its odometry is younger than a second and ROS's threads run: without a navigation or
-        a delivery application it is a robot still.
+        A robot is healthy if its odometry is less than a second old and the ROS threads run; navigation and the
+        delivery application are not required.
         """
-        publishers, subscribers = self._publishers, self._subscribers
-        hangs = subscribers.hangs()
-        age = self._odometry.age()
+        publishers, subscribers = self.publishers, self.subscribers
+        hangs = subscribers.ros.hangs()
+        age = self.odometry.age()
         is_current = age is not None and age <= OLDEST
-        # Without ROS's threads, nobody's answer would come.
+        # While a ROS thread hangs, no response would arrive.
         navigator, planner = (
-            ("unknown", "unknown") if hangs else await asyncio.gather(self._navigator.state(), self._planner.state())
+            ("unknown", "unknown") if hangs else await asyncio.gather(self.navigator.state(), self.planner.state())
         )
-        served = [
-            kind
-            for kind, is_served in (
-                ("service", subscribers.plan_service_is_served),
-                ("action", subscribers.plan_action_is_served),
-            )
-            if is_served()
-        ]
+        if subscribers.plan_service_is_served():
+            planned_by = {"by": "service"}
+        else:
+            planned_by = {"by": "action"} if subscribers.plan_action_is_served() else {}
         return {
             "healthy": is_current and not hangs,
-            "ros": {"available": not hangs, "silence": round(subscribers.silence(), 3)},
+            "ros": {"available": not hangs, "silence": round(subscribers.ros.silence(), 3)},
             "odometry": {"available": is_current} | ({} if age is None else {"age": round(age, 3)}),
             "velocity": {"available": publishers.find_velocity_subscribers()},
             "navigation": {"available": publishers.navigation_is_served(), "state": navigator},
-            "planner": {"available": bool(served), "state": planner} | ({"by": served[0]} if served else {}),
+            "planner": {"available": bool(planned_by), "state": planner} | planned_by,
             "localisation": {"available": subscribers.map_transform.latest is not None},
             "delivery": {"available": publishers.delivery_is_served()},
         }

@@ -1,9 +1,8 @@
-"""The odometry received last: where the robot is and how fast it moves, as it measures itself.
+"""The latest odometry of the robot, deserialized and written as JSON, XML and text.
 
-What a message says, and what is written of it, is worked out when somebody asks: an idle robot does nothing for its
-fifty messages a second. But where message after message is asked for, the next one is worked out when it comes, in
-ROS's thread. Otherwise one answer in two of a client that asks a hundred times a second would take that time, and the
-other would not.
+Messages are converted when a client requests them: an idle robot does nothing for its fifty messages a second. But if
+clients requested the last two messages, the next one is converted on arrival, in the ROS thread. Otherwise a client
+with a hundred requests a second would wait for the conversion in every second response.
 """
 
 from __future__ import annotations
@@ -19,94 +18,94 @@ from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import reader_of
 from reference_robot.webservices.representation.problems import Problem, not_yet
 
-OLDEST: Final = 1.0  # seconds; what is older is no odometry (contract, REST)
+OLDEST: Final = 1.0  # seconds; older odometry counts as missing (contract, REST)
 
 T = TypeVar("T")
 Writer = Callable[[dict[str, Any]], Any]  # of a plain nav_msgs/Odometry
 
-_NOBODY: Final[frozenset[Writer]] = frozenset()
+_NO_WRITERS: Final[frozenset[Writer]] = frozenset()
 
 
 class LatestOdometry:
-    """Tells what the robot measures."""
+    """The latest odometry message, with its age and its representations."""
 
     def __init__(self, subscribers: RobotSubscribersNode) -> None:
         self._subscribers = subscribers
         self._read = reader_of(Odometry)
-        self._came = 0  # messages
-        self._told = _Told(0, b"", None, _NOBODY)
-        subscribers.on_odometry = self._foresee
+        self._count = 0  # messages so far
+        self._converted = _Converted(0, b"", None, _NO_WRITERS)
+        subscribers.on_odometry = self._convert_ahead
 
     def message(self) -> Odometry:
-        """Return the message received last.
+        """Return the latest odometry message.
 
-        Its age is counted from its arrival, by this machine's clock: a robot's own clock may be another one.
+        The message's age is measured from its arrival by this machine's clock, because the robot's clock may differ.
 
         Raises:
-            Problem: 503 before the first, and while the last is older than a second, be it that the robot fell silent
-                or that ROS's thread in this process hangs.
+            Problem: 503 before the first message, and if the latest is over a second old, because the robot stopped
+                publishing or the ROS thread of this process hangs.
         """
         return self._latest().message
 
     def age(self) -> float | None:
-        """Return how many seconds ago the last message came; None before the first."""
-        octets, received = self._subscribers.odometry
-        return None if octets is None else monotonic() - received
+        """Return how many seconds ago the latest message arrived; None before the first."""
+        serialized, received = self._subscribers.odometry
+        return None if serialized is None else monotonic() - received
 
     def written(self, writer: Callable[[dict[str, Any]], T]) -> T:
-        """Return what a writer makes of the message received last: made once for each, however often it is asked for.
+        """Return what a writer makes of the latest message (such as its JSON); a writer is called once per message.
 
         Raises:
-            Problem: As ``message``; the 503 also where a value in it is not finite.
+            Problem: 503 as ``message``, and for a value that is not finite.
         """
-        told = self._latest()
-        told.asked.add(writer)
-        if writer not in told.written:
-            told.written[writer] = writer(self._read(told.message))
-        return cast("T", told.written[writer])
+        converted = self._latest()
+        converted.writers.add(writer)
+        if writer not in converted.written:
+            converted.written[writer] = writer(self._read(converted.message))
+        return cast("T", converted.written[writer])
 
-    def _latest(self) -> _Told:
-        octets, received = self._subscribers.odometry
-        if octets is None:
+    def _latest(self) -> _Converted:
+        serialized, received = self._subscribers.odometry
+        if serialized is None:
             raise not_yet("the robot has not published its odometry yet")
         age = monotonic() - received
         if age > OLDEST:
-            raise not_yet(f"the robot's last odometry came {age:.1f} s ago: where it is now is not known")
-        told = self._told
-        if octets is not told.octets:
-            told = self._told = self._successor(octets, told)
-        return told
+            raise not_yet(f"the robot's last odometry is {age:.1f} s old: the robot's pose is unknown")
+        converted = self._converted
+        if serialized is not converted.serialized:
+            converted = self._converted = self._successor(serialized, converted)
+        return converted
 
-    def _foresee(self, octets: bytes) -> None:
-        """Work a message out that has just come, for those who asked for the last two; in ROS's thread.
+    def _convert_ahead(self, serialized: bytes) -> None:
+        """Convert a message that has just arrived, if clients requested the last two; runs in the ROS thread.
 
-        Should the event loop's thread do the same meanwhile, one of the two was in vain.
+        The event loop's thread may do the same conversion at the same time; then one of the two results is unused.
         """
-        self._came += 1
-        last = self._told
-        wanted = last.asked & last.asked_before
+        self._count += 1
+        last = self._converted
+        wanted = last.writers & last.earlier_writers
         if not wanted:
             return
-        told = self._successor(octets, last)
+        converted = self._successor(serialized, last)
         try:
-            plain = self._read(told.message)
-            told.written = {writer: writer(plain) for writer in wanted}
+            plain = self._read(converted.message)
+            converted.written = {writer: writer(plain) for writer in wanted}
         except Problem:
-            return  # whoever asks is told
-        self._told = told
+            return  # a request for the message gets the problem
+        self._converted = converted
 
-    def _successor(self, octets: bytes, last: _Told) -> _Told:
-        asked_before = frozenset(last.asked) if self._came == last.number + 1 else _NOBODY
-        return _Told(self._came, octets, deserialize_message(octets, Odometry), asked_before)
+    def _successor(self, serialized: bytes, last: _Converted) -> _Converted:
+        earlier_writers = frozenset(last.writers) if self._count == last.number + 1 else _NO_WRITERS
+        return _Converted(self._count, serialized, deserialize_message(serialized, Odometry), earlier_writers)
 
 
-class _Told:
-    """What one message says, what has been written of it, who asked for that, and who asked for the one before it."""
+class _Converted:
+    """An odometry message, its representations so far, and the writers used for it and for its predecessor."""
 
-    def __init__(self, number: int, octets: bytes, message: Any, asked_before: frozenset[Writer]) -> None:
+    def __init__(self, number: int, serialized: bytes, message: Any, earlier_writers: frozenset[Writer]) -> None:
         self.number = number
-        self.octets = octets
+        self.serialized = serialized
         self.message = message
         self.written: dict[Writer, Any] = {}
-        self.asked: set[Writer] = set()
-        self.asked_before = asked_before
+        self.writers: set[Writer] = set()
+        self.earlier_writers = earlier_writers

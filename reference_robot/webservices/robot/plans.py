@@ -1,4 +1,4 @@
-"""Plans: a GetPlan service where the robot has one, else the ComputePathToPose action of Nav2."""
+"""Path planning by the robot's GetPlan service or, if there is none, by Nav2's ComputePathToPose action."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,9 +28,9 @@ _LARGEST_TOLERANCE: Final = 3.4e38  # nav_msgs/GetPlan carries it as a float32
 
 @dataclass(frozen=True)
 class PlanQuery:
-    """What a plan is asked for: metres and radians, goal and start in ``frame_id``.
+    """A request for a plan: goal and start in ``frame_id``, in metres and radians.
 
-    Without a start the planner takes where it knows the robot to be; a part of one that is left out is the robot's own.
+    Without any start value the planner uses the robot's pose; if some are given, the missing ones are the robot's own.
     """
 
     x: float
@@ -44,7 +44,7 @@ class PlanQuery:
 
 
 class Planner:
-    """Asks ROS for plans between poses in one of its ``frames``."""
+    """A client of the robot's planner, for poses in one of its ``frames``."""
 
     def __init__(
         self,
@@ -62,11 +62,11 @@ class Planner:
         self._read = reader_of(Path)
 
     async def plan(self, query: PlanQuery) -> dict[str, Any]:
-        """Return a plain nav_msgs/GetPlan response, ``{"plan": Path}``, with at least one pose.
+        """Return a path as the dict of a nav_msgs/GetPlan response, ``{"plan": Path}``, with at least one pose.
 
         Raises:
-            Problem: 422 for an unknown frame, a negative tolerance or a goal that no plan reaches; 503 while there is
-                no planner, or no odometry where a part of the start is the robot's own.
+            Problem: 422 for an unknown frame, a negative tolerance or a goal that no plan reaches; 503 without a
+                planner, or without odometry if a part of the start is the robot's own pose.
         """
         require_known_frame(query.frame_id, self._frames, "frame_id")
         if not 0 <= query.tolerance <= _LARGEST_TOLERANCE:
@@ -76,7 +76,7 @@ class Planner:
         stamped_start = None if start is None else self._stamped(into(start), frame)
         goal = self._stamped(into(planar_pose(query.x, query.y, query.yaw)), frame)
         if self._subscribers.plan_service_is_served():
-            # A start in no frame is none (move_base's make_plan).
+            # A start without a frame_id means the robot's own pose (move_base's make_plan).
             request = GetPlan.Request(start=stamped_start or PoseStamped(), goal=goal, tolerance=query.tolerance)
             reply = await self._calls.result(lambda: self._subscribers.ask_plan_service(request), "the plan service")
             path = reply.plan
@@ -93,14 +93,15 @@ class Planner:
             raise Problem(422, f"the robot plans in frame {plain['header']['frame_id']}, not {query.frame_id}")
         return {"plan": plain}
 
-    def _planning_frame(self, asked: str) -> tuple[str, _Move, _Move]:
-        """Return the frame to plan in, and how a pose gets there and back.
+    def _planning_frame(self, requested: str) -> tuple[str, _Move, _Move]:
+        """Return the frame to plan in, and the functions that transform a pose into it and back.
 
-        Planners plan in the map, and answer in it too; so does ours where it is known how the asked frame lies there.
+        Planners work in the map frame. If the transform from the map to the requested frame is unknown, the requested
+        frame is used.
         """
         transform = self._subscribers.map_transform.latest
-        if transform is None or asked == self._frames.map:
-            return asked, _as_it_is, _as_it_is
+        if transform is None or requested == self._frames.map:
+            return requested, _as_it_is, _as_it_is
         return self._frames.map, partial(moved, transform), partial(moved, inverse(transform))
 
     async def _by_action(self, start: PoseStamped | None, goal: PoseStamped) -> Path:
@@ -113,7 +114,7 @@ class Planner:
         return reply.result.path if reply.status == GoalStatus.STATUS_SUCCEEDED else Path()
 
     def _start(self, query: PlanQuery) -> Pose | None:
-        """Return the start in the asked frame."""
+        """Return the start pose in the requested frame; None if the query has no start."""
         if query.start_x is not None and query.start_y is not None:
             return planar_pose(query.start_x, query.start_y, query.start_yaw or 0.0)
         if query.start_x is None and query.start_y is None and query.start_yaw is None:
@@ -127,7 +128,7 @@ class Planner:
         return pose
 
     def _own_pose(self, frame_id: str) -> Pose:
-        """Return where the robot is: in the odometry frame, which is the map where nobody tells how it lies there."""
+        """Return the robot's pose in a frame; without a known transform the odometry frame counts as the map."""
         pose = self._odometry.message().pose.pose
         transform = self._subscribers.map_transform.latest
         return pose if transform is None or frame_id != self._frames.map else moved(transform, pose)

@@ -1,4 +1,4 @@
-"""Goals that somebody else sent, described as ours are: by the robot's own word, or by the action's status alone."""
+"""Goals of other clients in the form of a MoveBaseActionGoal, from the robot's report or from the action's status."""
 
 import json
 from typing import Any, Final
@@ -19,15 +19,15 @@ STATUS_TEXTS: Final = {
 _ORIGIN: Final = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
 
 
-def told_goal(report: str) -> dict[str, Any] | None:
-    """Return the goal of which a robot tells (``current_goal`` in ``names.toml``); a report amiss counts as none."""
+def goal_from_report(report: str) -> dict[str, Any] | None:
+    """Return the goal in a report of the robot (``current_goal`` in ``names.toml``); None for an invalid report."""
     try:
-        told = json.loads(report)
-        code, pose = int(told["status"]), told["pose"]
+        fields = json.loads(report)
+        code, pose = int(fields["status"]), fields["pose"]
         header = {"stamp": pose["header"]["stamp"], "frame_id": pose["header"]["frame_id"]}
         return {
             "header": header,
-            "goal_id": {"stamp": header["stamp"], "id": str(told["goal_id"])},
+            "goal_id": {"stamp": header["stamp"], "id": str(fields["goal_id"])},
             "goal": {"target_pose": reader_of(PoseStamped)(message_from(shape_of(PoseStamped), pose))},
             "status": {"code": code, "text": STATUS_TEXTS[code]},
         }
@@ -35,11 +35,11 @@ def told_goal(report: str) -> dict[str, Any] | None:
         return None
 
 
-def untold_goal(goal: ReportedGoal) -> dict[str, Any]:
-    """Return an active goal of which only its action tells: that it is there, and not where it leads.
+def goal_from_status(goal: ReportedGoal) -> dict[str, Any]:
+    """Return an active goal whose target pose is unknown, because only the action's status reports the goal.
 
-    The representation has a pose all the same. It is in no frame (an empty ``frame_id``), so that nobody takes it for
-    a place, and the status says so in words.
+    The representation requires a pose. It is the origin in an empty ``frame_id``, so that no client takes it for a real
+    place, and the status text says that the target is not known.
     """
     header = {"stamp": {"sec": goal.seconds, "nanosec": goal.nanoseconds}, "frame_id": ""}
     return {
@@ -48,6 +48,6 @@ def untold_goal(goal: ReportedGoal) -> dict[str, Any]:
         "goal": {"target_pose": {"header": header, "pose": _ORIGIN}},
         "status": {
             "code": goal.status,
-            "text": f"{STATUS_TEXTS[goal.status]}; another client sent it, and its target is not known",
+            "text": f"{STATUS_TEXTS[goal.status]}; another client sent it, and its target is unknown",
         },
     }

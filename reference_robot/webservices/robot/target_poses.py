@@ -1,4 +1,4 @@
-"""Poses that clients send: heading, unit quaternions, and frames that the robot knows."""
+"""Checks of poses that clients send (frame, unit quaternion), and poses from a heading."""
 
 import math
 from typing import Any, Final
@@ -13,7 +13,7 @@ _UNIT_TOLERANCE: Final = 1e-3  # contract, fine print
 
 
 def planar_pose(x: float, y: float, yaw: float) -> Pose:
-    """Return the pose on the floor at x, y (m) with a heading of yaw (rad)."""
+    """Return the pose on the floor at x, y (m) with the heading yaw (rad)."""
     pose = Pose()
     pose.position.x, pose.position.y = x, y
     pose.orientation.z, pose.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
@@ -21,18 +21,14 @@ def planar_pose(x: float, y: float, yaw: float) -> Pose:
 
 
 def require_known_frame(frame_id: str, frames: Frames, where: str) -> None:
-    """Raise the 422 for a frame in which the robot takes no poses."""
+    """Raise the Problem 422 for a frame that is neither the robot's map nor its odometry frame."""
     if frame_id not in {frames.map, frames.odom}:
         raise Problem(422, f"{where} must be {frames.map} or {frames.odom}: the robot knows no frame {shown(frame_id)}")
 
 
-def require_unit(orientation: dict[str, float], where: str) -> None:
-    """Raise the 422 for a quaternion whose length is not 1 within 1e-3."""
-    if not abs(math.hypot(*orientation.values()) - 1) <= _UNIT_TOLERANCE:
-        raise refused(where, orientation, f"must have length 1 within {_UNIT_TOLERANCE}")
-
-
 def require_pose(stamped: dict[str, Any], frames: Frames, where: str) -> None:
-    """Raise the 422 for a plain PoseStamped in an unknown frame or without a unit quaternion."""
+    """Raise the Problem 422 for the dict of a PoseStamped in an unknown frame or without a unit quaternion."""
     require_known_frame(stamped["header"]["frame_id"], frames, f"{where}.header.frame_id")
-    require_unit(stamped["pose"]["orientation"], f"{where}.pose.orientation")
+    orientation = stamped["pose"]["orientation"]
+    if not abs(math.hypot(*orientation.values()) - 1) <= _UNIT_TOLERANCE:
+        raise refused(f"{where}.pose.orientation", orientation, f"must have length 1 within {_UNIT_TOLERANCE}")

@@ -1,4 +1,4 @@
-"""The robot's velocity: what it measures, and what clients may ask for."""
+"""The robot's velocity: the measured one, and commands from clients."""
 
 import asyncio
 import time
@@ -15,12 +15,12 @@ from reference_robot.webservices.representation.shapes import shape_of
 from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.watchdog import VelocityWatchdog
 
-_DISCOVERY: Final = 1.0  # seconds that a robot just found may take to be connected
+_DISCOVERY: Final = 1.0  # seconds to wait for a robot's subscription
 _DISCOVERY_STEP: Final = 0.02
 
 
 class Velocity:
-    """Commands and measures velocity."""
+    """The measured velocity of the robot, and the sender of velocity commands."""
 
     def __init__(
         self,
@@ -39,19 +39,21 @@ class Velocity:
         self._watchdog = VelocityWatchdog(settings.hold, self._stop)
 
     def measured(self) -> dict[str, Any]:
-        """Return the measured velocity as a plain geometry_msgs/Twist; m/s and rad/s.
+        """Return the measured velocity as a dict with the fields of a geometry_msgs/Twist, in m/s and rad/s.
 
         Raises:
-            Problem: 503 without odometry of the last second.
+            Problem: 503, if there is no odometry of the last second.
         """
         return self._read(self._odometry.message().twist.twist)
 
     async def command(self, twist: dict[str, Any]) -> None:
-        """Publish a plain Twist once; it ends after the hold time, by the robot's own watchdog or by ours.
+        """Publish a velocity, a dict with the fields of a Twist, once; a watchdog ends it after the hold time.
+
+        The watchdog is the robot's own or the one of these web services.
 
         Raises:
-            Problem: 422 for a value beyond the limits or for a component that a differential drive cannot actuate,
-                409 while a goal is active, 503 when no robot takes velocities.
+            Problem: 422 for a value beyond the limits or a component that a differential drive cannot actuate, 409
+                while a goal is active, 503 if no robot subscribes to velocities.
         """
         self._check_limits(twist)
         if self._goal_is_active():
@@ -63,13 +65,13 @@ class Velocity:
         else:
             self._watchdog.release()
         if not self._publishers.publish_velocity(message_from(shape_of(Twist), twist)):
-            raise not_yet("the robot does not take velocity commands fast enough")
+            raise not_yet("the robot does not receive velocity commands fast enough")
 
     async def command_linear(self, linear: dict[str, float]) -> None:
         """Publish a velocity with a new linear part and the angular part that is in force.
 
-        What is in force is the angular part asked for within the hold time, or none: a robot that has stopped by
-        itself must not be made to turn again.
+        The angular part of the last command is in force during the hold time; afterwards it is zero. A robot that has
+        stopped must not start to turn again.
         """
         held = self._commanded
         if held is None or time.monotonic() - self._commanded_at >= self._settings.hold:
@@ -79,17 +81,17 @@ class Velocity:
         await self.command({"linear": linear, "angular": angular})
 
     def close(self) -> None:
-        """Stop the robot if a velocity of ours is in force: nobody will, once this process is gone."""
+        """Stop the robot if a velocity from these web services is in force, before this process ends."""
         self._watchdog.close()
         self._publishers.await_velocity_taken()
 
     def _stop(self) -> None:
-        """Publish zero, unless the robot follows a goal by now: then the velocities are the navigation's."""
+        """Publish zero velocity, unless the robot follows a goal: then the navigation controls the velocity."""
         try:
             if self._goal_is_active():
                 return
         except Problem:
-            pass  # what the robot does is not known: to stop is safe
+            pass  # the robot's state is unknown: stopping is safe
         self._publishers.publish_velocity(Twist())
 
     def _check_limits(self, twist: dict[str, Any]) -> None:
@@ -107,5 +109,5 @@ class Velocity:
         give_up = time.monotonic() + _DISCOVERY
         while not self._publishers.find_velocity_subscribers():
             if time.monotonic() > give_up:
-                raise not_yet("no robot on the ROS graph takes velocity commands")
+                raise not_yet("no robot on the ROS graph subscribes to velocity commands")
             await asyncio.sleep(_DISCOVERY_STEP)

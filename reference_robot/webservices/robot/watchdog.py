@@ -1,14 +1,14 @@
-"""Stops a robot whose client fell silent, for robots that do not do so by themselves (contract, class ``safety``)."""
+"""A watchdog that stops a robot whose client has become silent, for robots without their own (class ``safety``)."""
 
 import asyncio
 from collections.abc import Callable
 
 
 class VelocityWatchdog:
-    """Calls ``stop`` when a velocity has been in force for ``hold`` seconds and was not renewed.
+    """A timer that calls ``stop`` when a velocity has not been renewed for ``hold`` seconds.
 
-    It knows of the velocities that these web services sent, and of no others: nobody else's are ended by it. It costs
-    one timer of the event loop while a velocity is in force, and nothing at other times.
+    It only ends velocities from these web services, not those of other ROS nodes. It needs one event-loop timer while a
+    velocity is in force.
     """
 
     def __init__(self, hold: float, stop: Callable[[], None]) -> None:
@@ -18,20 +18,20 @@ class VelocityWatchdog:
         self._timer: asyncio.TimerHandle | None = None
 
     def renew(self) -> None:
-        """Note a velocity that was sent just now, on the event loop's thread."""
+        """Restart the hold time, because a velocity was just sent; call on the event loop's thread."""
         loop = asyncio.get_running_loop()
         self._ends_at = loop.time() + self._hold
-        if self._timer is None:  # or it looks again when it is due: cheaper than a new timer for each of 100 a second
+        if self._timer is None:  # a running timer checks `_ends_at` itself; cheaper than a new timer each time
             self._timer = loop.call_at(self._ends_at, self._look, loop)
 
     def release(self) -> None:
-        """Note that there is nothing to stop any more."""
+        """Cancel the timer, because no velocity is in force any more."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
 
     def close(self) -> None:
-        """Stop the robot now, if a velocity is in force; also when the event loop has ended."""
+        """Stop the robot now if a velocity is in force; works also after the event loop has ended."""
         if self._timer is not None:
             self.release()
             self._stop()

@@ -1,4 +1,4 @@
-"""A service's WSDL and XSD: served with the robot's own address, and the judge of what comes in."""
+"""The WSDL and XSD of a SOAP service: sent to clients with the robot's address, and used to validate messages."""
 
 from typing import Any, Final
 
@@ -10,11 +10,11 @@ from reference_robot.webservices.soap.faults import client_fault
 
 _WSDL_SOAP: Final = "{http://schemas.xmlsoap.org/wsdl/soap/}"
 _XSD: Final = "{http://www.w3.org/2001/XMLSchema}"
-_ERRORS_TOLD: Final = 3
+_ERRORS_SHOWN: Final = 3
 
 
 class ServiceDescription:
-    """The contract's files of one service, ``publishers`` or ``subscribers``, which answers at a path."""
+    """The WSDL and XSD of one service of the contract, ``publishers`` or ``subscribers``, at a path."""
 
     def __init__(self, name: str, path: str) -> None:
         self._path = path
@@ -25,7 +25,7 @@ class ServiceDescription:
         self._schema = etree.XMLSchema(document)
 
     def wsdl(self, base: str) -> bytes:
-        """Return the WSDL with the robot's address in it (WS-I BP R2001), its schema at ``?xsd=1``."""
+        """Return the WSDL with the robot's address (WS-I BP R2001) and the location ``?xsd=1`` of its schema."""
         for address in self._wsdl.iter(f"{_WSDL_SOAP}address"):
             address.set("location", base + self._path)
         for schema in self._wsdl.iter(f"{_XSD}import"):
@@ -33,9 +33,9 @@ class ServiceDescription:
         return etree.tostring(self._wsdl, encoding="utf-8", xml_declaration=True)
 
     def require_valid(self, element: etree._Element) -> None:
-        """Raise the Client fault for an element that the XSD does not allow (R2724)."""
+        """Raise a Client fault for an element that is invalid by the XSD (R2724)."""
         if not self._schema.validate(element):
-            # libxml2 quotes names and values of the message itself, and nothing of the robot's.
+            # libxml2's texts quote only names and values of the message, nothing internal to the robot.
             log: Any = self._schema.error_log
-            told = "; ".join(entry.message for entry in log[:_ERRORS_TOLD])
-            raise client_fault(f"{shown(element.tag)} is not what the description says: {told}")
+            errors = "; ".join(entry.message for entry in log[:_ERRORS_SHOWN])
+            raise client_fault(f"{shown(element.tag)} is not valid by the XSD: {errors}")

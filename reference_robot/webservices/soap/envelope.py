@@ -1,4 +1,4 @@
-"""From a parsed document to the one element in its Body, by the rules of SOAP 1.1 and the Basic Profile."""
+"""Parsing of a SOAP message, by the rules of SOAP 1.1 and the Basic Profile."""
 
 from typing import Final
 
@@ -13,16 +13,16 @@ _BODY: Final = f"{{{SOAP}}}Body"
 _MUST_UNDERSTAND: Final = f"{{{SOAP}}}mustUnderstand"
 _ACTOR: Final = f"{{{SOAP}}}actor"
 
-# SOAP 1.1, 4.2.2: without an actor, or with this one, a header block is meant for whoever receives it.
+# SOAP 1.1, 4.2.2: without an actor, or with this one, a header block is meant for the receiver of the message.
 _FOR_US: Final = frozenset({None, "", "http://schemas.xmlsoap.org/soap/actor/next"})
 
-# WS-Addressing is tolerated, mandatory or not (contract): the answer goes back on the connection that asked, which is
-# what an anonymous ReplyTo asks for. No other address is ever called.
+# WS-Addressing headers are accepted, mandatory or not (contract). The response is sent on the same connection, as an
+# anonymous ReplyTo requests. The robot never connects to another address.
 _TOLERATED: Final = ("{http://www.w3.org/2005/08/addressing}", "{http://schemas.xmlsoap.org/ws/2004/08/addressing}")
 
 
 def operation_element(root: etree._Element) -> etree._Element:
-    """Return the single element child of the Body, by which the operation is chosen (WS-I BP R1127, R2710).
+    """Return the single child element of the Body, which selects the operation (WS-I BP R1127, R2710).
 
     Raises:
         Fault: VersionMismatch, MustUnderstand or Client, checked in that order (R2725).
@@ -46,7 +46,7 @@ def operation_element(root: etree._Element) -> etree._Element:
 
 
 def _no_envelope(root: etree._Element) -> Fault:
-    """Return the fault for another document element (R1015): an Envelope of another version, or no Envelope."""
+    """Return the fault for a root element that is not a SOAP 1.1 Envelope (R1015)."""
     if str(root.tag).rpartition("}")[2] == "Envelope":
         return Fault(FaultCode.VERSION_MISMATCH, f"the Envelope must be SOAP 1.1's {_ENVELOPE}, not {shown(root.tag)}")
     return client_fault(f"the document must be a SOAP 1.1 Envelope, not {shown(root.tag)}")

@@ -1,4 +1,4 @@
-"""SOAP 1.1 faults (SOAP 1.1, 4.4)."""
+"""SOAP faults (SOAP 1.1, 4.4)."""
 
 from enum import StrEnum
 from typing import Final
@@ -11,7 +11,7 @@ SOAP: Final = "http://schemas.xmlsoap.org/soap/envelope/"
 
 
 class FaultCode(StrEnum):
-    """The standard fault codes, in the order in which they are checked (WS-I BP R1004, R2725)."""
+    """The standard fault codes of SOAP 1.1, in the order of the checks (WS-I BP R1004, R2725)."""
 
     VERSION_MISMATCH = "VersionMismatch"
     MUST_UNDERSTAND = "MustUnderstand"
@@ -20,7 +20,7 @@ class FaultCode(StrEnum):
 
 
 class Fault(Exception):  # noqa: N818 - SOAP's own name for it
-    """A message is answered with a fault; its text names element and value."""
+    """An error that is answered with a SOAP fault; its text names element and value."""
 
     def __init__(self, code: FaultCode, text: str) -> None:
         super().__init__(text)
@@ -28,7 +28,7 @@ class Fault(Exception):  # noqa: N818 - SOAP's own name for it
         self.text = text
 
     def envelope(self) -> bytes:
-        """Return the fault in its envelope: children unqualified (R1001), faultcode qualified."""
+        """Return the serialized envelope with the fault: its children unqualified (R1001), its code qualified."""
         root = etree.Element(f"{{{SOAP}}}Envelope", nsmap={"soap": SOAP})
         fault = etree.SubElement(etree.SubElement(root, f"{{{SOAP}}}Body"), f"{{{SOAP}}}Fault")
         etree.SubElement(fault, "faultcode").text = f"soap:{self.code}"
@@ -37,5 +37,5 @@ class Fault(Exception):  # noqa: N818 - SOAP's own name for it
 
 
 def client_fault(text: str) -> Fault:
-    """Return the fault for a message that is not what the description says (R2724)."""
+    """Return the Client fault for a message that does not match the WSDL (R2724)."""
     return Fault(FaultCode.CLIENT, text)

@@ -1,4 +1,4 @@
-"""The SOAP interface: from a request to the service at its path."""
+"""The SOAP interface: finds the service for a request by its path."""
 
 from collections.abc import Awaitable, Callable, Iterable
 from typing import Final
@@ -16,7 +16,7 @@ _READ: Final = frozenset({"GET", "HEAD"})
 
 
 class SoapInterface(Interface):
-    """Serves SOAP services, each at its own path, and their descriptions."""
+    """The SOAP interface: services, each at its own path, and their descriptions."""
 
     def __init__(
         self, services: Iterable[SoapService], address: Callable[[Request], str], admission: Admission
@@ -26,15 +26,15 @@ class SoapInterface(Interface):
         self._address = address
 
     def scope(self, request: Request) -> Scope:
-        """Return that of the service."""
+        """Return the token scope of the service that the request addresses."""
         service = self._services.get(request.path)
         return Scope.READ if service is None else service.scope
 
     def answer(self, request: Request) -> Response | Awaitable[Response]:
-        """Return a service's answer, or its description at ``?wsdl`` and ``?xsd=1``.
+        """Return the response of a service, or its description for ``?wsdl`` and ``?xsd=1``.
 
         Raises:
-            Problem: 404 for an unknown path, 405 for other methods (WS-I BP R1114), and what the service raises.
+            Problem: 404 for an unknown path, 405 for other methods (WS-I BP R1114), and every problem of the service.
         """
         service = self._services.get(request.path)
         if service is None:
@@ -47,10 +47,10 @@ class SoapInterface(Interface):
             return Response(204, (allow,))
         if description is not None and request.method in _READ:
             return content(200, "text/xml", description)
-        raise Problem(405, f"the method is not one of {allow[1].decode()}; messages come by POST", (allow,))
+        raise Problem(405, f"the method is not one of {allow[1].decode()}; send messages by POST", (allow,))
 
     def _description(self, service: SoapService, request: Request) -> bytes | None:
-        asked = request.query.lower()
-        if asked in {b"wsdl", b"wsdl=1"}:
+        query = request.query.lower()
+        if query in {b"wsdl", b"wsdl=1"}:
             return service.description.wsdl(self._address(request))
-        return service.description.xsd if asked == b"xsd=1" else None
+        return service.description.xsd if query == b"xsd=1" else None

@@ -1,22 +1,25 @@
-"""One SOAP service: its operations by the element that asks for them, and how a message becomes an answer."""
+"""A SOAP service: dispatches a message to its operation and returns the response."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Awaitable, Callable
-from typing import Final
+from collections.abc import Awaitable, Callable, Iterable
+from functools import partial
+from typing import Any, Final
 
 from lxml import etree
 
 from reference_robot.webservices.http.authorization import Scope
+from reference_robot.webservices.http.interface import awaited
 from reference_robot.webservices.http.messages import Request, Response, content
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.reading import parsed_content_type
+from reference_robot.webservices.representation.writing import element_of
 from reference_robot.webservices.representation.xml_input import parsed
 from reference_robot.webservices.soap.description import ServiceDescription
 from reference_robot.webservices.soap.envelope import operation_element
-from reference_robot.webservices.soap.faults import Fault, FaultCode, client_fault
+from reference_robot.webservices.soap.faults import SOAP, Fault, FaultCode, client_fault
 
 Operation = Callable[[etree._Element], Response | Awaitable[Response]]  # noqa: SLF001 - lxml's only name for the class
 
@@ -26,12 +29,13 @@ _SERVERS_FAULT: Final = 500
 
 
 class SoapService:
-    """A service: a subclass gives the operations by local name.
+    """A SOAP service; subclasses pass their operations by the local name of the request element.
 
-    An operation takes the wrapper element, valid by the XSD, and returns the answer: ``answered`` with its envelope.
+    An operation gets the schema-valid request element and returns the response, which ``response``
+    creates.
 
     Attributes:
-        scope: What a token must be good for to send it messages.
+        scope: The token scope that clients need to send messages.
     """
 
     scope: Scope
@@ -43,45 +47,43 @@ class SoapService:
         self._operations = {f"{{{namespace}}}{name}": operation for name, operation in operations.items()}
 
     def post(self, request: Request) -> Response | Awaitable[Response]:
-        """Answer a message: 200, or 500 with a fault (WS-I BP R1126).
+        """Return the response to a message: 200, or 500 with a fault (WS-I BP R1126).
 
         Raises:
-            Problem: 415 for another media type, 400 for what is no XML and for a DOCTYPE or processing instruction:
-                without a fault, for there was no message.
+            Problem: 415 for another media type; 400 for invalid XML, a DOCTYPE or a processing instruction. These
+                responses have no fault, because there was no SOAP message.
         """
         media_type, charset = parsed_content_type(request.headers.get(b"content-type"))
         if media_type != _MEDIA_TYPE:
             raise Problem(
                 415,
-                f"SOAP 1.1 comes as text/xml, not {media_type[:200]!a} (WS-I BP R1115)",
+                f"a SOAP 1.1 message must be text/xml, not {media_type[:200]!a} (WS-I BP R1115)",
                 ((b"accept", _MEDIA_TYPE.encode()),),
             )
         root = parsed(request.content(), charset)
         try:
             outcome = self._answer(root)
-        except Exception as error:  # noqa: BLE001 - whatever went wrong, the client gets a fault
+        except Exception as error:  # noqa: BLE001 - after any error the client gets a fault
             return _faulted(root, error)
-        return outcome if isinstance(outcome, Response) else _awaited(root, outcome)
+        return outcome if isinstance(outcome, Response) else awaited(outcome, partial(_faulted, root))
+
+    def response(self, operation: str, returned: Iterable[Any] = ()) -> Response:
+        """Return the response of an operation: an envelope with one unqualified ``return`` element for each value."""
+        namespace = self.description.namespace
+        root = etree.Element(f"{{{SOAP}}}Envelope", nsmap={"soap": SOAP})
+        wrapper = etree.SubElement(
+            etree.SubElement(root, f"{{{SOAP}}}Body"), f"{{{namespace}}}{operation}Response", nsmap={"tns": namespace}
+        )
+        wrapper.extend([element_of(value, "return") for value in returned])
+        return content(200, _MEDIA_TYPE, etree.tostring(root, encoding="utf-8", xml_declaration=True))
 
     def _answer(self, root: etree._Element) -> Response | Awaitable[Response]:
         element = operation_element(root)
         operation = self._operations.get(str(element.tag))
         if operation is None:
-            raise client_fault(f"no operation is asked for by {shown(element.tag)}")
+            raise client_fault(f"no operation has the request element {shown(element.tag)}")
         self.description.require_valid(element)
         return operation(element)
-
-
-def answered(envelope: bytes) -> Response:
-    """Return an operation's answer."""
-    return content(200, _MEDIA_TYPE, envelope)
-
-
-async def _awaited(root: etree._Element, outcome: Awaitable[Response]) -> Response:
-    try:
-        return await outcome
-    except Exception as error:  # noqa: BLE001 - as above
-        return _faulted(root, error)
 
 
 def _faulted(root: etree._Element, error: Exception) -> Response:
@@ -89,6 +91,6 @@ def _faulted(root: etree._Element, error: Exception) -> Response:
         code = FaultCode.SERVER if error.status >= _SERVERS_FAULT else FaultCode.CLIENT
         error = Fault(code, error.detail)
     elif not isinstance(error, Fault):
-        _LOGGER.error("no answer to %s", root.tag, exc_info=error)
-        error = Fault(FaultCode.SERVER, "the robot failed to answer; its log says why")
+        _LOGGER.error("cannot respond to %s", root.tag, exc_info=error)
+        error = Fault(FaultCode.SERVER, "an internal error of the robot; the robot's log has the details")
     return content(500, _MEDIA_TYPE, error.envelope())

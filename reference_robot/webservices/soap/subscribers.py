@@ -1,4 +1,4 @@
-"""RobotSubscribersWebService: the web methods that tell the robot's state, each as its REST resource does."""
+"""RobotSubscribersWebService: the web methods that return the robot's state, each equal to its REST resource."""
 
 from collections.abc import Callable
 from functools import partial
@@ -10,19 +10,18 @@ from reference_robot.webservices.http.authorization import Scope
 from reference_robot.webservices.http.messages import Response
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.checking import shown
-from reference_robot.webservices.representation.writing import element_of
 from reference_robot.webservices.robot.goals import Goals
 from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.plans import Planner, PlanQuery
 from reference_robot.webservices.robot.velocity import Velocity
-from reference_robot.webservices.soap.faults import SOAP, client_fault
-from reference_robot.webservices.soap.service import Operation, SoapService, answered
+from reference_robot.webservices.soap.faults import client_fault
+from reference_robot.webservices.soap.service import Operation, SoapService
 
 PATH: Final = "/turtlesim_subscriber_ws"
 
 
 class SubscribersWebService(SoapService):
-    """GetPose, GetVelocity, GetSensors, GetNavigationServices, GetGoal and GetPlan."""
+    """The operations GetPose, GetVelocity, GetSensors, GetNavigationServices, GetGoal and GetPlan."""
 
     scope = Scope.READ
 
@@ -41,19 +40,19 @@ class SubscribersWebService(SoapService):
             "GetGoal": lambda: [goal] if (goal := goals.current()) else [],
         }
         operations: dict[str, Operation] = {
-            name: partial(self._tell, name, values) for name, values in returned.items()
+            name: partial(self._return_values, name, values) for name, values in returned.items()
         }
         operations |= {"GetPose": self._get_pose, "GetPlan": self._get_plan}
         super().__init__("subscribers", PATH, operations)
         self._odometry = odometry
-        self._write_pose = lambda pose: self._response("GetPose", [pose])
+        self._write_pose = lambda pose: self.response("GetPose", [pose])
         self._planner = planner
 
-    def _tell(self, operation: str, values: Callable[[], list[Any]], _wrapper: etree._Element) -> Response:
-        return self._response(operation, values())
+    def _return_values(self, operation: str, values: Callable[[], list[Any]], _wrapper: etree._Element) -> Response:
+        return self.response(operation, values())
 
     def _get_pose(self, _wrapper: etree._Element) -> Response:
-        """Return the odometry, written once for each message as REST's is."""
+        """Return the latest odometry; each message is serialized to XML at most once."""
         return self._odometry.written(self._write_pose)
 
     async def _get_plan(self, wrapper: etree._Element) -> Response:
@@ -61,21 +60,11 @@ class SubscribersWebService(SoapService):
         for element in wrapper:
             name, text = str(element.tag), element.text or ""
             given[name] = text if name == "frame_id" else _finite(name, text)
-        return self._response("GetPlan", [await self._planner.plan(PlanQuery(**given))])
-
-    def _response(self, operation: str, returned: list[Any]) -> Response:
-        """Return an envelope with one unqualified ``return`` element for each value."""
-        namespace = self.description.namespace
-        root = etree.Element(f"{{{SOAP}}}Envelope", nsmap={"soap": SOAP})
-        wrapper = etree.SubElement(
-            etree.SubElement(root, f"{{{SOAP}}}Body"), f"{{{namespace}}}{operation}Response", nsmap={"tns": namespace}
-        )
-        wrapper.extend([element_of(value, "return") for value in returned])
-        return answered(etree.tostring(root, encoding="utf-8", xml_declaration=True))
+        return self.response("GetPlan", [await self._planner.plan(PlanQuery(**given))])
 
 
 def _finite(name: str, text: str) -> float:
-    """Read a valid xs:double; INF and NaN never enter (contract, REST)."""
+    """Return a schema-valid xs:double as float; raise a Client fault for INF and NaN (contract, REST)."""
     number = float(text)
     if number - number != 0:
         raise client_fault(f"{name} must be finite, not {shown(text)}")

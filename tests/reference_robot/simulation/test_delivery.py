@@ -50,7 +50,7 @@ def test_the_queue_is_bounded(robot):
     for _ in range(22):
         robot.request(*NEAR, code=3)
     until(lambda: robot.states == ["active", *["queued"] * 20, "dropped", "dropped"])
-    assert [mission["reason"] for mission in robot.missions[-2:]] == ["20 missions wait already"] * 2
+    assert [mission["reason"] for mission in robot.missions[-2:]] == ["the queue is full with 20 missions"] * 2
 
 
 @FAST

@@ -169,6 +169,6 @@ def test_a_goal_without_progress_is_aborted_and_fails_one_mission(domain_id):
             observer.request(SOURCE, DEPOT, DEPOT)
         until(lambda: observer.states == ["failed", "failed"])
         reasons = [mission["reason"] for mission in observer.missions]
-        assert reasons == ["the navigation gave a leg up: no progress in 20 s"] * 2
+        assert reasons == ["the navigation gave up a leg: no progress in 20 s"] * 2
         assert navigation  # kept while they serve
         assert delivery

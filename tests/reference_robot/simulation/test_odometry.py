@@ -5,7 +5,7 @@ from rclpy.serialization import deserialize_message
 
 from reference_robot.simulation.kinematics import Motion
 from reference_robot.simulation.messages import quaternion_of
-from reference_robot.simulation.odometry import OdometryOctets
+from reference_robot.simulation.odometry import SerializedOdometry
 
 
 def test_filled_octets_are_the_message_whatever_the_frames_and_the_numbers():
@@ -14,7 +14,7 @@ def test_filled_octets_are_the_message_whatever_the_frames_and_the_numbers():
         message.header.frame_id = frame
         message.pose.covariance = [0.1 * number for number in range(36)]
         message.twist.covariance = [-0.2 * number for number in range(36)]
-        octets = OdometryOctets(message)
+        octets = SerializedOdometry(message)
         for motion in (Motion(0.1, -0.2, 3.1, 0.7, -2.5), Motion(5e-324, -0.0, 0.0)):
             message.header.stamp.sec, message.header.stamp.nanosec = stamp = 2_000_000_000, 999_999_999
             message.pose.pose.position.x, message.pose.pose.position.y = motion.x, motion.y

@@ -9,7 +9,7 @@ from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
 from reference_robot.names import RosNames
-from reference_robot.ros import RosRuntime, taken
+from reference_robot.ros import RosRuntime, waiting_messages
 from reference_robot.simulation.runner import Simulation
 
 
@@ -74,14 +74,14 @@ def test_what_comes_to_a_node_that_is_not_spun_is_taken_by_hand_in_order(domain_
         publisher = ros.create_node("says").create_publisher(String, "word", keep_all)
         ros.start()
         until(publisher.get_subscription_count)
-        assert list(taken(waiting)) == []
+        assert list(waiting_messages(waiting)) == []
         words = [f"word {number}" for number in range(100)]
         for word in words:
             publisher.publish(String(data=word))
         came = []
-        until(lambda: came.extend(taken(waiting)) or len(came) == len(words))
+        until(lambda: came.extend(waiting_messages(waiting)) or len(came) == len(words))
         assert [deserialize_message(octets, String).data for octets in came] == words
-        assert list(taken(waiting)) == []
+        assert list(waiting_messages(waiting)) == []
     assert called == []
 
 
@@ -93,7 +93,7 @@ def test_who_watches_is_called_once_for_what_waits_in_the_thread_of_a_node(domai
 
         def take():
             threads.append(threading.current_thread())
-            batches.append(list(taken(waiting)))
+            batches.append(list(waiting_messages(waiting)))
 
         ros.watch(waiting, node, take, 0.2)
         node.create_timer(0.01, lambda: threads.append(threading.current_thread()))

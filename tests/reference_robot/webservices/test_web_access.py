@@ -131,7 +131,7 @@ def test_what_cannot_be_listened_with_is_named(tmp_path):
     _, locked = pair(tmp_path, "locked", "-passout", "pass:word")
     for options, said in {
         ("--host=0.0.0.0",): "--insecure",
-        (f"--tls-cert={certificate}",): "go together",
+        (f"--tls-cert={certificate}",): "give both --tls-cert and --tls-key",
         (f"--tls-cert={certificate}", f"--tls-key={another}"): f"{another} is not the key of --tls-cert {certificate}",
         (f"--tls-cert={key}", f"--tls-key={key}"): f"--tls-cert {key} holds no certificate in PEM",
         (f"--tls-cert={certificate}", f"--tls-key={certificate}"): f"--tls-key {certificate} holds no private key",

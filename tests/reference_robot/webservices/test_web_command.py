@@ -69,7 +69,7 @@ def test_the_robot_ends_with_its_simulation(domain_id):
         os.kill(child, signal.SIGKILL)
         assert served.process.wait(60) == 1
         said = served.process.stderr.read()
-        assert "ended by itself" in said
+        assert "ended unexpectedly" in said
         (log,) = set(re.findall(r"log is (\S+)", said))
         assert Path(log).is_file()
 

@@ -88,7 +88,7 @@ def test_every_accepted_request_is_taken_and_told_of(domain_id):
         assert listener.reports[-1]["dropped"] >= total - 100
         listed = eventually(lambda: all_ended(served.call("GET", "/robot/app/delivery/").json()))
         assert {entry["state"] for entry in listed} == {"dropped"}
-        assert {entry["reason"] for entry in listed} == {"20 missions wait already"}
+        assert {entry["reason"] for entry in listed} == {"the queue is full with 20 missions"}
 
 
 def all_ended(listed):

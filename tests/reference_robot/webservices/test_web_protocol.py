@@ -55,7 +55,7 @@ async def test_chunks_of_one_octet_make_one_content_and_trailers_no_fields():
         answer = await robot.ask(head + b"1\r\na\r\n" * 5000 + b"0\r\nHost: b\r\n\r\n" + request("/now?end"))
         assert statuses(answer) == [200, 200]
         assert robot.interface.seen[0] == ("PUT", b"/now", b"a" * 5000)
-        assert robot.port.held.octets == 0
+        assert robot.port.held.size == 0
 
 
 @runs

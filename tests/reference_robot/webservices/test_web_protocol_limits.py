@@ -23,7 +23,7 @@ async def test_content_over_the_limit_is_refused_dropped_and_the_connection_goes
             )
         assert statuses(await robot.ask(head + request("/now?next"))) == [413, 200]
         assert robot.interface.seen == [("GET", b"/now", b"")]
-        assert robot.port.held.octets == 0
+        assert robot.port.held.size == 0
 
 
 @runs
@@ -33,7 +33,7 @@ async def test_refused_content_without_end_is_not_read_for_ever():
         writer.write(request("/now", "Transfer-Encoding: chunked", method="PUT"))
         with pytest.raises(ConnectionError):
             await send_for_ever(writer, b"10000\r\n" + b"x" * 0x10000 + b"\r\n")
-        assert robot.port.held.octets == 0
+        assert robot.port.held.size == 0
 
 
 async def send_for_ever(writer, octets):
@@ -132,9 +132,9 @@ async def test_whatever_clients_make_the_robot_keep_is_bounded_for_all_and_given
         assert statuses(await robot.ask(request(method="PUT", body=b"y" * 300))) == [503]
         holding.transport.abort()
         robot.interface.let_go.set()
-        await until(lambda: robot.port.held.octets == 0)
+        await until(lambda: robot.port.held.size == 0)
         assert statuses(await robot.ask(request(method="PUT", body=b"y" * 300))) == [200]
-        assert robot.port.held.octets == 0
+        assert robot.port.held.size == 0
 
 
 @runs
@@ -143,7 +143,7 @@ async def test_a_client_that_does_not_read_is_dropped_at_once_where_too_much_is_
         reader, writer = await robot.connect()
         writer.transport.pause_reading()
         writer.write(request("/big"))
-        await until(lambda: robot.interface.seen and not robot.port.held.octets)
+        await until(lambda: robot.interface.seen and not robot.port.held.size)
         writer.transport.resume_reading()
         assert len(await closed(reader)) < len(BIG)
         writer.close()

@@ -1,1 +1,1 @@
-"""The lamp's own checks."""
+"""The checks of the lamp contract."""

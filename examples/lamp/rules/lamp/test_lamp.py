@@ -1,4 +1,4 @@
-"""Whether the lamp shows what it was sent."""
+"""Checks that the lamp reports and reaches the brightness that a client sets."""
 
 import json
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ Trace = list[tuple[float, float, Exchange]]
 
 
 def shown(exchange: Exchange) -> dict[str, float]:
-    """Return the lamp's state, or an empty object where the response shows none."""
+    """Return brightness and target from a response, or an empty dict if they are missing or not numbers."""
     try:
         state = json.loads(exchange.response.body)
         return {name: float(state[name]) for name in ("brightness", "target")}
@@ -29,13 +29,13 @@ def shown(exchange: Exchange) -> dict[str, float]:
 
 
 def put(api: RestInterface, brightness: float) -> Exchange:
-    """Send a brightness."""
+    """Send ``PUT /lamp`` with a brightness."""
     return api.client.send("PUT", "/lamp", headers=JSON, body=json.dumps({"brightness": brightness}).encode())
 
 
 @pytest.mark.requirement("lamp/state")
 def test_state(api: RestInterface, judge: Judge) -> None:
-    """The lamp can be read."""
+    """Check that ``GET /lamp`` returns 200 with a brightness and a target from 0 to 1."""
     exchange = api.client.send("GET", "/lamp")
     state = shown(exchange)
     holds = exchange.response.status == 200 and bool(state) and all(0 <= one <= 1 for one in state.values())
@@ -45,7 +45,7 @@ def test_state(api: RestInterface, judge: Judge) -> None:
 @pytest.mark.motion
 @pytest.mark.requirement("lamp/out-of-range")
 def test_out_of_range(api: RestInterface, judge: Judge) -> None:
-    """The lamp refuses what it cannot do, and stays as it is."""
+    """Check that a brightness outside 0 to 1 is answered 422 and leaves the target unchanged."""
     put(api, 0.25)
     for wrong in (1.01, -0.01, 1e308):
         refusal, after = put(api, wrong), shown(api.client.send("GET", "/lamp"))
@@ -56,7 +56,7 @@ def test_out_of_range(api: RestInterface, judge: Judge) -> None:
 
 @scenario(needs={Need.REST, Need.MOTION})
 def fading(api: RestInterface) -> Trace:
-    """Fade from 0 to 0.8, and read the lamp all the while."""
+    """Set the lamp from 0 to 0.8 and read its state every 20 ms while it fades."""
     put(api, 0.0)
     WALL_CLOCK.sleep(FADES_S)
     begun, trace = WALL_CLOCK.now(), []
@@ -69,20 +69,20 @@ def fading(api: RestInterface) -> Trace:
 
 @rule("lamp/target", on=(fading,))
 def target(trace: Trace) -> Iterator[Outcome]:
-    """Judge the target that the lamp names."""
+    """Judge whether every reading during the fade reports the requested target."""
     for _, _, exchange in trace:
         yield Case(shown(exchange).get("target") == 0.8, exchange, "the target 0.8 that was sent")
 
 
 @rule("lamp/fades", on=(fading,))
 def fades(trace: Trace) -> Iterator[Outcome]:
-    """Judge the brightness at the end."""
+    """Judge whether the lamp has reached the requested brightness in the last reading."""
     at, brightness, exchange = trace[-1]
     yield Case(abs(brightness - 0.8) < 0.01, exchange, f"0.8 after {FADES_S} s", f"{brightness:.2f} after {at:.2f} s")
 
 
 @rule("lamp/in-between", on=(fading,))
 def in_between(trace: Trace) -> Iterator[Outcome]:
-    """Judge each brightness on the way."""
+    """Judge whether every brightness during the fade lies between the old and the new target."""
     for at, brightness, exchange in trace:
         yield Case(0 <= brightness <= 0.8, exchange, "a brightness from 0 to 0.8", f"{brightness:.2f} after {at:.2f} s")
