@@ -1,4 +1,4 @@
-"""Where a robot is behind a proxy: what it says of its own addresses leads to the proxy, never past it."""
+"""Rewrite a robot's own addresses in its responses, so that they lead to the proxy in front of the robot."""
 
 import re
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ _ORIGIN: Final = re.compile(r"^https?://[^/?]*(?=[/?])", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Addresses:
-    """Origins by interface ("rest", "soap"), as ``http://127.0.0.1:8080``.
+    """The addresses of a robot and of the proxy in front of it, as origins by interface ("rest", "soap").
 
     Attributes:
-        robot: where the robot is.
-        proxy: where clients find it.
-        prefix: path before everything of REST at the proxy, as "/r2d2/api", or empty.
+        robot: the robot's origins, such as ``http://127.0.0.1:8080``.
+        proxy: the proxy's origins, which clients use.
+        prefix: path before every REST path at the proxy, such as "/r2d2/api", or empty.
     """
 
     robot: dict[str, str]
@@ -24,11 +24,11 @@ class Addresses:
     prefix: str = ""
 
     def public(self, side: str) -> str:
-        """The base URL of an interface as clients know it."""
+        """Return the base URL of an interface at the proxy, as clients use it."""
         return self.proxy[side] + (self.prefix if side == "rest" else "")
 
     def inward(self, request: Request) -> Request | None:
-        """A request as the robot knows it, or None when it is for nothing that is the robot's."""
+        """Return a client's request with the robot's own address in it, or None for a path that is not the robot's."""
         if request.side != "rest" or not self.prefix or request.raw is not None:
             return request
         # In absolute form too (RFC 9112 3.2.2), of which the robot then gets the origin form.
@@ -38,7 +38,7 @@ class Addresses:
         return request.copy(target=target.removeprefix(self.prefix) or "/")
 
     def outward(self, response: Response) -> Response:
-        """The robot's response as clients are to see it; the response itself is altered."""
+        """Replace the robot's address with the proxy's in a response, in place, and return the response."""
         for side, robot in self.robot.items():
             here = self.public(side)
             # A robot may go by the Host field, which is the proxy's, and cannot know that the proxy speaks TLS.

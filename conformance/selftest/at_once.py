@@ -1,4 +1,4 @@
-"""Several devices judged at once: each is reported when it is done, and Ctrl-C does not wait for the others."""
+"""Judge several devices in parallel threads; each result is reported when it is ready, and Ctrl-C stops all of them."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ _AGAIN_S: Final = 0.1
 def each_at_once(
     judge: Callable[[_Item], _Result], items: Iterable[_Item], at_once: int, tell: Callable[[_Result], None]
 ) -> list[_Result]:
-    """Judge each item in a thread, ``at_once`` at a time; results in the items' order.
+    """Judge each item in a thread, ``at_once`` at a time; return the results in the items' order.
 
     Args:
-        judge: runs certifications in processes of their own (certifying.run_job).
-        items: what to judge.
-        at_once: how many at a time.
-        tell: called with each result when it is there, one call at a time; not with what an interrupt ended.
+        judge: certifies one item in a process of its own (certifying.run_job).
+        items: the items to judge.
+        at_once: number of items judged in parallel.
+        tell: called with each result as soon as it is ready, never twice at a time and never after an interrupt.
 
     Raises:
-        KeyboardInterrupt: after what was under way has been killed, and its robots are stopped.
+        KeyboardInterrupt: after the running certifications were killed and their robots stopped.
     """
     lock, interrupted = threading.Lock(), threading.Event()
 

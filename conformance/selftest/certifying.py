@@ -1,4 +1,4 @@
-"""One certification as part of a self-test: in a process of its own, so that nothing is left of it for the next."""
+"""Run one certification of a self-test in a process of its own, so that it leaves no state for the next one."""
 
 import contextlib
 import io
@@ -33,21 +33,22 @@ PACK_VARIABLE = "ROAAS_SELFTEST_PACK"
 
 @dataclass(frozen=True)
 class Job:
-    """What is judged, and how.
+    """One certification to run: the device, its statement and the options.
 
     Attributes:
         pack: folder of the contract pack.
         statement: file of the robot's statement; None: nothing is declared.
-        rest: REST's base URL; publishers and subscribers: their WSDLs; each may be empty.
-        classes: classes to claim, in place of the statement's; empty: those of the statement.
-        requirements: ids to judge, so that only their checks run; empty: all of the classes.
+        rest: the REST base URL; may be empty.
+        publishers: URL of the publishers' WSDL; may be empty, as may ``subscribers``.
+        classes: conformance classes to claim instead of the statement's; empty: those of the statement.
+        requirements: ids of the requirements to judge; only their checks run; empty: all of the claimed classes.
         effort: quick, standard or deep.
-        seed: of everything random.
-        domain_id: ROS domain for the probe, or None for none.
+        seed: seed of everything random.
+        domain_id: ROS domain of the probe, or None for no probe.
         token: bearer token to send, or empty.
-        endpoints: further endpoint options (ca_file, request_rate).
-        timeout_s: after which the run is given up.
-        enough: requirements of which one failure is enough to know: the check that sees it is the last.
+        endpoints: further endpoint options of the statement (ca_file, request_rate).
+        timeout_s: time after which the run is killed, s.
+        enough: requirements that end the run: after the first failure of one of them no further check starts.
         out: folder in which result.json is kept, or None.
     """
 
@@ -70,15 +71,15 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of it.
+    """The result of one certification.
 
     Attributes:
-        exit_code: as roaas certify's; -1 when the run was given up.
-        verdicts: by requirement.
-        reasons: by requirement, where it is not pass.
-        met: requirements whose checks met what is told as the finding of another requirement.
-        requests: how many were sent.
-        seconds: how long it took.
+        exit_code: exit code of roaas certify; -1 when the run was killed by its timeout.
+        verdicts: verdict of each requirement.
+        reasons: reason of each verdict other than pass.
+        met: requirements whose checks met a failure that is reported under another requirement.
+        requests: number of requests sent.
+        seconds: duration of the run, s.
     """
 
     exit_code: int
@@ -90,21 +91,21 @@ class Outcome:
 
     @property
     def fails(self) -> frozenset[str]:
-        """Requirements that say fail."""
+        """Return the requirements with the verdict fail."""
         return frozenset(id_ for id_, verdict in self.verdicts.items() if verdict == "fail")
 
     def not_passed(self) -> tuple[str, ...]:
-        """Return the requirements that say fail or warn, or that met what another one says it for."""
+        """Return the requirements that failed or warned, and those whose checks met another requirement's failure."""
         return tuple(id_ for id_, verdict in self.verdicts.items() if verdict in {"fail", "warn"} or id_ in self.met)
 
 
 def job_at(robot: Robot, **more: Any) -> Job:
-    """Return a job that judges a device at its addresses."""
+    """Return a job that certifies a running device at its addresses."""
     return Job(robot.pack, robot.device.statement, robot.rest, robot.publishers, robot.subscribers, **more)
 
 
 def run_job(job: Job) -> Outcome:
-    """Run a certification and wait for it; a run that takes too long is given up, and shows nothing."""
+    """Run a certification and wait for its outcome; kill it when it exceeds the job's timeout."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(_PRELOADED)
     os.environ.setdefault(PACK_VARIABLE, str(job.pack))
@@ -135,7 +136,7 @@ def run_job(job: Job) -> Outcome:
 
 
 def _run(job: Job, pipe: Pipe) -> None:
-    """Certify, in the child, and send what came of it."""
+    """Certify in the child process and send the outcome through the pipe."""
     with tempfile.TemporaryDirectory() as folder, Path(os.devnull).open("w", encoding="utf-8") as nowhere:
         with contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(io.StringIO()):
             certification = certify(robot_of(job, Path(folder)), job.out or Path(folder), progress=None)
@@ -163,7 +164,7 @@ def statement_of(job: Job, contract: Contract) -> Statement:
 
 
 def robot_of(job: Job, folder: Path) -> RobotUnderTest:
-    """Return the robot and the run that a job describes; ``folder`` is for its token."""
+    """Return the robot and the run that a job describes; the job's token is written to a file in ``folder``."""
     if job.token:
         (folder / "token").write_text(job.token, encoding="utf-8")
         job = replace(job, endpoints={**job.endpoints, "token_file": str(folder / "token")})
@@ -183,7 +184,7 @@ def robot_of(job: Job, folder: Path) -> RobotUnderTest:
 
 
 class _EnoughKnown(Judge):
-    """A judge who lets no further check begin once one of some requirements, of a class that is claimed, has failed."""
+    """A judge that starts no further check after one of the job's ``enough`` requirements has failed."""
 
     def __init__(self, run: Run, enough: frozenset[str]) -> None:
         super().__init__(set(run.contract.ledger))
@@ -203,7 +204,7 @@ class _EnoughKnown(Judge):
         cause: str = "",
         subject: str = "",
     ) -> bool:
-        """Judge one case."""
+        """Judge one case as Judge.check() does, and note whether the run already knows enough."""
         if not holds and requirement in self._enough and not self._run.aborted:
             self._run.aborted = f"{requirement} has failed, which is enough to know"
         return super().check(requirement, holds, exchange, expected, found=found, cause=cause, subject=subject)

@@ -1,7 +1,7 @@
-"""Which REST mutants the plain Schemathesis command line kills, with the same OpenAPI file.
+"""Run the plain Schemathesis command line, with the same OpenAPI file, against the REST mutants, for comparison.
 
-It is bounded in time, as our runs are. Schemathesis kills a mutant when it reports something that it does not report of
-the good device behind the same proxy.
+Each run is bounded in time, as our runs are. Schemathesis kills a mutant when it reports something that it does not
+report of the good device behind the same proxy.
 """
 
 import re
@@ -28,12 +28,12 @@ Findings = frozenset[tuple[str, str]]
 
 @dataclass(frozen=True)
 class SchemathesisResult:
-    """What Schemathesis says of one mutant.
+    """What Schemathesis reports of one mutant.
 
     Attributes:
-        mutant: its name.
-        killed: whether it reports something beyond what it reports of the good device.
-        findings: what is beyond, as "OPERATION CODE".
+        mutant: the mutant's name.
+        killed: whether Schemathesis reports anything that it does not report of the good device.
+        findings: these additional reports, each as "OPERATION CODE".
     """
 
     mutant: str
@@ -42,7 +42,7 @@ class SchemathesisResult:
 
 
 def command() -> str | None:
-    """Return the Schemathesis command of this environment, or None."""
+    """Return the path of the Schemathesis command in this environment, or None where it is not installed."""
     beside = Path(sys.executable).with_name("st")
     return str(beside) if beside.exists() else shutil.which("st")
 
@@ -76,7 +76,7 @@ def compare(
 
 
 def _findings(description: Path, proxy: Proxy, token: str = "") -> Findings:
-    """Return what Schemathesis reports, by its JUnit file."""
+    """Run Schemathesis through the proxy and return the failures in its JUnit file."""
     schemathesis = command()
     if schemathesis is None:
         return frozenset()

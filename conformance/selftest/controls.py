@@ -27,7 +27,7 @@ _TIMEOUT_S = 900.0
 
 @dataclass(frozen=True)
 class Case:
-    """One device to judge: in which circumstances or behind which server, with which seed."""
+    """One good device to judge: the variant (link, proxy, TLS) or web server in front of it, and the run's seed."""
 
     device: GoodDevice
     variant: Variant | Front | None = None
@@ -36,13 +36,14 @@ class Case:
 
 @dataclass(frozen=True)
 class ControlResult:
-    """What came of a good device.
+    """The result of judging one good device.
 
     Attributes:
-        robot: its name; variant: in which circumstances, or empty.
-        seed: of the run.
-        outcome: what came of it, or None when it was not tried.
-        not_tried: why it was not tried, or empty.
+        robot: the device's name.
+        variant: name of the variant or web server in front of it, or empty.
+        seed: seed of the run.
+        outcome: outcome of the run, or None when it did not take place.
+        not_tried: why the run did not take place, or empty.
     """
 
     robot: str
@@ -53,14 +54,14 @@ class ControlResult:
 
     @property
     def false_positives(self) -> dict[str, str]:
-        """MUST requirements that the good device failed, with the reasons."""
+        """Return the MUST requirements that the good device failed, with the reasons."""
         if self.outcome is None:
             return {}
         return {id_: self.outcome.reasons[id_] for id_, value in self.outcome.verdicts.items() if value == "fail"}
 
     @property
     def unjudged(self) -> dict[str, str]:
-        """Requirements that could not be judged although they are claimed, with the reasons."""
+        """Return the claimed requirements that got no verdict, with the reasons."""
         if self.outcome is None:
             return {}
         reasons = self.outcome.reasons
@@ -69,7 +70,7 @@ class ControlResult:
 
     @property
     def conformant(self) -> bool:
-        """Whether the device was found conformant (or was not tried)."""
+        """Return whether the device was found conformant or the run did not take place."""
         return self.outcome is None or (self.outcome.exit_code == 0 and not self.false_positives)
 
 
@@ -78,8 +79,8 @@ class Controls:
     """The controls of one self-test.
 
     Attributes:
-        cases: which devices, in which circumstances.
-        missing: why devices of the pack are not among them.
+        cases: the devices to judge, with their variants.
+        missing: for each device of the pack that cannot be a control here, the reason.
     """
 
     cases: list[Case] = field(default_factory=list)
@@ -91,9 +92,9 @@ def controls_of(contract: Contract, seeds: int, *, short: bool, variants: bool) 
 
     Args:
         contract: the pack.
-        seeds: how many seeds for each device.
-        short: whether one device on ROS will do.
-        variants: whether to judge devices in variants, behind web servers, and those that are judged once.
+        seeds: number of seeds for each device.
+        short: whether to judge one device on ROS only, to save time.
+        variants: whether to judge devices also in variants and behind web servers.
     """
     needs, found = self_test_of(contract), Controls()
     there: list[GoodDevice] = []
@@ -128,7 +129,17 @@ def run_controls(
     tell: Callable[[ControlResult], None],
     requirements: tuple[str, ...] = (),
 ) -> list[ControlResult]:
-    """Judge good devices, each case a process of its own, by all requirements or these; tell each when it is done."""
+    """Judge good devices, each in a process of its own; ``tell`` is called with each result when it is ready.
+
+    Args:
+        contract: the pack.
+        cases: the devices to judge.
+        effort: quick, standard or deep.
+        parallel: number of devices judged in parallel.
+        domain_id: first ROS domain to use.
+        tell: called with each result, never twice at a time.
+        requirements: ids of the requirements to judge; empty: all.
+    """
     lock = threading.Lock()
     domains = list(range(domain_id, domain_id + parallel))
 
@@ -149,7 +160,7 @@ def run_controls(
 def _judge(
     contract: Contract, case: Case, effort: str, domain: int, requirements: tuple[str, ...]
 ) -> tuple[Outcome | None, str]:
-    """Judge one device; where this machine lacks what its circumstances need, return None and what is missing."""
+    """Judge one device; where a program that the variant needs is not installed, return None and the program's name."""
     more = {"requirements": requirements, "effort": effort, "seed": case.seed, "timeout_s": _TIMEOUT_S}
     try:
         with contextlib.ExitStack() as stack:
@@ -165,10 +176,10 @@ def _judge(
 
 
 def _varied(stack: contextlib.ExitStack, variant: Variant, robot: Robot, seed: int) -> tuple[Robot, dict[str, object]]:
-    """Put a device into its circumstances; return it as clients reach it then, and what its job says of that.
+    """Put a variant (proxy, TLS, link) in front of a device; return its new addresses and the job's additional options.
 
     Raises:
-        NotInstalledError, CertificateError: this machine lacks something.
+        NotInstalledError, CertificateError: a program that the variant needs is missing.
     """
     endpoints, tls = dict(variant.endpoints), None
     if variant.tls:

@@ -1,4 +1,4 @@
-"""What binds each requirement: the checks that judge it, and the mutants that prove that they do."""
+"""List for each requirement the checks that judge it and the mutants that it must kill."""
 
 from collections import defaultdict
 from collections.abc import Iterable
@@ -31,10 +31,10 @@ before a good device, and that the requirement has to kill.
 
 @dataclass(frozen=True)
 class Binding:
-    """One requirement with what binds it.
+    """One requirement with its checks and mutants.
 
     Attributes:
-        requirement: which.
+        requirement: the requirement.
         checks: names of the checks that judge it, as ``module::function``.
         mutants: names of the mutants that it must kill.
     """
@@ -45,7 +45,7 @@ class Binding:
 
 
 class _Checks:
-    """A pytest plugin that takes down the ids in the markers of every check, whether or not the ledger has them."""
+    """A pytest plugin that records the requirement ids in the markers of every check, including unknown ids."""
 
     def __init__(self, contract: Contract) -> None:
         self._ledger, self._everywhere = contract.ledger, contract.name == DEFAULT_PACK
@@ -53,7 +53,7 @@ class _Checks:
         self.broken = ""
 
     def pytest_itemcollected(self, item: pytest.Item) -> None:
-        """Take down a check."""
+        """Record the requirement ids of one check."""
         marked = (id_ for mark in item.iter_markers("requirement") for id_ in mark.args)
         # What the generic suite judges by convention binds only packs whose ledger has it.
         own = self._everywhere or GENERIC_RULES not in item.path.parents
@@ -62,14 +62,14 @@ class _Checks:
                 self.found[id_][f"{item.path.stem}::{item.name.partition('[')[0]}"] = None
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
-        """Take down why a module with checks cannot be imported."""
+        """Record the error when a module with checks cannot be imported."""
         if report.failed and not self.broken:
             self.broken = f"{report.nodeid} cannot be imported: {report.longrepr}"
 
 
 @cache
 def checks_by_requirement(contract: Contract) -> dict[str, tuple[str, ...]]:
-    """Return the checks by the ids in their markers; pytest collects them, as it does in a run.
+    """Return the names of the checks by requirement id; pytest collects them from their markers, as in a run.
 
     Raises:
         ContractError: a module with checks cannot be imported.
@@ -97,10 +97,10 @@ def bindings(contract: Contract) -> tuple[Binding, ...]:
 
 
 def disagreements(contract: Contract) -> list[str]:
-    """Return where ledger, checks and mutants do not agree, in words.
+    """Return one sentence for each disagreement between the ledger, the checks and the mutants.
 
-    A pack that has mutants has one for each of its own requirements that is no MAY. Those of the generic suite are
-    shown by the mutants of the suite's own pack.
+    A pack with mutants must have a mutant for each of its own MUST and SHOULD requirements. Requirements of the generic
+    suite are covered by the mutants of the suite's own pack.
     """
     mutants, known = self_test_of(contract).mutants, contract.ledger
     shown = set(known) - (set() if contract.name == DEFAULT_PACK else set(generic_ledger()))
@@ -129,7 +129,7 @@ def _misnamed(mutants: Iterable[Mutant], known: Iterable[str]) -> Iterable[str]:
 
 
 def page(contract: Contract) -> str:
-    """Return the page, as Markdown."""
+    """Return the coverage page docs/coverage.md as Markdown."""
     found, mutants = bindings(contract), self_test_of(contract).mutants
     musts = sum(binding.requirement.level is Level.MUST for binding in found)
     shoulds = sum(binding.requirement.level is Level.SHOULD for binding in found)

@@ -1,7 +1,7 @@
-"""A link as robots have it: a relay of TCP connections, in a process of its own, that delays, jitters and stalls.
+"""A simulated network link: a TCP relay in a process of its own that adds delay, jitter and stalls.
 
-What a relay can do of a lossy network: octets keep their order, as TCP has it, so that a segment which was lost and
-sent again holds up those behind it. Windows do not shrink, and nothing is dropped for good.
+Bytes keep their order, as in TCP, so that a segment that was lost and sent again delays those behind it. The relay
+does not shrink TCP windows and never drops data for good.
 """
 
 import asyncio
@@ -26,16 +26,17 @@ _RESET = struct.pack("ii", 1, 0)
 
 @dataclass(frozen=True)
 class Link:
-    """What a link does to every connection.
+    """The properties of a simulated network link.
 
     Attributes:
-        name: its name; says: what it is, in a few words.
-        delay_s: the shortest and the longest time from end to end, one way, s; each segment has its own.
-        late: share of segments that come ``late_s`` later, and hold up those behind them.
-        late_s: how much later, s.
-        octets_per_s: what goes through in each direction of one connection.
-        outage_s: how long nothing goes through, once, s.
-        outage_after_s: between these times after the first connection the outage begins, s.
+        name: its name.
+        says: a short description.
+        delay_s: shortest and longest one-way delay of a segment, s.
+        late: share of segments that arrive ``late_s`` later and delay those behind them.
+        late_s: additional delay of late segments, s.
+        octets_per_s: bandwidth in each direction of one connection, bytes per second.
+        outage_s: duration of the one outage, s.
+        outage_after_s: the outage begins between these times after the first connection, s.
     """
 
     name: str
@@ -60,12 +61,12 @@ def _chance(seed: str) -> random.Random:
 
 
 class Direction:
-    """When the segments that go one way of one connection arrive: by the seed alone, given when they were sent.
+    """One direction of one connection: computes when each segment arrives, reproducibly for a seed.
 
     Args:
-        link: what the connection is made of.
-        seed: of all that is random.
-        outage: when nothing goes through, s of the clock that ``arrival`` is given.
+        link: the link's properties.
+        seed: seed of everything random.
+        outage: start and end of the outage, s on the clock that ``arrival`` is given.
     """
 
     def __init__(self, link: Link, seed: str, outage: tuple[float, float]) -> None:
@@ -75,7 +76,7 @@ class Direction:
         self._free = self._last = 0.0
 
     def arrival(self, sent: float, octets: int) -> float:
-        """When a segment arrives: after it was its turn on the link, and never before the one sent before it."""
+        """Return when a segment sent at ``sent`` arrives; never before the segment sent before it."""
         begins, ends = self._outage
         self._free = max(self._free, sent) + octets / self._link.octets_per_s
         left = ends if begins <= self._free < ends else self._free
@@ -88,7 +89,7 @@ class Direction:
 
 @contextlib.contextmanager
 def linked(link: Link, seed: int, *targets: Address) -> Iterator[list[Address]]:
-    """Relay connections to each target, until the end; gives where to connect to instead, in the targets' order.
+    """Relay connections to each target over the link until the context ends; yield the relay's addresses in order.
 
     Raises:
         OSError: the relay does not start.
@@ -162,7 +163,7 @@ class _Relay:
 
 
 class _Pump:
-    """One way of one connection: what is read is written when it arrives."""
+    """One direction of one relayed connection: writes the bytes it reads when they are due to arrive."""
 
     def __init__(self, direction: Direction) -> None:
         self._direction = direction
@@ -206,7 +207,7 @@ class _Pump:
 
 
 def _abort(writer: asyncio.StreamWriter) -> None:
-    """Break a connection off, as its other end was."""
+    """Reset a connection, as the other end did."""
     sock: socket.socket = writer.get_extra_info("socket")
     with contextlib.suppress(OSError):
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)

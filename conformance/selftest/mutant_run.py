@@ -1,4 +1,4 @@
-"""Each mutant is judged, and each requirement that must kill it has to fail or warn."""
+"""Certify each hand-written mutant and see whether each requirement that must kill it fails or warns."""
 
 import queue
 from collections.abc import Callable, Iterable
@@ -21,16 +21,17 @@ _TIMEOUTS = {"quick": 90.0, "standard": 240.0, "deep": 900.0}
 
 @dataclass
 class MutantResult:
-    """What came of one mutant.
+    """The result of one hand-written mutant.
 
     Attributes:
-        mutant: which.
-        killed_by: requirements that said fail or warn, of those that must and of others.
-        survived: requirements that must have, and did not.
-        effort: of the last run.
-        not_tried: why it was not tried, or empty.
-        seconds: how long it took; runs: how many runs.
-        reasons: what those said that it survived.
+        mutant: the mutant.
+        killed_by: requirements that failed or warned, including those that do not have to.
+        survived: requirements that must kill the mutant and passed it.
+        effort: effort of the last run.
+        not_tried: why the mutant was not run, or empty.
+        seconds: total duration, s.
+        runs: number of runs.
+        reasons: what the requirements in ``survived`` reported instead.
     """
 
     mutant: Mutant
@@ -44,13 +45,13 @@ class MutantResult:
 
 
 class RobotPool:
-    """Good devices with a proxy before each, for as many runs at once.
+    """Good devices, each with a proxy in front that can turn it into a mutant; one for each parallel run.
 
     Args:
         contract: the pack.
-        device: which device is behind the proxies.
-        size: how many.
-        domain_id: ROS domain of the first; the next ones take the next.
+        device: the good device to start behind each proxy.
+        size: number of devices.
+        domain_id: ROS domain of the first device; the others take the next ones.
 
     Raises:
         RobotError: a device does not start.
@@ -78,11 +79,11 @@ class RobotPool:
         self._stack.close()
 
     def take(self) -> tuple[Robot, Proxy]:
-        """Return a robot that is free, and its proxy."""
+        """Return a device that no run uses, and its proxy."""
         return self._free.get()
 
     def give(self, robot: Robot, proxy: Proxy) -> None:
-        """Take them back, and undo what was done to the proxy."""
+        """Return a device and its proxy to the pool, and remove the mutant from the proxy."""
         proxy.change, proxy.incomplete_request = unchanged, None
         proxy.serial = proxy.backwards = proxy.forgetful = False
         proxy.broken = []
@@ -90,14 +91,14 @@ class RobotPool:
 
 
 def become(proxy: Proxy, mutant: Mutant) -> None:
-    """Make a mutant of the robot behind a proxy, for one run."""
+    """Set the proxy's changes so that the robot behind it becomes the mutant for one run."""
     proxy.change = mutant.make()
     proxy.incomplete_request = mutant.incomplete_request() if mutant.incomplete_request else None
     proxy.serial, proxy.backwards, proxy.forgetful = mutant.serial, mutant.backwards, mutant.forgetful
 
 
 def job_for(robot: Robot, proxy: Proxy, effort: str, seed: int, **more: Any) -> Job:
-    """Return a job that judges a robot through its proxy."""
+    """Return a job that certifies a robot through its proxy."""
     return job_at(proxy.before(robot), effort=effort, seed=seed, timeout_s=_TIMEOUTS[effort], **more)
 
 
@@ -119,15 +120,15 @@ def run_mutants(
     already: frozenset[str] = frozenset(),
     tell: Callable[[MutantResult], None],
 ) -> list[MutantResult]:
-    """Try every mutant, several at once.
+    """Run every mutant, several in parallel, and return the results.
 
     Args:
-        pool: the robots.
-        mutants: what to try.
-        effort: of the first runs.
-        seed: of everything random.
-        already: requirements that say fail or warn of the good robot itself: nothing can be shown of them.
-        tell: called as each is done.
+        pool: the devices.
+        mutants: the mutants to run.
+        effort: effort of each mutant's first run.
+        seed: seed of everything random.
+        already: requirements that fail or warn on the good robot itself, so that no mutant can show anything of them.
+        tell: called with each result when it is ready.
     """
 
     def one(mutant: Mutant) -> MutantResult:
@@ -141,7 +142,7 @@ def run_mutants(
 
 
 def _obstacle(mutant: Mutant, robot: Robot, already: frozenset[str]) -> str:
-    """Return why a mutant of this robot cannot be tried, or an empty text."""
+    """Return why a mutant of this robot cannot be run, or an empty text."""
     if shared := already.intersection(mutant.catches):
         return f"{robot.kind} itself does not pass {min(shared)}"
     if mutant.probe and not robot.device.on_ros:

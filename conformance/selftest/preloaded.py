@@ -1,4 +1,4 @@
-"""What every certification needs, imported once: processes forked from there start in milliseconds."""
+"""Import once all that a certification needs: processes forked from here start in milliseconds."""
 
 import contextlib
 import importlib

@@ -1,4 +1,4 @@
-"""A reverse proxy that makes a robot a mutant: REST and SOAP, each on a port of its own, with one change in between."""
+"""A reverse proxy that turns a robot into a mutant by changing its messages, over REST and SOAP on two ports."""
 
 import contextlib
 import socket
@@ -17,23 +17,23 @@ _IDLE_S = 60.0
 
 
 class Proxy:
-    """Stands in front of a robot.
+    """A reverse proxy in front of a robot.
 
     Args:
         rest: the robot's REST base URL.
-        soap: URL of one of the robot's SOAP services; empty: it has none.
-        host: where to listen.
+        soap: URL of one of the robot's SOAP services; empty: none.
+        host: address to listen on.
         tls: context to serve TLS with, or None.
-        prefix: path before everything on the REST side, as "/r2d2/api".
+        prefix: path before every REST path, such as "/r2d2/api".
 
     Attributes:
-        change: what is done to every exchange; may be exchanged at any time.
-        incomplete_request: what is done with requests that are never completed.
-        serial: whether a request is read only when the one before it has come to its end.
-        backwards: whether of two requests that were sent at once the second is answered first.
-        forgetful: whether of requests that were sent at once the first alone is answered.
-        requests: how many have come.
-        broken: what a change raised that it should not have: then the mutant is wrong, not the robot.
+        change: the change applied to every exchange; may be replaced at any time.
+        incomplete_request: the response to a request that the client never completes.
+        serial: whether the proxy reads a request only after it has sent the response to the one before.
+        backwards: whether the proxy sends the responses to two pipelined requests in the wrong order.
+        forgetful: whether the proxy responds only to the first of several pipelined requests.
+        requests: number of requests received.
+        broken: unexpected exception of a change: the mutant has a defect, not the robot.
     """
 
     def __init__(
@@ -64,30 +64,30 @@ class Proxy:
 
     @property
     def rest(self) -> str:
-        """REST's base URL at the proxy."""
+        """Return the REST base URL at the proxy."""
         return self._addresses.public("rest")
 
     def wsdl(self, url: str) -> str:
-        """Return the URL at the proxy of a WSDL of the robot; empty where that is empty."""
+        """Return the proxy's URL of one of the robot's WSDLs; empty where the given URL is empty."""
         where = urlsplit(url)
         return f"{self._addresses.public('soap')}{where.path}?{where.query}" if url else ""
 
     def before(self, robot: Robot) -> Robot:
-        """Return the robot as clients of the proxy reach it."""
+        """Return the robot with the proxy's addresses, as its clients reach it."""
         publishers, subscribers = self.wsdl(robot.publishers), self.wsdl(robot.subscribers)
         return replace(robot, rest=self.rest, publishers=publishers, subscribers=subscribers)
 
     @property
     def listens(self) -> dict[str, tuple[str, int]]:
-        """Host and port of each side."""
+        """Return host and port of each side."""
         return {side: sock.getsockname()[:2] for side, sock in self._listeners.items()}
 
     def seen_at(self, **origins: str) -> None:
-        """Say of each side where clients reach it, when that is not where the proxy listens."""
+        """Set the origins by which clients reach the proxy where they are not the addresses it listens on."""
         self._addresses = replace(self._addresses, proxy=origins)
 
     def close(self) -> None:
-        """Stop listening, and end every connection."""
+        """Stop listening and close every connection."""
         self._closed = True
         for sock in [*self._listeners.values(), *self._open]:
             with contextlib.suppress(OSError):
@@ -103,7 +103,7 @@ class Proxy:
             threading.Thread(target=self._serve, args=(side, sock), daemon=True).start()
 
     def _serve(self, side: str, sock: socket.socket) -> None:
-        """One connection, to its end."""
+        """Serve one connection until it closes."""
         robot = RobotConnection(*self._robot[side])
         owner = threading.get_ident()
 

@@ -1,4 +1,4 @@
-"""What a self-test says in the end: selftest.json, selftest.md, and a summary for people."""
+"""Write the results of a self-test: selftest.json, selftest.md and a summary for the terminal."""
 
 import json
 from dataclasses import dataclass, field
@@ -15,16 +15,17 @@ from conformance.selftest.mutant_run import MutantResult
 
 @dataclass
 class Report:
-    """Everything that a self-test has found.
+    """All results of one self-test.
 
     Attributes:
         contract: the pack.
         target: the good device behind the mutants.
-        mutant_results: by mutant.
-        control_results: by good device.
-        compared: what Schemathesis killed; good: what it reports of the good device.
-        notes: remarks.
-        generated_results: of mutants by rule; seed: of their sample.
+        mutant_results: results of the hand-written mutants.
+        control_results: results of the good devices.
+        compared: results of Schemathesis on the mutants; ``good``: its findings on the good device.
+        notes: remarks for the reader.
+        generated_results: results of the generated mutants.
+        seed: seed of the sample of generated mutants.
     """
 
     contract: Contract
@@ -40,28 +41,28 @@ class Report:
 
     @property
     def tried(self) -> list[MutantResult]:
-        """Mutants that were tried."""
+        """Return the results of the mutants that were run."""
         return [result for result in self.mutant_results if not result.not_tried]
 
     @property
     def survived(self) -> list[MutantResult]:
-        """Mutants that survived a requirement which has to kill them."""
+        """Return the mutants that survived a requirement that must kill them."""
         return [result for result in self.tried if result.survived]
 
     @property
     def false_positives(self) -> list[ControlResult]:
-        """Controls of good devices that were not found conformant."""
+        """Return the controls whose good device was not found conformant."""
         return [result for result in self.control_results if not result.conformant]
 
     @property
     def holds(self) -> bool:
-        """Whether all mutants are killed, no control is a false positive, and something was tried."""
+        """Return whether all mutants were killed, no control was a false positive, and at least one run took place."""
         tried = bool(self.tried or self.control_results or self.generated_results)
         escaped = any(result.outcome not in {KILLED, NOT_REACHED} for result in self.generated_results)
         return tried and not self.survived and not self.false_positives and not escaped
 
     def document(self) -> dict[str, Any]:
-        """Return selftest.json; its keys are those of roaas-selftest/1."""
+        """Return the content of selftest.json, with the keys of the schema roaas-selftest/1."""
         return {
             "format": "roaas-selftest/1",
             "holds": self.holds,
@@ -114,10 +115,10 @@ class Report:
         }
 
     def write(self, out: Path) -> Path:
-        """Write selftest.json and selftest.md, and return the former's path.
+        """Write selftest.json and selftest.md, and return the path of selftest.json.
 
         Raises:
-            OSError: it cannot be written.
+            OSError: a file cannot be written.
         """
         out.mkdir(parents=True, exist_ok=True)
         path = out / "selftest.json"
@@ -126,7 +127,7 @@ class Report:
         return path
 
     def matrix(self) -> str:
-        """Return a table: each mutant with the requirements that killed it; of mutants by rule, the rates."""
+        """Return Markdown tables: each mutant with the requirements that killed it; rates of generated mutants."""
         if self.generated_results:
             theirs = {seen.mutant: seen.killed for seen in self.compared}
             return by_rule.rates_page(self.contract, self.generated_results, self.target, self.seed, theirs, self.notes)
@@ -150,7 +151,7 @@ class Report:
         return "\n".join(lines) + "\n"
 
     def summary(self) -> str:
-        """Return what a person wants to know, in a few lines."""
+        """Return a summary of a few lines for the terminal."""
         tried, missed = len(self.tried), len(self.survived)
         lines = []
         if tried:

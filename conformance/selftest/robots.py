@@ -1,4 +1,4 @@
-"""The good devices of a self-test: started as processes of their own, and stopped again."""
+"""Start the good devices of a self-test as separate processes, and stop them."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ _DOMAINS = 102
 
 
 class RobotError(Exception):
-    """A device that does not start; the message says what to do."""
+    """A device does not start; the message tells the user what to do."""
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A good device that runs, at the addresses by which clients reach it.
+    """A running good device with the addresses by which clients reach it.
 
     Attributes:
         pack: folder of its contract pack.
-        device: which.
-        rest: REST's base URL.
-        publishers: URL of the publishers' WSDL, or empty; likewise subscribers.
+        device: the device's entry in the pack.
+        rest: the REST base URL.
+        publishers: URL of the publishers' WSDL, or empty; likewise ``subscribers``.
         domain_id: its ROS domain, or None.
     """
 
@@ -49,15 +49,15 @@ class Robot:
 
     @property
     def kind(self) -> str:
-        """The device's name."""
+        """Return the device's name."""
         return self.device.name
 
 
 def target_of(contract: Contract, name: str) -> GoodDevice:
-    """Return a pack's good device of this name; the first one where the name is empty.
+    """Return a pack's good device by name; the first one where the name is empty.
 
     Raises:
-        RobotError: the pack has no such device.
+        RobotError: the pack has no device of this name.
     """
     devices = {device.name: device for device in self_test_of(contract).devices}
     if not devices:
@@ -71,10 +71,10 @@ def target_of(contract: Contract, name: str) -> GoodDevice:
 
 
 def check_available(contract: Contract, device: GoodDevice) -> None:
-    """See whether a device can be started here.
+    """Raise RobotError when a device cannot be started on this machine.
 
     Raises:
-        RobotError: it cannot.
+        RobotError: the device cannot be started; the message says what is missing.
     """
     if not device.on_ros or find_spec("rclpy") is not None:
         return
@@ -86,17 +86,17 @@ def check_available(contract: Contract, device: GoodDevice) -> None:
 
 @contextlib.contextmanager
 def running(contract: Contract, device: GoodDevice, domain_id: int = 0, seed: int = 0) -> Iterator[Robot]:
-    """Start a good device on free ports, and stop it in the end.
+    """Start a good device on free ports and stop it when the context ends.
 
     Args:
         contract: its pack.
-        device: which.
+        device: the device.
         domain_id: first ROS domain to try, for a device on ROS.
-        seed: of everything random in it.
+        seed: seed of everything random in the device.
 
     Raises:
-        RobotError: it does not start.
-        NotInstalledError: what it runs on is not installed.
+        RobotError: the device does not start.
+        NotInstalledError: a program that the device needs is not installed.
     """
     check_available(contract, device)
     with contextlib.ExitStack() as stack:
@@ -109,10 +109,10 @@ def running(contract: Contract, device: GoodDevice, domain_id: int = 0, seed: in
 
 @contextlib.contextmanager
 def _own_domain(first: int) -> Iterator[int]:
-    """A ROS domain that no other run on this machine holds, from ``first`` on.
+    """Reserve a ROS domain that no other run on this machine uses, beginning the search at ``first``; yield its id.
 
     Raises:
-        RobotError: all are taken.
+        RobotError: all domains are in use.
     """
     # Only where there is ROS, and so never on Windows, which lacks it.
     import fcntl  # noqa: PLC0415
@@ -141,7 +141,7 @@ def _started(command: list[str]) -> Iterator[subprocess.Popen[str]]:
 
 @contextlib.contextmanager
 def stopped(process: subprocess.Popen[Any]) -> Iterator[None]:
-    """Stop a process in the end; kill it where it does not stop."""
+    """Stop a process when the context ends; kill it when it does not stop."""
     try:
         yield
     finally:
@@ -154,7 +154,7 @@ def stopped(process: subprocess.Popen[Any]) -> Iterator[None]:
 
 
 def _ready(process: subprocess.Popen[str], name: str) -> tuple[str, str]:
-    """Return the two addresses in the line that a device prints when it is ready; the second may be empty."""
+    """Return the two addresses in the "ready" line that a device prints after its start; the second may be empty."""
     until = time.monotonic() + _START_S
     output: IO[str] | None = process.stdout
     with selectors.DefaultSelector() as selector:

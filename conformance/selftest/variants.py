@@ -1,4 +1,4 @@
-"""Circumstances in which a good device stays one: what stands between it and its clients in the field."""
+"""Variants of a good device that must stay conformant: TLS, path prefix, authentication, rate limits, slow links."""
 
 import json
 import shutil
@@ -26,15 +26,18 @@ _CEILING = 100.0
 
 @dataclass(frozen=True)
 class Variant:
-    """One circumstance.
+    """One variant: what stands between a good device and its clients.
 
     Attributes:
-        name: its name; says: what it is, in a few words.
-        make: makes the change.
-        host: where the proxy listens; prefix: its path; tls: whether it speaks TLS.
-        token: bearer token to send.
-        endpoints: what the statement says of it.
-        link: what the clients are away by, or None where they are beside the robot.
+        name: its name.
+        says: a short description.
+        make: returns the change to the device's messages.
+        host: address on which the proxy listens.
+        prefix: path before every REST path.
+        tls: whether the proxy speaks TLS.
+        token: bearer token that clients must send.
+        endpoints: additional endpoint options of the statement.
+        link: the simulated network link between clients and proxy, or None for none.
     """
 
     name: str
@@ -49,14 +52,14 @@ class Variant:
 
 
 class CertificateError(Exception):
-    """No certificate can be made here."""
+    """No TLS certificate can be made on this machine."""
 
 
 def certificate(folder: Path) -> tuple[ssl.SSLContext, Path]:
-    """Return a context that serves with a self-signed certificate, and the file by which to trust it.
+    """Return a TLS context with a new self-signed certificate, and the file with which clients trust it.
 
     Raises:
-        CertificateError: there is no openssl, or it fails.
+        CertificateError: openssl is missing or fails.
     """
     openssl = shutil.which("openssl")
     if openssl is None:
@@ -79,7 +82,7 @@ def _slow(request: Request, forward: Forward) -> Response:
 
 
 def _prefixed(request: Request, forward: Forward) -> Response:
-    """Name the path under which everything is in the description."""
+    """Add the path prefix to the server URL in the OpenAPI description."""
     response = forward(request)
     if request.side == "rest" and request.path.endswith("/openapi.json"):
         value = parsed(response.body)
@@ -103,7 +106,7 @@ def _guarded(request: Request, forward: Forward) -> Response:
 
 
 class _Ceiling:
-    """Responds 429 to more requests than the ceiling allows within a second."""
+    """A rate limit: responds 429 to requests beyond a number per second."""
 
     def __init__(self) -> None:
         self._times: list[float] = []
@@ -121,7 +124,7 @@ class _Ceiling:
 
 
 def _uptime(request: Request, forward: Forward) -> Response:
-    """Add to every JSON object for how many seconds the robot has been up."""
+    """Add the robot's uptime in seconds to every JSON object."""
     response = forward(request)
     if request.side != "rest" or response.status != HTTPStatus.OK or response.media_type != JSON:
         return response
@@ -148,6 +151,6 @@ VARIANTS = (
 
 
 def variants_of(contract: Contract) -> tuple[Variant, ...]:
-    """Return the variants for a pack: those for every pack, and its own."""
+    """Return the variants for a pack: those common to all packs and the pack's own."""
     own = self_test_of(contract).variants
     return (*VARIANTS, *(Variant(change.name, change.says, change.make) for change in own))

@@ -1,1 +1,1 @@
-"""Mutants by rule: every operator at every field, status, header and operation that the contract's files name."""
+"""Generated mutants: every operator applied to every field, status and header that the pack's descriptions name."""

@@ -1,4 +1,4 @@
-"""What is done to the body of an answer as a whole, or to the whole answer, now and then."""
+"""Generated mutants that alter the body as a whole or replace the whole response, always or intermittently."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -37,7 +37,7 @@ _NUMBERS: dict[str, Callable[[bytes], bytes]] = {
 
 
 def of_bodies(exchange: Exchange) -> Iterator[GeneratedMutant]:
-    """The body of successful answers as a whole, in each format; in plain text its numbers too."""
+    """Yield mutants that alter the whole body of successful responses in each format, and the numbers in plain text."""
     for media_type in exchange.formats:
         form = media_type.rpartition("/")[2].replace("plain", "text")
         edits = {**_BODIES, **_NUMBERS} if form == "text" else _BODIES
@@ -62,7 +62,7 @@ def of_bodies(exchange: Exchange) -> Iterator[GeneratedMutant]:
 
 
 def crossed(exchange: Exchange, mode: str) -> Callable[[Tally], Change]:
-    """In place of its answer the one before, of whatever operation."""
+    """Return a change that sends the robot's previous response, of any operation, instead of the current one."""
 
     def make(tally: Tally) -> Change:
         before: list[Response] = []
@@ -80,12 +80,12 @@ def crossed(exchange: Exchange, mode: str) -> Callable[[Tally], Change]:
 
 
 def failing(exchange: Exchange, mode: str) -> Callable[[Tally], Change]:
-    """In place of a successful answer, 500."""
+    """Return a change that replaces successful responses by 500."""
     return in_mode(mode, answers(exchange, lambda answer: answer.status in _SUCCESS, becomes(500)))
 
 
 def cut(exchange: Exchange, mode: str) -> Callable[[Tally], Change]:
-    """A successful answer's body ends in the middle, or there is one where there should be none."""
+    """Return a change that sends half of a successful response's body, or adds a body where none is allowed."""
 
     def edit(answer: Response) -> None:
         answer.body = answer.body[: len(answer.body) // 2]

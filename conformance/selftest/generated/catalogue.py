@@ -1,4 +1,4 @@
-"""All mutants by rule of a contract pack, in an order that stays the same as long as the pack's descriptions do."""
+"""List all generated mutants of a contract pack, in an order that depends on the pack's descriptions alone."""
 
 from collections import defaultdict
 from collections.abc import Iterator
@@ -18,14 +18,14 @@ _WHOLE = {"crossed": bodies.crossed, "failing": bodies.failing, "cut": bodies.cu
 
 @cache
 def every_change(contract: Contract) -> tuple[GeneratedMutant, ...]:
-    """Return all changes that the rules make, those that break no clause included."""
+    """Return all generated changes, including those that break no clause of the contract."""
     found = [*_of_fields(contract), *_of_exchanges(contract)]
     return tuple({mutant.name: mutant for mutant in found}.values())
 
 
 @cache
 def generated_mutants(contract: Contract) -> tuple[GeneratedMutant, ...]:
-    """Return the mutants by rule: changes that break a clause."""
+    """Return the generated mutants: the changes that break a clause of the contract."""
     return tuple(change for change in every_change(contract) if open_place(contract, change) is None)
 
 
@@ -60,7 +60,7 @@ def _at(operator: Operator, place: Place, mode: str = "") -> GeneratedMutant:
 
 
 def _classes(place: Place) -> tuple[str, ...]:
-    """Return the classes that can see a field, the likeliest first."""
+    """Return the conformance classes whose checks read a field, most likely killer first."""
     own = place.exchange.classes
     if place.medium == "xml":
         return ("rest-formats", "strict-input") if place.part == "request" else ("rest-formats", "http")

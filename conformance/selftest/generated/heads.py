@@ -1,4 +1,4 @@
-"""What is done to the head of an answer: each status becomes its neighbours, fields are dropped, doubled, changed."""
+"""Generated mutants of status codes and headers: other statuses, and dropped, doubled or changed header fields."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -18,7 +18,7 @@ _SUCCESS = range(200, 300)
 
 
 def neighbours(exchange: Exchange, status: int) -> tuple[int, ...]:
-    """The statuses that a status could be mistaken for: the next ones, the operation's others, and the other kind."""
+    """Return the statuses to replace a status with: adjacent codes, others of the operation, one of the other class."""
     soap_statuses = (200, 202, 204, 400, 404, 405, 415, 500)
     others = {status - 1, status + 1, *(exchange.statuses if exchange.side == "rest" else soap_statuses)}
     others |= {500, 404} if status in _SUCCESS else {200, 500}
@@ -26,7 +26,7 @@ def neighbours(exchange: Exchange, status: int) -> tuple[int, ...]:
 
 
 def of_statuses(exchange: Exchange) -> Iterator[GeneratedMutant]:
-    """Each declared status becomes each of its neighbours."""
+    """Yield mutants that replace each declared status with each of its neighbours."""
     for status in dict.fromkeys((*exchange.statuses, *((500,) if exchange.side == "soap" else (405, 415)))):
         for other in neighbours(exchange, status):
             yield GeneratedMutant(
@@ -60,7 +60,7 @@ def _twice(name: str, other: str) -> Callable[[Response], None]:
 
 
 def _headers(exchange: Exchange) -> Iterator[tuple[str, str, Callable[[Response], bool], dict[str, Any]]]:
-    """Field, of what, when, and edits by operator."""
+    """Yield for each header its name, the kind of message, the condition for a change, and the edits by operator."""
     fine, bad = (lambda answer: answer.status in _SUCCESS), (lambda answer: answer.status not in range(400))
     for said, when in (("", fine), ("-of-errors", bad)):
         if said or exchange.formats:
@@ -89,7 +89,7 @@ def _headers(exchange: Exchange) -> Iterator[tuple[str, str, Callable[[Response]
 
 
 def of_headers(exchange: Exchange) -> Iterator[GeneratedMutant]:
-    """Each header field that the contract names is dropped, doubled, changed."""
+    """Yield mutants that drop, double or change each header field that the contract names."""
     for field, of, when, edits in _headers(exchange):
         for operator, edit in edits.items():
             yield GeneratedMutant(
@@ -105,7 +105,7 @@ def of_headers(exchange: Exchange) -> Iterator[GeneratedMutant]:
 
 
 def _of_allow(exchange: Exchange) -> Iterator[GeneratedMutant]:
-    """Allow of the operation's resource, without it or with what it does not have."""
+    """Yield mutants whose Allow header lacks a method of the resource or lists one that it does not have."""
 
     def resource(request: Request) -> bool:
         return request.side == "rest" and re.fullmatch(exchange.path, request.path) is not None

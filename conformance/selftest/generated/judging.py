@@ -1,4 +1,4 @@
-"""Mutants by rule are judged by the product's verdict, with the classes that can see them, the likeliest first."""
+"""Judge generated mutants by the verdict of a certification of the classes most likely to kill them."""
 
 from __future__ import annotations
 
@@ -32,17 +32,18 @@ _WORD: Final = re.compile(r"[A-Z]?[a-z]+")
 
 @dataclass
 class GeneratedResult:
-    """What came of one mutant by rule.
+    """The result of one generated mutant.
 
     Attributes:
-        mutant: which.
-        outcome: killed, survived, not reached (nothing was altered in any run), given up, broken.
-        by: requirements that said fail (MUST) or warn (SHOULD) of it, and not of the good device.
-        fails: whether one of them said fail, so that the device is not conformant.
-        effort: the effort at which it was killed, else the last one tried.
-        altered: how often it altered something.
-        runs: how many runs; seconds: how long they took.
-        reason: the first requirement's, or what was broken.
+        mutant: the mutant.
+        outcome: killed, survived, not reached (the mutant altered nothing in any run), given up (timeout) or broken.
+        by: requirements that failed (MUST) or warned (SHOULD) on the mutant and not on the good device.
+        fails: whether one of them failed, so that the device is not conformant.
+        effort: the effort at which the mutant was killed, else the last one tried.
+        altered: number of messages that the mutant altered.
+        runs: number of runs.
+        seconds: their total duration, s.
+        reason: the reason of the first requirement, or the error of a broken mutant.
     """
 
     mutant: GeneratedMutant
@@ -64,14 +65,14 @@ def judge(
     seed: int = 0,
     tell: Callable[[GeneratedResult], None],
 ) -> list[GeneratedResult]:
-    """Judge mutants, several at once.
+    """Judge generated mutants, several in parallel, and return the results.
 
     Args:
-        pool: good devices with a proxy before each.
-        mutants: which.
-        efforts: those to try, until it is killed.
-        seed: of everything random.
-        tell: called as each is done.
+        pool: good devices, each with a proxy in front.
+        mutants: the mutants to judge.
+        efforts: efforts to try in this order until the mutant is killed.
+        seed: seed of everything random.
+        tell: called with each result when it is ready.
     """
     control = _Control(seed)
 
@@ -86,7 +87,7 @@ def judge(
 
 
 class _Control:
-    """The A/A control: which requirements the good device itself does not pass. They can kill no mutant."""
+    """The A/A control: the requirements that the unchanged device does not pass, which therefore kill no mutant."""
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
@@ -94,11 +95,11 @@ class _Control:
         self._lock = threading.Lock()
 
     def known(self, effort: str) -> frozenset[str]:
-        """Return the requirements that the good device is known not to pass."""
+        """Return the requirements that the unchanged device has failed or warned so far at an effort."""
         return frozenset(id_ for id_, refuted in self._known.get(effort, {}).items() if refuted)
 
     def without(self, ids: tuple[str, ...], robot: Robot, proxy: Proxy, effort: str) -> tuple[str, ...]:
-        """Return those of some requirements that the good device passes; it is judged by each once."""
+        """Return those of the given requirements that the unchanged device passes; each is tried on it once."""
         with self._lock:
             known = self._known.setdefault(effort, {})
             if new := tuple(id_ for id_ in ids if id_ not in known):
@@ -157,7 +158,7 @@ def _note(result: GeneratedResult, outcome: Outcome, by: tuple[str, ...]) -> Non
 
 
 def _attempts(contract: Contract, mutant: GeneratedMutant, claimed: tuple[str, ...]) -> Iterator[Attempt]:
-    """Yield classes and requirements to judge, one after the other: those about the operation, then whole classes."""
+    """Yield what to judge a mutant by: first the requirements that name its operation, then whole classes."""
     classes = tuple(class_ for class_ in mutant.classes if class_ in claimed)
     if not classes or classes[0] != mutant.classes[0]:
         # The class that should see it is not judged: any other may.

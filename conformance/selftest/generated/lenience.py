@@ -1,4 +1,4 @@
-"""Devices that take what they should refuse: a field that is missing or misspelt, or unknown fields beside it."""
+"""Generated mutants that accept bad requests: a missing or misspelt field, or unknown fields."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -19,7 +19,7 @@ def _objects(value: Any, steps: tuple[str, ...]) -> list[dict[str, Any]]:
 
 
 def _rewritten(place: Place, edit: Callable[[dict[str, Any], str], bool]) -> Callable[[Tally], Change]:
-    """Alter the object that a field of a JSON request is in."""
+    """Return a change that edits the JSON object that contains the field, before the robot reads the request."""
     *steps, name = place.steps
 
     def make(tally: Tally) -> Change:
@@ -47,11 +47,11 @@ _DEFAULTS: dict[str, Any] = {"number": 0.0, "integer": 0, "boolean": False}
 
 
 def of_lenience(place: Place, known: frozenset[str]) -> Iterator[GeneratedMutant]:
-    """Yield mutants that fill in a missing JSON field, take its name in any case, or drop unknown fields in it.
+    """Yield mutants that fill in a missing JSON field, accept its name in any case, or ignore unknown fields in it.
 
     Args:
         place: the field.
-        known: the names of the fields in it.
+        known: names of the fields inside it.
     """
 
     def fill(item: dict[str, Any], name: str) -> bool:

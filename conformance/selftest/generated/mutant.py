@@ -1,4 +1,4 @@
-"""A mutant by rule, when it strikes, and the changes that fields make."""
+"""A generated mutant, the modes that decide which exchanges it alters, and the changes of single fields."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ Alter = Callable[[Request, Response], Response | None]
 
 
 class Tally:
-    """How often a mutant has altered something in a run."""
+    """Counts the messages that a mutant has altered in a run."""
 
     def __init__(self) -> None:
         self.altered = 0
 
     def __call__(self) -> None:
-        """Once more."""
+        """Count one altered message."""
         self.altered += 1
 
 
 @dataclass(frozen=True)
 class GeneratedMutant:
-    """A mutant by rule.
+    """A mutant made by applying an operator to a field, status, header or operation.
 
     Attributes:
-        name: ``operator:operation:place[:form]``, stable.
-        says: one sentence on what is wrong with it.
-        operator: what is done; with the mode behind an at-sign.
+        name: ``operator:operation:place[:form]``; stable.
+        says: one sentence on the defect.
+        operator: name of the operator, followed by ``@`` and the mode if there is one.
         exchange: the operation.
-        classes: conformance classes that can see it, the likeliest first.
-        make: makes the change for one run, which counts what it alters.
+        classes: conformance classes whose checks can kill it, the likeliest first.
+        make: makes the change for one run, which counts the messages that it alters.
     """
 
     name: str
@@ -50,16 +50,16 @@ class GeneratedMutant:
 
     @property
     def interface(self) -> str:
-        """REST or SOAP."""
+        """Return the interface, REST or SOAP."""
         return self.exchange.side
 
     def as_mutant(self) -> Mutant:
-        """The same, for what takes mutants that people thought of; nothing in particular has to catch it."""
+        """Return this mutant as a hand-written one that no particular requirement has to kill."""
         return Mutant(self.name, self.says, (), self.interface, lambda: self.make(Tally()))
 
 
 class Mode:
-    """When a mutant strikes; one instance for one run."""
+    """Decides which exchanges of one run a mutant alters: all, some, or those in a given situation."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -68,13 +68,13 @@ class Mode:
         self._error = False
 
     def begin(self) -> bool:
-        """A request has come. Returns whether another one is under way."""
+        """Note that a request has arrived; return whether another request is in progress."""
         with self._lock:
             self._under_way += 1
             return self._under_way > 1
 
     def strikes(self, *, together: bool) -> bool:
-        """Whether an exchange that it concerns is altered; ``together``: another was under way when it came."""
+        """Return whether to alter an exchange; ``together``: another request was in progress when it arrived."""
         with self._lock:
             self._seen += 1
             if self._name == "rarely":
@@ -84,7 +84,7 @@ class Mode:
             return self._error if self._name == "after-error" else True
 
     def end(self, response: Response | None) -> None:
-        """An exchange has come to its end."""
+        """Note that an exchange has ended with this response."""
         with self._lock:
             self._under_way -= 1
             if response is not None:
@@ -100,7 +100,7 @@ MODES = {
 
 
 def in_mode(mode_name: str, alter: Alter) -> Callable[[Tally], Change]:
-    """A change of answers; ``alter`` returns None for what it leaves alone."""
+    """Return a change that alters responses in a mode; ``alter`` returns None for a response it leaves unchanged."""
 
     def make(tally: Tally) -> Change:
         mode = Mode(mode_name)
@@ -124,7 +124,7 @@ def in_mode(mode_name: str, alter: Alter) -> Callable[[Tally], Change]:
 
 
 def of_answer(operator: Operator, place: Place, mode: str = "") -> Callable[[Tally], Change]:
-    """The field is altered in successful answers."""
+    """Return a change that alters the field in successful responses."""
 
     def make(tally: Tally) -> Change:
         edit = operator.make(place)
@@ -141,7 +141,7 @@ def of_answer(operator: Operator, place: Place, mode: str = "") -> Callable[[Tal
 
 
 def of_request(operator: Operator, place: Place) -> Callable[[Tally], Change]:
-    """The field is altered on its way to the robot; it counts where the robot then takes the request."""
+    """Return a change that alters the field in requests, counted where the robot accepts the altered request."""
 
     def make(tally: Tally) -> Change:
         edit = operator.make(place)
@@ -163,7 +163,7 @@ def of_request(operator: Operator, place: Place) -> Callable[[Tally], Change]:
 
 
 def answers(exchange: Exchange, when: Callable[[Response], bool], edit: Callable[[Response], object]) -> Alter:
-    """Alter the answers of an operation, where they become others."""
+    """Return a function that edits an operation's responses where ``when`` holds; None for an unchanged response."""
 
     def alter(request: Request, response: Response) -> Response | None:
         if not exchange.concerns(request) or not when(response):
@@ -177,7 +177,7 @@ def answers(exchange: Exchange, when: Callable[[Response], bool], edit: Callable
 
 
 def classes_of_answers(exchange: Exchange) -> tuple[str, ...]:
-    """Return the classes that can see an operation's responses as messages, the likeliest first."""
+    """Return the conformance classes whose checks read an operation's responses, the likeliest killer first."""
     if exchange.side == "soap":
         return (*exchange.classes, "soap-basic-profile", "strict-input", "xml-security")
     return (*exchange.classes, "http", "rest-formats", "strict-input")

@@ -1,6 +1,6 @@
-"""Changes that rules make and that break no clause, each with the reason: those of the norms, and those of a pack.
+"""Generated changes that break no clause of a norm or of the pack's contract, each with the reason.
 
-They are no mutants, and are not judged. A pattern is narrow; coverage.md shows how many changes it covers.
+They are not mutants and are not judged. Patterns are narrow; coverage.md shows how many changes each covers.
 """
 
 from conformance.contract.pack import Contract
@@ -36,12 +36,12 @@ BY_NORM = (
 
 
 def open_places(contract: Contract) -> tuple[OpenPlace, ...]:
-    """Return what norms and the contract leave open."""
+    """Return the patterns of changes that break no clause of the norms or of the pack's contract."""
     return (*self_test_of(contract).open_places, *BY_NORM)
 
 
 def open_place(contract: Contract, change: GeneratedMutant) -> OpenPlace | None:
-    """Return what leaves a change open, so that it breaks no clause; None where it breaks one."""
+    """Return the pattern that says why a change breaks no clause; None for a change that breaks one."""
     exchange = change.exchange
     covering = (one for one in open_places(contract) if one.covers(change.name, exchange.side, exchange.method))
     return next(covering, None)

@@ -1,4 +1,4 @@
-"""What is done to a field. An operator makes an edit for one run, which may remember what it has seen."""
+"""The operators that alter a field. Each makes an edit for one run, which may remember earlier messages."""
 
 import math
 import struct
@@ -17,16 +17,16 @@ _ALL = _SCALAR | {"object", "array"}
 
 @dataclass(frozen=True)
 class Operator:
-    """An operator.
+    """One way to alter a field.
 
     Attributes:
-        name: as it begins the names of mutants.
-        says: what it does, of "the field".
-        kinds: kinds of fields that it is for.
-        parts: "answer", "request" or both.
-        media: forms in which it means something.
-        make: an edit for one run.
-        sibling: whether it needs one.
+        name: first part of the names of its mutants.
+        says: the effect, as a clause about "the field".
+        kinds: kinds of fields that it applies to.
+        parts: messages that it applies to: "answer" (response), "request" or both.
+        media: notations that it applies to (json, xml, soap, path, query).
+        make: makes the edit for one run.
+        sibling: whether it needs another field of the same kind beside the field.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Operator:
     sibling: bool = False
 
     def fits(self, place: Place) -> bool:
-        """Whether it makes a mutant there."""
+        """Return whether the operator applies to a field."""
         return (
             place.kind in self.kinds
             and place.part in self.parts
@@ -48,7 +48,7 @@ class Operator:
 
 
 def _each(change: Callable[[Any], Any]) -> Callable[[Place], Edit]:
-    """Give every field another value; ``change`` raises TypeError or ValueError for one that it does not know."""
+    """Return an edit that replaces the field's value; ``change`` raises TypeError or ValueError for values it skips."""
 
     def edit(slots: list[Slot]) -> bool:
         altered = False
@@ -76,7 +76,7 @@ def _always(do: Callable[[Slot], object]) -> Callable[[Place], Edit]:
 
 
 def _number(change: Callable[[float], float]) -> Callable[[Place], Edit]:
-    """Give every number another finite value; integers stay integers."""
+    """Return an edit that replaces a number by another finite number; integers stay integers."""
 
     def apply(value: Any) -> Any:
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
@@ -118,7 +118,7 @@ def _forward(place: Place) -> Edit:
 
 
 def _remembering(*, for_ever: bool) -> Callable[[Place], Edit]:
-    """The values of the first message for ever, or those of the message before."""
+    """Return an edit that repeats the first message's value for ever, or always the previous message's value."""
 
     def make(_place: Place) -> Edit:
         kept: list[Any] = []
@@ -140,7 +140,7 @@ def _remembering(*, for_ever: bool) -> Callable[[Place], Edit]:
 
 
 def single(value: float) -> float:
-    """A number as it comes out of a 32-bit float."""
+    """Return a number rounded to a 32-bit float."""
     return float(struct.unpack("f", struct.pack("f", value))[0])
 
 
@@ -165,7 +165,7 @@ def _clamped(value: float) -> float:
 
 
 def _coerced(value: Any) -> Any:
-    """Zero for what is no finite number."""
+    """Return zero for any value that is not a finite number, and numbers unchanged."""
     if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
         raise TypeError
     return 0

@@ -1,4 +1,4 @@
-"""Where a mutant can be: the fields of requests and responses, enumerated from a contract pack's descriptions."""
+"""Enumerate where a generated mutant can be: the fields of requests and responses in a pack's descriptions."""
 
 import re
 from collections.abc import Iterator
@@ -27,16 +27,16 @@ _INTEGERS = {"int", "unsignedInt", "integer", "long", "short"}
 
 @dataclass(frozen=True)
 class Exchange:
-    """One operation of the device, over one interface.
+    """One operation of the device over one interface.
 
     Attributes:
-        name: operationId, or the name in the WSDL.
+        name: operationId, or the operation's name in the WSDL.
         side: "rest" or "soap".
-        method: of HTTP.
-        path: matches its path, with a group for each parameter; empty for SOAP.
-        parameters: the names of the parameters in its path.
-        classes: the pack's conformance classes that can see a change in it, the one that it belongs to first.
-        statuses: what the description declares.
+        method: HTTP method.
+        path: pattern of its path with a group for each parameter; empty for SOAP.
+        parameters: names of its path parameters.
+        classes: conformance classes of the pack that read its messages, the operation's own class first.
+        statuses: statuses that the description declares.
         formats: media types of a successful response.
     """
 
@@ -51,11 +51,11 @@ class Exchange:
 
     @property
     def class_(self) -> str:
-        """The conformance class that it belongs to."""
+        """Return the conformance class that the operation belongs to."""
         return self.classes[0]
 
     def concerns(self, request: Request) -> bool:
-        """Whether a request is for this operation."""
+        """Return whether a request is for this operation."""
         if self.side == "soap":
             return soap(self.name)(request)
         return (
@@ -67,17 +67,17 @@ class Exchange:
 
 @dataclass(frozen=True)
 class Place:
-    """A field.
+    """A field of an operation's request or response.
 
     Attributes:
         exchange: the operation.
-        part: "answer" (of a response) or "request".
-        medium: how it is written: json, xml, soap, path or query.
-        steps: names from the top, ``[]`` for the items of a list.
+        part: "answer" (the response) or "request".
+        medium: notation of the message: json, xml, soap, path or query.
+        steps: names from the message's root to the field, ``[]`` for the items of a list.
         kind: number, integer, boolean, string, object or array.
-        siblings: names of the fields beside it that have the same kind, itself left out.
-        required: whether it has to be there.
-        example: the description's example of it, or None.
+        siblings: names of the other fields of the same kind in the same object.
+        required: whether the description requires the field.
+        example: the description's example value, or None.
     """
 
     exchange: Exchange
@@ -91,15 +91,16 @@ class Place:
 
     @property
     def label(self) -> str:
-        """Its name in that of a mutant, as ``answer.position.x``."""
+        """Return the field's part of a mutant's name, such as ``answer.position.x``."""
         return ".".join((self.part, *self.steps)).replace("." + ITEM, ITEM)
 
 
 def classes_of(contract: Contract, operation: str, interface: Interface) -> tuple[str, ...]:
-    """Return the classes that can see a change in an operation, the one that it belongs to first.
+    """Return the conformance classes whose checks read an operation's messages, the operation's own class first.
 
-    A pack may say it (SelfTest.classes). Otherwise they are the classes of its own that judge the interface, and what
-    judges the description; for a pack without classes of its own, all that judge the interface.
+    A pack may name them (SelfTest.classes). Otherwise they are the pack's own classes that judge the interface,
+    followed
+    by those that judge the description; for a pack without own classes, all that judge the interface.
     """
     if said := self_test_of(contract).classes_of(operation):
         return said
@@ -110,7 +111,7 @@ def classes_of(contract: Contract, operation: str, interface: Interface) -> tupl
 
 @cache
 def exchanges(contract: Contract) -> tuple[Exchange, ...]:
-    """Return every operation of a contract, REST's first."""
+    """Return every operation of a contract, REST before SOAP."""
     found = [_rest(contract, operation) for operation in operations_of(contract)]
     for interface, description in _services(contract):
         for operation in description.operations:
@@ -150,7 +151,7 @@ def _rest(contract: Contract, operation: Operation) -> Exchange:
 
 @cache
 def places(contract: Contract) -> tuple[Place, ...]:
-    """Return every field of every operation, in every form that the contract describes."""
+    """Return every field of every operation, once for each notation that the contract describes."""
     by_name = {exchange.name: exchange for exchange in exchanges(contract)}
     found: list[Place] = []
     for operation in operations_of(contract):
@@ -192,7 +193,7 @@ def _of_schema(exchange: Exchange, part: str, medium: str, schema: Schema, examp
 
 
 def _walk(schema: Schema, steps: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Schema, tuple[str, ...], bool]]:
-    """Steps, schema, siblings and whether it is required, for each field below a schema."""
+    """Yield for each field in a schema its path, its schema, its siblings' names and whether it is required."""
     schema = flat(schema)
     properties: dict[str, Schema] = {name: flat(item) for name, item in schema.get("properties", {}).items()}
     for name, item in properties.items():

@@ -1,4 +1,4 @@
-"""What a self-test reports of mutants by rule: in selftest.json, for people, and on the page on coverage."""
+"""Report the results of generated mutants: in selftest.json, on the terminal, and in docs/coverage.md."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -26,7 +26,10 @@ def _figures(rate: Rate) -> dict[str, Any]:
 
 
 def document(contract: Contract, results: Iterable[GeneratedResult], seed: int) -> dict[str, Any]:
-    """Return the part of selftest.json on mutants by rule; ``at_least`` is the lower end of Wilson's 95 % interval."""
+    """Return the part of selftest.json on generated mutants.
+
+    ``at_least`` is the lower bound of Wilson's 95 % interval of the kill rate.
+    """
     results = list(results)
     return {
         "exist": len(generated_mutants(contract)),
@@ -52,7 +55,7 @@ def document(contract: Contract, results: Iterable[GeneratedResult], seed: int) 
 
 
 def summary(contract: Contract, results: Iterable[GeneratedResult]) -> str:
-    """Return what a person wants to know: the rates, then every survivor."""
+    """Return the rates and the list of survivors for the terminal."""
     results = list(results)
     lines = [f"Mutants by rule killed: {rate_of(results).words()}; {len(generated_mutants(contract))} exist"]
     if warned := sum(result.outcome == KILLED and not result.fails for result in results):
@@ -76,15 +79,15 @@ def rates_page(
     theirs: Mapping[str, bool],
     notes: Iterable[str],
 ) -> str:
-    """Return a page of the rates, for selftest.md and docs/caught.md.
+    """Return a Markdown page with the rates, for selftest.md and docs/caught.md.
 
     Args:
         contract: the pack.
-        results: of each mutant.
-        target: the good device behind them.
-        seed: of the sample.
-        theirs: whether plain Schemathesis killed it, by name, of those that it was tried on.
-        notes: remarks in the end.
+        results: result of each mutant.
+        target: the good device behind the mutants.
+        seed: seed of the sample.
+        theirs: by mutant's name, whether plain Schemathesis killed it, for those it was run on.
+        notes: remarks at the end of the page.
     """
     results = list(results)
     pack = "" if contract.name == DEFAULT_PACK else f" --contract {contract.name}"
@@ -123,7 +126,7 @@ def rates_page(
 
 
 def page_part(contract: Contract) -> list[str]:
-    """Return lines of the page on coverage: how many there are, and what the rules make that breaks no clause."""
+    """Return lines for docs/coverage.md: the number of generated mutants, and the changes that break no clause."""
     mutants = generated_mutants(contract)
     operators = Counter(mutant.operator.partition("@")[0] for mutant in mutants)
     left = Counter(open_place(contract, change) for change in every_change(contract))

@@ -1,4 +1,4 @@
-"""A sample of the mutants by rule that has every operator and every class in it, and what it says of all."""
+"""Draw a stratified sample of the generated mutants, and estimate the kill rate of all from it."""
 
 import math
 import random
@@ -15,9 +15,9 @@ _Z: Final = 1.959964
 
 
 def sample(mutants: Iterable[GeneratedMutant], number: int, seed: int) -> list[GeneratedMutant]:
-    """Return ``number`` mutants (all, if there are no more), one of each stratum (operator, class) in turn.
+    """Return ``number`` mutants (or all, if there are fewer), taking one of each stratum (operator, class) in turn.
 
-    The strata are dealt out in random order, so that a small sample leaves out others with each seed.
+    The strata are in random order, so that small samples with different seeds leave out different strata.
     """
     dice = random.Random(seed)  # noqa: S311 - a sample that can be drawn again, nothing secret
     strata: dict[tuple[str, str], list[GeneratedMutant]] = defaultdict(list)
@@ -36,10 +36,12 @@ def sample(mutants: Iterable[GeneratedMutant], number: int, seed: int) -> list[G
 
 @dataclass(frozen=True)
 class Rate:
-    """How many of the mutants that altered something were killed.
+    """The kill rate of those mutants that altered at least one message.
 
     Attributes:
-        killed: how many; survived: how many were not; not_reached: how many altered nothing, and do not count.
+        killed: number of mutants killed.
+        survived: number of mutants that survived.
+        not_reached: number of mutants that altered no message; they do not count.
     """
 
     killed: int
@@ -48,17 +50,17 @@ class Rate:
 
     @property
     def share(self) -> float:
-        """Killed of those that altered something; 1 where none did."""
+        """Return killed / (killed + survived); 1 where both are zero."""
         return self.killed / self.reached if self.reached else 1.0
 
     @property
     def reached(self) -> int:
-        """How many altered something."""
+        """Return the number of mutants that altered at least one message."""
         return self.killed + self.survived
 
     @property
     def bound(self) -> float:
-        """The lower end of Wilson's 95 % interval for the share (E. B. Wilson, JASA 22, 1927)."""
+        """Return the lower bound of Wilson's 95 % interval for the share (E. B. Wilson, JASA 22, 1927)."""
         n, p = self.reached, self.share
         if not n:
             return 0.0
@@ -66,19 +68,19 @@ class Rate:
         return (centre - _Z * math.sqrt(p * (1 - p) / n + _Z**2 / (4 * n**2))) / (1 + _Z**2 / n)
 
     def words(self) -> str:
-        """For people."""
+        """Return the rate as a phrase for people."""
         reached = f"{self.killed} of {self.reached} ({self.share:.1%}, at least {self.bound:.1%})"
         return f"{reached}, {self.not_reached} not reached" if self.not_reached else reached
 
 
 def rate_of(results: Iterable[GeneratedResult]) -> Rate:
-    """Return the rate of some results."""
+    """Return the kill rate of some results."""
     outcomes = [result.outcome for result in results]
     return Rate(outcomes.count(KILLED), outcomes.count(SURVIVED), outcomes.count(NOT_REACHED))
 
 
 def rates_by(results: Iterable[GeneratedResult], key: str) -> dict[str, Rate]:
-    """Return rates by ``operator`` (with its mode), ``class`` or ``effort`` (of the last run)."""
+    """Return kill rates grouped by ``operator`` (with its mode), ``class`` or ``effort`` (of the last run)."""
     groups: dict[str, list[GeneratedResult]] = defaultdict(list)
     for result in results:
         mutant = result.mutant

@@ -1,4 +1,4 @@
-"""A field of one message at hand, to be read and altered, whether it stands in JSON, XML, a path or a query."""
+"""Read and alter one field of one message in place, in JSON, in XML, in a path or in a query."""
 
 from __future__ import annotations
 
@@ -20,97 +20,97 @@ _NUMERIC = {"number", "integer"}
 
 
 class UnusualError(ValueError):
-    """A message that a reader and a writer would make another one of: it is left alone."""
+    """A message that would change by being parsed and written again; no mutant alters it."""
 
 
 class Slot(Protocol):
-    """A field that is there."""
+    """A field that is present in a message."""
 
     def value(self) -> Any:
-        """What it holds: a number, a text, or a copy of all that is in it."""
+        """Return the field's value: a number, a text, or a copy of an object or list."""
 
     def put(self, value: Any) -> None:
-        """Give it another value, None for none."""
+        """Replace the value; None writes null."""
 
     def drop(self) -> None:
-        """Take it out."""
+        """Remove the field from the message."""
 
     def rename(self, name: str) -> None:
-        """Give it another name."""
+        """Replace the field's name."""
 
     def double(self) -> None:
-        """Write it a second time."""
+        """Write the field a second time."""
 
     def beside(self, name: str) -> Slot | None:
-        """The field of that name beside it."""
+        """Return the field of that name in the same object, or None."""
 
 
 class JsonSlot:
-    """A member of a JSON object, or of the parameters of a target."""
+    """A member of a JSON object, or a parameter of a path or query."""
 
     def __init__(self, container: dict[str, Any], name: str) -> None:
         self._container, self._name = container, name
 
     def value(self) -> Any:
-        """See Slot."""
+        """Return the member's value, copied."""
         return copy.deepcopy(self._container[self._name])
 
     def put(self, value: Any) -> None:
-        """See Slot."""
+        """Replace the member's value."""
         self._container[self._name] = value
 
     def drop(self) -> None:
-        """See Slot."""
+        """Remove the member."""
         del self._container[self._name]
 
     def rename(self, name: str) -> None:
-        """See Slot."""
+        """Replace the member's name."""
         self._container[name] = self._container.pop(self._name)
 
     def double(self) -> None:
-        """See Slot."""
+        """Write the member's name twice into the object."""
         self._container[_AGAIN + self._name] = self._container[self._name]
 
     def beside(self, name: str) -> JsonSlot | None:
-        """See Slot."""
+        """Return another member of the same object, or None."""
         return JsonSlot(self._container, name) if name in self._container else None
 
 
 class TextSlot(JsonSlot):
-    """A parameter of a target, whose value is a text that may say a number."""
+    """A parameter of a path or query, whose text may be a number."""
 
     def __init__(self, container: dict[str, Any], name: str, kind: str) -> None:
         super().__init__(container, name)
         self._kind = kind
 
     def value(self) -> Any:
-        """See Slot."""
+        """Return the parameter as a number where its text is one, else as text."""
         return _read(self._container[self._name], self._kind)
 
     def put(self, value: Any) -> None:
-        """See Slot."""
+        """Replace the parameter's text."""
         self._container[self._name] = written(value)
 
     def beside(self, name: str) -> TextSlot | None:
-        """See Slot."""
+        """Return another parameter of the same target, or None."""
         return TextSlot(self._container, name, self._kind) if name in self._container else None
 
 
 class XmlSlot:
-    """Elements of one name below one element: several, where it is a list."""
+    """The child elements of one name below one element: several where the field is a list."""
 
     def __init__(self, parent: etree._Element, nodes: list[etree._Element], kind: str) -> None:
         self._parent, self._nodes, self._kind = parent, nodes, kind
 
     def value(self) -> Any:
-        """See Slot."""
+        """Return the elements' value, as JSON would have it."""
         if self._kind == "array":
             return [copy.deepcopy(node) for node in self._nodes]
         node = self._nodes[0]
         return copy.deepcopy(node) if self._kind == "object" else _read(node.text or "", self._kind)
 
     def put(self, value: Any) -> None:
-        """See Slot."""
+        """Replace the elements' content."""
         if isinstance(value, list):
             at = self._parent.index(self._nodes[0])
             tail = [copy.deepcopy(node) for node in value]
@@ -128,28 +128,28 @@ class XmlSlot:
                 node.text = written(value)
 
     def drop(self) -> None:
-        """See Slot."""
+        """Remove the elements."""
         for node in self._nodes:
             self._parent.remove(node)
 
     def rename(self, name: str) -> None:
-        """See Slot."""
+        """Replace the elements' local name."""
         for node in self._nodes:
             node.tag = etree.QName(etree.QName(node).namespace, name).text
 
     def double(self) -> None:
-        """See Slot."""
+        """Write the elements a second time."""
         for node in self._nodes:
             node.addnext(copy.deepcopy(node))
 
     def beside(self, name: str) -> XmlSlot | None:
-        """See Slot."""
+        """Return the sibling elements of that name, or None."""
         nodes = _children(self._parent, name)
         return XmlSlot(self._parent, nodes, self._kind) if nodes else None
 
 
 def _read(text: str, kind: str) -> Any:
-    """A number where the field is one and the text says so; else the text."""
+    """Return the text as a number where the field is a number and the text is one; else the text."""
     if kind in _NUMERIC:
         try:
             return int(text) if kind == "integer" else float(text)
@@ -159,14 +159,14 @@ def _read(text: str, kind: str) -> Any:
 
 
 def written(value: Any) -> str:
-    """A value as XML and targets have it."""
+    """Return a value as text for XML, paths and queries."""
     if value is None:
         return ""
     return repr(value) if isinstance(value, float) else str(value)
 
 
 def same(one: Any, other: Any) -> bool:
-    """Whether no reader could tell two values of a field apart: numbers by value, the rest by what is written."""
+    """Return whether two values of a field are equal: numbers by value, all else by their text."""
     if etree.iselement(one) or etree.iselement(other):
         both = etree.iselement(one) and etree.iselement(other)
         return both and bool(etree.tostring(one, with_tail=False) == etree.tostring(other, with_tail=False))
@@ -180,9 +180,9 @@ Edit = Callable[[list[Slot]], bool]
 
 
 def edit_message(place: Place, message: Request | Response, edit: Edit) -> bool:
-    """Alter the place in a message. Returns whether anything became another.
+    """Alter the field in a message, and return whether the message changed.
 
-    What cannot be read as this medium, or would not survive reading and writing (a name twice, a DTD), stays as it is.
+    A message that cannot be parsed, or that parsing and writing would change (a name twice, a DTD), stays as it is.
     """
     try:
         if isinstance(message, Request) and place.medium in {"path", "query"}:
@@ -257,7 +257,7 @@ def _in_xml(place: Place, message: Request | Response, edit: Edit) -> bool:
 
 
 def _children(parent: etree._Element, name: str) -> list[etree._Element]:
-    """Children with a local name; all, where it is empty."""
+    """Return the child elements with a local name; all, where the name is empty."""
     elements = [node for node in parent if isinstance(node.tag, str)]
     return [node for node in elements if not name or etree.QName(node).localname == name]
 
@@ -267,7 +267,7 @@ def _nested(nodes: list[etree._Element]) -> bool:
 
 
 def _items(parents: list[etree._Element]) -> list[etree._Element]:
-    """The items of lists that are written as one element each, or nested in one."""
+    """Return the items of lists, whether each is an element of its own or nested in one list element."""
     found: list[etree._Element] = []
     for parent in parents:
         found += _children(parent, "") if _nested([parent]) and len(parent) else [parent]

@@ -1,1 +1,1 @@
-"""Web servers that robots stand behind: each in front of a good robot, with its defaults."""
+"""Web servers with default settings (nginx, HAProxy and others) that stand in front of a good robot in controls."""

@@ -1,4 +1,4 @@
-"""Starting a web server in front of a robot, with one port each for REST and SOAP, and stopping it again."""
+"""Start a web server in front of a robot, with one port for REST and one for SOAP, and stop it."""
 
 import contextlib
 import socket
@@ -20,14 +20,14 @@ _START_S = 20.0
 
 @dataclass(frozen=True)
 class Ports:
-    """Where a front listens on loopback, and which robot is behind it."""
+    """The loopback ports on which a web server listens, and the robot behind it."""
 
     rest: int
     soap: int
     robot: Robot
 
     def values(self, folder: Path) -> dict[str, str]:
-        """Return what the configurations name with a dollar sign; a device without SOAP has REST on both ports."""
+        """Return the values of the variables in a server's configuration; without SOAP both ports lead to REST."""
         wsdl = self.robot.publishers or self.robot.subscribers
         rest, soap = (urlsplit(url).netloc for url in (self.robot.rest, wsdl or self.robot.rest))
         return {
@@ -46,9 +46,10 @@ class Front:
     """A web server that can stand in front of a robot.
 
     Attributes:
-        name: its name; says: what it is, in a few words.
-        command: makes what starts it in the foreground, from the ports and a folder that is its own; raises
-            NotInstalledError where it is not there.
+        name: its name.
+        says: a short description.
+        command: returns the command that starts the server in the foreground, from the ports and a folder of its own;
+            raises NotInstalledError where the server is not installed.
     """
 
     name: str
@@ -94,11 +95,11 @@ FRONTS = (
 
 @contextlib.contextmanager
 def behind(front: Front, robot: Robot) -> Iterator[Robot]:
-    """Put a web server before a robot; yield the robot as clients reach it then.
+    """Start a web server in front of a robot; yield the robot with the server's addresses.
 
     Raises:
-        NotInstalledError: the server is not there.
-        RobotError: it does not start.
+        NotInstalledError: the server is not installed.
+        RobotError: the server does not start.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -1,1 +1,1 @@
-"""This contract's robot: how it is read, driven and stopped; goals, plans, deliveries; the ROS probe."""
+"""How the suite reads, drives and stops a robot of this contract; goals, plans, deliveries and the ROS probe."""

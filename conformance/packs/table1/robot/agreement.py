@@ -1,4 +1,4 @@
-"""Whether a value read in between two others is what they say: for states that may change while they are read."""
+"""Compare a value with the values read before and after it, for states that may change between reads."""
 
 import json
 from dataclasses import dataclass
@@ -10,16 +10,16 @@ from conformance.documents.json_text import shown
 
 @dataclass(frozen=True)
 class Slack:
-    """How far a number may lie outside what was read before and after it, where that was not the same twice."""
+    """How far a number may lie outside the two numbers read before and after it, when those two differ."""
 
     absolute: float = 0.02
     relative: float = 0.05
 
 
 def disagreement(before: Any, between: Any, after: Any, slack: Slack, where: str = "") -> str:
-    """Return in what ``between`` contradicts both its neighbours; empty where it does not.
+    """Return a description of where ``between`` differs from both neighbours, or an empty text.
 
-    Compared are the fields that all three have. A stamp that goes on is left to the caller.
+    Only fields that all three values have are compared. The caller must remove stamps, which advance between reads.
     """
     if isinstance(before, dict) and isinstance(after, dict):
         return _in_fields(before, between, after, slack, where)
@@ -55,7 +55,7 @@ def _in_fields(before: dict[str, Any], between: Any, after: dict[str, Any], slac
 
 
 def _turned(quaternion: Any, like: Any) -> Any:
-    """Return a quaternion, or its negative if that is nearer to another one; return other values as they are."""
+    """Return a quaternion or its negative, whichever is nearer to ``like``; return other values unchanged."""
     try:
         aside = sum(float(quaternion[axis]) * float(like[axis]) for axis in "xyzw") < 0
         return {**quaternion, **{axis: -quaternion[axis] for axis in "xyzw"}} if aside else quaternion
@@ -77,14 +77,14 @@ def _in_lists(before: list[Any], between: Any, after: list[Any], slack: Slack, w
 
 
 def unstamped(value: Any) -> Any:
-    """Return a copy of a message without its stamps, which may differ between responses."""
+    """Return a copy of a message without timestamps, which may legitimately differ between responses."""
     if isinstance(value, dict):
         return {name: unstamped(item) for name, item in value.items() if name != "stamp"}
     return [unstamped(item) for item in value] if isinstance(value, list) else value
 
 
 def stamp_of(message: Any) -> tuple[float, float]:
-    """Return the stamp in a message's header, (sec, nanosec); zeros where it cannot be read."""
+    """Return the timestamp (sec, nanosec) in a message's header; zeros where it cannot be read."""
     header = message.get("header") if isinstance(message, dict) else None
     stamp = header.get("stamp") if isinstance(header, dict) else None
     if not isinstance(stamp, dict) or not is_number(stamp.get("sec")) or not is_number(stamp.get("nanosec")):
@@ -93,5 +93,5 @@ def stamp_of(message: Any) -> tuple[float, float]:
 
 
 def entries_of(listed: list[Any], names: tuple[str, ...]) -> list[str]:
-    """Return a list of entries in a form that can be compared, whatever its order."""
+    """Return the given fields of each list entry as sorted texts, so that lists compare equal in any order."""
     return sorted(json.dumps([entry.get(name) for name in names]) for entry in listed)

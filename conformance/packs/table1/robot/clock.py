@@ -1,4 +1,4 @@
-"""How fast a robot's clock goes, by the stamps of its odometry and the clock on the wall."""
+"""Measure how fast a robot's clock runs, by comparing its odometry stamps with the local clock."""
 
 from statistics import median
 from typing import Final
@@ -19,7 +19,7 @@ _HARDLY: Final = 0.1
 
 
 class Clock:
-    """Stamps and when they were read, from the whole of a run."""
+    """The odometry stamps of a whole run, each with the local time at which it was read."""
 
     def __init__(self) -> None:
         self._readings: list[tuple[float, float]] = []
@@ -27,7 +27,7 @@ class Clock:
         self._first: list[tuple[float, float]] = []
 
     def take(self, at: float, stamp: float) -> None:
-        """Take a reading: the time on the wall and the robot's own, s."""
+        """Add a reading: the local time and the robot's stamp, s."""
         if self._readings and at < self._readings[-1][0] + self._every:
             return
         self._readings.append((at, stamp))
@@ -38,15 +38,15 @@ class Clock:
 
     @property
     def span_s(self) -> float:
-        """From the first reading to the last, s."""
+        """Return the time from the first reading to the last, s."""
         return self._readings[-1][0] - self._readings[0][0] if self._readings else 0.0
 
     @property
     def rate(self) -> float | None:
-        """How fast the robot's clock goes in comparison with the one on the wall; None before enough was read.
+        """Return robot seconds per local second; None while there are too few readings.
 
-        The median over all pairs of readings that are at least half of the span apart (Theil and Sen), so that neither
-        a late answer nor a clock that was once set right counts.
+        The rate is the median over all pairs of readings at least half of the span apart (Theil-Sen estimator), so that
+        neither a slow response nor one correction of the robot's clock changes it.
         """
         if self.span_s < SPAN_S:
             return None
@@ -60,10 +60,13 @@ class Clock:
 
     @property
     def fine_rate(self) -> float | None:
-        """The rate within a second: the median over readings that are near each other; None where too few tell.
+        """Return the clock's rate within a second; None where there are too few readings.
 
-        Of odometry that is slow, two readings may have the same stamp: those say nothing. A stamp whose nanoseconds are
-        counted in milliseconds has the right rate over many seconds, and hardly one in between.
+        The rate is the median over pairs of near readings. Pairs with the same stamp do not count: odometry may be
+        published
+        slowly. A robot that writes milliseconds into the nanoseconds field has the right rate over many seconds and
+        almost none
+        within one.
         """
         near = [
             (later - earlier) / (there - here)
@@ -74,11 +77,11 @@ class Clock:
         return median(near) if len(near) >= _ENOUGH else None
 
     def is_right(self, time_scale: float) -> bool:
-        """Return whether the rate is the declared one within 5 %, and what the odometry's age may come to."""
+        """Return whether the rate is within 5 % of the declared time scale, so that odometry ages can be computed."""
         rate = self.rate
         return rate is not None and abs(rate - time_scale) <= time_scale * (_SHARE + _OLDER_S / self.span_s)
 
     def stands_between(self, time_scale: float) -> bool:
-        """Return whether the stamps hardly advance within a second, and leap from one to the next."""
+        """Return whether the stamps hardly advance within each second and jump from one second to the next."""
         fine = self.fine_rate
         return fine is not None and abs(fine) < time_scale * _HARDLY

@@ -1,4 +1,4 @@
-"""What several clients put at one moment, and what the robot then showed, as values that can be judged without it."""
+"""Records of what several clients PUT at the same moment and of what the robot then showed, for rules to judge."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class GoalRead:
     """A GET of the goal.
 
     Attributes:
-        exchange: the evidence.
-        differs: in what the goal differs from each that was put; empty: it is one of them.
+        exchange: the GET's request and response.
+        differs: how the goal differs from each goal that was PUT; empty when it equals one of them.
     """
 
     exchange: Exchange
@@ -33,12 +33,12 @@ class GoalRead:
 
 @dataclass(frozen=True)
 class ConcurrentGoal:
-    """One new goal that several clients put at one moment.
+    """Several clients' simultaneous PUTs of one new goal.
 
     Attributes:
-        puts: of the clients that the robot had time for.
-        read: the goal after that; None: it may have ended before it could be read.
-        cancelled: each GET for a while after the goal was cancelled, up to one that shows the goal once more.
+        puts: the PUTs that the robot did not answer with 429 or 503.
+        read: the goal afterwards; None when it may have ended before it could be read.
+        cancelled: the GETs after the goal was cancelled, up to the first that shows the goal again.
     """
 
     puts: tuple[Exchange, ...]
@@ -48,11 +48,11 @@ class ConcurrentGoal:
 
 @dataclass(frozen=True)
 class Accepted:
-    """A velocity that was accepted.
+    """A velocity that the robot accepted.
 
     Attributes:
-        velocity: the velocity that was put.
-        exchange: of the PUT.
+        velocity: the velocity in the PUT.
+        exchange: the PUT's request and response.
     """
 
     velocity: Velocity
@@ -64,9 +64,9 @@ class VelocityRead:
     """A GET of the velocity.
 
     Attributes:
-        sent, received: when, s of the run's clock.
-        velocity: the measured one; None: it could not be read.
-        exchange: the evidence.
+        sent, received: times of request and response, s of the run's clock.
+        velocity: the measured velocity; None where the response cannot be read.
+        exchange: the GET's request and response.
     """
 
     sent: float
@@ -77,13 +77,13 @@ class VelocityRead:
 
 @dataclass(frozen=True)
 class ConcurrentVelocities:
-    """Different velocities that several clients put at one moment to a robot at rest.
+    """Several clients' simultaneous PUTs of different velocities to a robot at rest.
 
     Attributes:
-        accepted: those that the robot accepted.
-        sent, answered: when the first was sent and the last was answered, s of the run's clock.
-        reads: of the velocity, up to one that shows an accepted velocity, or cannot be read.
-        last: whether these velocities are not put again if the reads do not show what the robot does.
+        accepted: the velocities that the robot accepted.
+        sent, answered: time of the first request and of the last response, s of the run's clock.
+        reads: GETs of the velocity, up to the first that shows an accepted velocity or cannot be read.
+        last: whether this is the last try: reads that show no accepted velocity then count as a failure.
     """
 
     accepted: tuple[Accepted, ...]
@@ -93,32 +93,33 @@ class ConcurrentVelocities:
     last: bool
 
     def read(self, one: VelocityRead) -> ConcurrentVelocities:
-        """Return this with one more read of the velocity."""
+        """Return a copy with one more GET of the velocity."""
         return replace(self, reads=(*self.reads, one))
 
     def settled(self, limits: Limits) -> float:
-        """Return from when on the robot has to do one of the velocities, s of the run's clock."""
+        """Return the time from which the robot must drive one of the velocities, s of the run's clock."""
         return self.answered + _SETTLED * limits.settle_s
 
     def ends(self, limits: Limits) -> float:
-        """Return until when that velocity certainly holds, s of the run's clock.
+        """Return the time until which the robot must hold that velocity, s of the run's clock.
 
-        The robot may have taken it up as soon as the first was sent, however late the others were answered.
+        It counts from the first request: the robot may have begun to drive before it answered the others.
         """
         return math.inf if limits.hold_s is None else self.sent + certain_s(limits.hold_s, JUDGED)
 
     def reached(self, limits: Limits) -> VelocityRead | None:
-        """Return the read that shows an accepted velocity, or None."""
+        """Return the GET that shows an accepted velocity, or None."""
         read = self.reads[-1] if self.reads else None
         if read is None or read.velocity is None:
             return None
         return read if any(is_near(limits, read.velocity, one.velocity, _NEAR) for one in self.accepted) else None
 
     def missed(self, limits: Limits) -> VelocityRead | None:
-        """Return the last read that shows another velocity while an accepted one had to be there, or None.
+        """Return the last GET that shows a wrong velocity while the robot had to drive an accepted one, or None.
 
-        The linear part of one client with the angular part of another counts at once. Another velocity counts only on
-        the last try: the robot may have been held up.
+        A mixture (one client's linear part with another's angular part) counts at once. Any other velocity counts only
+        on the
+        last try, since the robot may have been delayed.
         """
         settled, ends = self.settled(limits), self.ends(limits)
         if self.reached(limits) is not None or self.is_unreadable:
@@ -130,16 +131,16 @@ class ConcurrentVelocities:
 
     @property
     def is_unreadable(self) -> bool:
-        """Whether the velocity could not be read in the end, which the observers have judged."""
+        """Return whether the last GET of the velocity cannot be read; the observers have judged that response."""
         return bool(self.reads) and self.reads[-1].velocity is None
 
     def is_decided(self, limits: Limits) -> bool:
-        """Return whether there is nothing to put again."""
+        """Return whether the velocities need not be PUT again."""
         shown = self.reached(limits) is not None or self.missed(limits) is not None
         return not self.accepted or self.is_unreadable or shown
 
     def _is_mixture(self, limits: Limits, measured: Velocity | None) -> bool:
-        """Return whether a velocity has the linear part of one client, and the angular part of another."""
+        """Return whether a velocity has the linear part of one client's PUT and the angular part of another's."""
         pairs = itertools.permutations((accepted.velocity for accepted in self.accepted), 2)
         mixtures = (Velocity(*one[:3], *other[3:]) for one, other in pairs)
         return measured is not None and any(is_near(limits, measured, mixture, _NEAR) for mixture in mixtures)

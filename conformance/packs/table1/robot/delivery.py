@@ -1,4 +1,4 @@
-"""Deliveries: their values, and the forms in which a client may write them."""
+"""The values of a delivery, and the notations in which a client may write them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _ONLY_DIGITS: Final = 1e15
 
 
 class Delivery(NamedTuple):
-    """A mybot_delivery_app/DeliveryRequestMsg; coordinates in metres."""
+    """The values of one delivery (mybot_delivery_app/DeliveryRequestMsg); coordinates in metres."""
 
     message_code: int
     depot_x: float
@@ -36,31 +36,31 @@ class Delivery(NamedTuple):
 
     @classmethod
     def of(cls, request: Mapping[str, Any]) -> Delivery:
-        """Return the delivery in JSON of the right shape."""
+        """Return the delivery in a JSON object with all of its fields."""
         return cls(int(request["message_code"]), *(float(request[name]) for name in cls._fields[1:]))
 
     @property
     def bits(self) -> bytes:
-        """The values bit for bit, so that two are equal only when no digit was lost, nor the sign of a zero."""
+        """Return the values as bytes, which are equal only when no digit and no sign of a zero was lost."""
         return struct.pack(">q6d", *self)
 
     @property
     def rest_path(self) -> str:
-        """The target of its PUT, each number in the shortest form that gives it back."""
+        """Return the path of its PUT, each number in the shortest notation that parses to the same double."""
         return path_of(str(self.message_code), *(repr(value) for value in self[1:]))
 
 
 def path_of(code: str, *coordinates: str) -> str:
-    """Return the target of a delivery PUT with values as they are written: code, depot, destination, source."""
+    """Return the path of a delivery's PUT from values already written as text: code, depot, destination, source."""
     pairs = "".join(f"/{name}/{value}" for name, value in zip(PATH_NAMES, coordinates, strict=True))
     return f"{DELIVERIES}{code}{pairs}"
 
 
 def put_delivery(api: RestInterface, path: str, *, fresh: bool = False, headers: Headers = ()) -> Exchange:
-    """Send a PUT of a delivery that has to be accepted.
+    """PUT a delivery that the robot must accept, and return the exchange.
 
     Raises:
-        HarnessError: it is not valid by the contract.
+        HarnessError: the path is not valid by the contract.
         NoAnswerError: no HTTP response came.
     """
     require_valid(api.run.contract, "PUT", path)
@@ -68,7 +68,7 @@ def put_delivery(api: RestInterface, path: str, *, fresh: bool = False, headers:
 
 
 def written(value: float) -> tuple[str, ...]:
-    """Return the forms in which the contract lets a number be written: sign, fraction and exponent, or not."""
+    """Return the notations of a number that the contract allows: with or without sign, fraction and exponent."""
     forms = [repr(value), f"{value:.17e}", f"{value:+.20e}"]
     if abs(value) < _ONLY_DIGITS:
         plain = f"{value:.30f}"
@@ -81,17 +81,17 @@ def written(value: float) -> tuple[str, ...]:
 
 
 def doubles() -> st.SearchStrategy[float]:
-    """Return finite doubles over their whole range, the corners often."""
+    """Return a strategy for finite doubles over their whole range that often draws the extremes."""
     return st.one_of(st.sampled_from(_KNOWN), st.floats(allow_nan=False, allow_infinity=False))
 
 
 def deliveries() -> st.SearchStrategy[Delivery]:
-    """Return deliveries of any finite coordinates."""
+    """Return a strategy for deliveries with any finite coordinates."""
     return st.builds(Delivery, st.sampled_from((COURIER, COFFEE)), *[doubles()] * len(PATH_NAMES))
 
 
 def lexical_deliveries() -> st.SearchStrategy[tuple[Delivery, tuple[str, ...]]]:
-    """Return deliveries with each value as it is to be written."""
+    """Return a strategy for deliveries, each with its values written in some allowed notation."""
 
     def forms(delivery: Delivery) -> st.SearchStrategy[tuple[Delivery, tuple[str, ...]]]:
         code = st.sampled_from((str(delivery.message_code), f"+{delivery.message_code}", f"0{delivery.message_code}"))

@@ -1,4 +1,4 @@
-"""The requests of this contract's SOAP services: values put into the shapes that its XSD has."""
+"""Build the requests of this contract's SOAP services, in the structure of its XSD."""
 
 from functools import cache
 from typing import Final
@@ -15,24 +15,24 @@ NAMESPACE: Final = "http://soap.turtlebot.mybot.org/"
 
 
 def request(operation: str, **values: float | str) -> Node:
-    """Return a request, its elements in the order of the XSD.
+    """Return a SOAP request with its elements in the order of the XSD.
 
     Args:
-        operation: its name.
-        values: by the element's name; numbers in the shortest form that gives them back, texts as written. An element
-            without a value is left out.
+        operation: the operation's name.
+        values: value of each element by name: numbers are written in the shortest exact notation, texts as they are. An
+            element without a value is left out.
     """
     texts = {name: value if isinstance(value, str) else repr(value) for name, value in values.items()}
     return filled(_shape(operation), texts)
 
 
 def delivery(operation: str = "ExecuteDeliveryRequest", code: str = "4", **coordinates: str) -> Node:
-    """Return a delivery request.
+    """Return a SOAP delivery request.
 
     Args:
         operation: ExecuteDeliveryRequest or ExecuteCoffeeRequest.
-        code: as written.
-        coordinates: those that differ from the paper's, as written.
+        code: the delivery code, as text.
+        coordinates: coordinates, as text, that differ from those of the paper's example.
     """
     return request(operation, **(EXAMPLE | coordinates), message_code=code)
 

@@ -1,4 +1,4 @@
-"""Driving a robot by its velocity: commands, watches and keeps a trace; drive_rules judges that."""
+"""Drive a robot by velocity commands and record a trace; drive_rules judges the trace."""
 
 import math
 from dataclasses import replace
@@ -24,10 +24,10 @@ _LAPSES: Final = 2
 
 
 class Drive:
-    """One drive, which feeds many requirements.
+    """Sends velocity commands and reads the robot's motion, and records both in one trace.
 
     Attributes:
-        trace: what was commanded and seen so far.
+        trace: the commands and readings so far.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -36,14 +36,14 @@ class Drive:
         self._turn_at = 0.0
 
     def command(self, velocity: Velocity, *, integers: bool = False) -> bool:
-        """Put a velocity; return whether the response is as in the contract.
+        """PUT a velocity; return whether the response conforms to the contract.
 
         Args:
-            velocity: within the limits.
+            velocity: a velocity within the robot's limits.
             integers: write whole numbers without a fraction.
 
         Raises:
-            NotPossibleError: a goal of the robot's own is active, so that it cannot be driven.
+            NotPossibleError: the robot pursues a goal, so that it cannot be driven.
         """
         sent = self.clock.now()
         if integers:
@@ -54,17 +54,17 @@ class Drive:
         return self._commanded(Command(velocity, sent, self.clock.now(), exchange, integers=integers))
 
     def command_linear(self, velocity: Velocity) -> bool:
-        """Put the linear part of a velocity; return whether the response is as in the contract.
+        """PUT the linear part of a velocity; return whether the response conforms to the contract.
 
         Raises:
-            NotPossibleError: a goal of the robot's own is active, so that it cannot be driven.
+            NotPossibleError: the robot pursues a goal, so that it cannot be driven.
         """
         sent = self.clock.now()
         exchange = self.robot.put_linear(velocity)
         return self._commanded(Command(velocity, sent, self.clock.now(), exchange, linear_only=True))
 
     def commanded(self, velocity: Velocity, sent: float, exchange: Exchange) -> None:
-        """Take down a command that somebody else gave, at a moment of the monotonic clock, as the last one."""
+        """Record a command that other code sent at the time ``sent`` (s of the run's clock) as the last command."""
         self.trace = self.trace.commanded(Command(velocity, sent, self.clock.now(), exchange))
 
     def _commanded(self, command: Command) -> bool:
@@ -74,7 +74,9 @@ class Drive:
         return drive_rules.answer_of(command).holds
 
     def _renew(self) -> None:
-        """Give the last command again, in the same way: a PUT of all components would do what it may have failed to."""
+        """Send the last command again to the same resource: a PUT of all components could hide a partial PUT's
+        fault.
+        """
         last = self.trace.last_command
         if last is None:
             return
@@ -86,27 +88,27 @@ class Drive:
 
     @property
     def holds_until(self) -> float:
-        """Until when the last command of all components certainly holds, s of the monotonic clock."""
+        """Return the time until which the robot must hold the last full command, s of the run's clock."""
         return self.trace.full_sent + certain_s(self.robot.limits.hold_s)
 
     @property
     def look_s(self) -> float:
-        """How long a look usually takes, s."""
+        """Return how long one look (a GET of each resource that shows the velocity) usually takes, s."""
         return _LOOK * self.robot.usual_s
 
     @property
     def _outlasts_hold(self) -> bool:
-        """Whether one look takes longer than a velocity holds, so that what is read need not be what was commanded."""
+        """Return whether one look takes longer than the robot holds a velocity."""
         hold_s = self.robot.limits.hold_s
         return hold_s is not None and self.look_s > hold_s
 
     def refresh(self, velocity: Velocity) -> None:
-        """Command a velocity again, and let it be reached where it had ended meanwhile."""
+        """Command a velocity again, and wait until the robot reaches it if it had ended in the meantime."""
         self.command(velocity)
         self.reach(velocity)
 
     def look(self) -> tuple[Velocity | None, Exchange]:
-        """Read odometry, velocity and its linear part; return the velocity."""
+        """GET odometry, velocity and linear velocity; return the velocity and its exchange."""
         wait = self._turn_at + _PACE_S - self.clock.now()
         if wait > 0:
             self.clock.sleep(wait)
@@ -118,13 +120,13 @@ class Drive:
         return velocity, exchange
 
     def _glance(self) -> None:
-        """Read the velocity, and nothing that it could be compared with."""
+        """GET the velocity alone, which is faster than a whole look."""
         at = self.clock.now()
         velocity, exchange = self.robot.velocity()
         self.trace = self.trace.looked(Turn(None, at, velocity, exchange, None, exchange))
 
     def stop(self, moving: Velocity) -> bool:
-        """Command a velocity once more and then zero; return whether the robot stops because of it, not by itself."""
+        """Renew a velocity, then command zero; return whether the command stops the robot, and not its watchdog."""
         if not self.command(moving) or not self.command(STILL):
             return False
         hold_s, settle_s = self.robot.limits.hold_s, self.robot.limits.settle_s
@@ -134,16 +136,17 @@ class Drive:
     def reach(
         self, wanted: Velocity, *ids: str, part: slice = ALL, within: float | None = None, since: float | None = None
     ) -> bool:
-        """Look until the velocity is the wanted one, or has to be; return whether it is.
+        """Look until the robot has the wanted velocity or its time to reach it is over; return whether it has it.
 
-        What is to be judged has to be shown by the median of several samples; what is only waited for, by one.
+        A velocity that is judged must be shown by the median of several samples; one that is only awaited, by one
+        sample.
 
         Args:
-            wanted: velocity.
-            ids: requirements that say that it comes to this, of any class.
+            wanted: the velocity.
+            ids: requirements, of any class, that say that the robot must reach it.
             part: the components that count.
-            within: another time than the settle time, s.
-            since: when what brings it about was answered, s of the monotonic clock; by default the last command.
+            within: time allowed, s; by default the settle time.
+            since: start of that time, s of the run's clock; by default the response to the last command.
         """
         limits = self.robot.limits
         patience = min(self.robot.settle_s, within or self.robot.settle_s)
@@ -185,17 +188,17 @@ class Drive:
     def sees(
         self, wanted: Velocity, factor: float = 1.0, *, part: slice = ALL, until: float = math.inf, alone: bool = False
     ) -> tuple[bool | None, str]:
-        """Look whether the velocity is what was wanted: once where it is, else until several samples tell.
+        """Look whether the robot has the wanted velocity: once where it has, else until several samples agree.
 
         Args:
-            wanted: velocity.
-            factor: how much of the tolerance it may be off.
+            wanted: the velocity.
+            factor: how many times the tolerance is allowed.
             part: the components that count.
-            until: from then on only that it is what was wanted says anything, s of the monotonic clock.
-            alone: ask for nothing else, which on a slow robot takes a third of the time.
+            until: after this time a different velocity proves nothing, s of the run's clock.
+            alone: read the velocity alone, which on a slow robot takes a third of the time.
 
         Returns:
-            Whether it is (None: it was too late to say), and what was seen.
+            Whether the robot has it (None: the readings came too late), and the velocity read.
         """
         first = len(self.trace.turns)
         last = self.clock.now() + _LONGER_S
@@ -210,32 +213,32 @@ class Drive:
                 return holds, str(windows.middle(seen)) if seen else ""
 
     def keep(self, seconds: float) -> None:
-        """Look for a while."""
+        """Look repeatedly for the given time, s."""
         until = self.clock.now() + seconds
         while self.clock.now() < until:
             self.look()
 
     def saw(self, shows: str, expected: str, observed: str = "", cause: str = "", *, holds: bool | None) -> None:
-        """Take down what the last look shows of a requirement; the arguments are those of Sighting."""
+        """Record what the last look shows about a requirement; the arguments are those of Sighting."""
         exchange = self.trace.turns[-1].velocity_exchange
         seen = Sighting(shows, holds, exchange, expected, observed, cause)
         self.trace = replace(self.trace, sightings=(*self.trace.sightings, seen))
 
     def refused(self, shows: str, expected: str) -> None:
-        """Take down that the last command was refused, which a requirement forbids."""
+        """Record that the robot rejected the last command, which a requirement forbids."""
         exchange = self.trace.commands[-1].exchange
         seen = Sighting(shows, holds=False, exchange=exchange, expected=expected, cause=exchange.came)
         self.trace = replace(self.trace, sightings=(*self.trace.sightings, seen))
 
     @property
     def whole(self) -> Trace:
-        """The trace at the end of a drive whose way is to be judged."""
+        """Return the trace of a finished drive in which the pose is to be judged as well."""
         return replace(self.trace, outlasted=self._outlasts_hold)
 
 
 def _renewed_s(hold_s: float, settle_s: float) -> float:
-    """Return when a velocity that is not reached yet is given again, s after its command.
+    """Return after how many seconds a velocity that is not reached yet is commanded again.
 
-    Not before the robot has had its time, where the velocity lasts for that long and a while more.
+    Where the robot holds a velocity long enough, this is not before the settle time is over.
     """
     return max(0.6 * hold_s, settle_s + _PACE_S) if settle_s + _PACE_S < 0.75 * hold_s else 0.6 * hold_s

@@ -1,4 +1,4 @@
-"""What a drive shows of a robot: every function judges a trace, or a part of one, and talks to nobody."""
+"""Judge the trace of a drive. No function here sends anything to the robot."""
 
 import itertools
 import math
@@ -30,7 +30,7 @@ _WAY: Final = (f"{_RESOURCES}/pose-motion", f"{_RESOURCES}/pose-rotation")
 
 
 def judge_drive(judge: Judge, trace: Trace, limits: Limits, *, way: bool = False) -> None:
-    """Record all that a drive shows as evidence; ``way``: also whether the pose followed the velocity."""
+    """Judge a trace by all requirements on driving; ``way``: also whether the pose followed the velocity."""
     for requirement, outcome in every_outcome(trace, limits, way=way):
         match outcome:
             case Case():
@@ -47,20 +47,20 @@ def judge_drive(judge: Judge, trace: Trace, limits: Limits, *, way: bool = False
 
 
 def outcomes(requirement: str, trace: Trace, limits: Limits) -> Iterator[Outcome]:
-    """Yield what a drive shows of one requirement."""
+    """Yield the outcomes of a trace for one requirement."""
     readings, way = requirement in {*_AGREEMENT, _LIMITS_HOLD}, requirement in _WAY
     shown = every_outcome(trace, limits, way=way, readings=readings)
     return (one for id_, one in shown if id_ == requirement)
 
 
 def every_outcome(trace: Trace, limits: Limits, *, way: bool, readings: bool = True) -> Iterator[tuple[str, Outcome]]:
-    """Yield all that a drive shows, each with the id of its requirement.
+    """Yield all outcomes of a trace, each with the id of its requirement.
 
     Args:
-        trace: of the drive.
-        limits: of the robot.
-        way: whether the pose has to follow the velocity.
-        readings: whether what each reading shows counts: there are hundreds.
+        trace: the trace of the drive.
+        limits: the robot's limits.
+        way: whether the pose must follow the velocity.
+        readings: whether to include the outcomes of single readings, of which there are hundreds.
     """
     yield from ((_answered(one), answer_of(one)) for one in trace.commands if not one.renewal)
     if readings:
@@ -76,7 +76,7 @@ def every_outcome(trace: Trace, limits: Limits, *, way: bool, readings: bool = T
 
 
 def _readings(trace: Trace, limits: Limits) -> Iterator[tuple[str, Outcome]]:
-    """Yield what each reading shows together with those before it."""
+    """Yield the outcomes of each reading, compared with the readings before it."""
     for turns in range(1, len(trace.turns) + 1):
         seen = trace.upto(turns)
         yield from agreement(seen, limits)
@@ -87,7 +87,7 @@ def _readings(trace: Trace, limits: Limits) -> Iterator[tuple[str, Outcome]]:
 
 
 def _ways(trace: Trace, limits: Limits) -> Iterator[tuple[str, Outcome]]:
-    """Yield whether the pose followed the velocity."""
+    """Yield whether the pose followed the velocity, over each stretch of the drive."""
     for id_, case in zip(_WAY, way_and_turn(trace.odometry, trace.measured, limits.noise), strict=True):
         if trace.outlasted:
             yield id_, _OUTLASTED
@@ -96,13 +96,13 @@ def _ways(trace: Trace, limits: Limits) -> Iterator[tuple[str, Outcome]]:
 
 
 def _answered(command: Command) -> str:
-    """Return the id of the requirement on the response to a command."""
+    """Return the id of the requirement on the response to a velocity command."""
     name = "linear-put" if command.linear_only else "velocity-integers" if command.integers else "velocity-put"
     return f"{_RESOURCES}/{name}"
 
 
 def answer_of(command: Command) -> Case:
-    """Return whether a command was answered as the contract wants it: 204, or 200 with what was accepted."""
+    """Judge the response to a velocity command: it must be 204, or 200 with the accepted velocity."""
     answer = command.exchange.response
     kind, shape = ("Vector3", VECTOR3) if command.linear_only else ("Twist", TWIST)
     problem = "" if answer.status in {HTTPStatus.OK, HTTPStatus.NO_CONTENT} else command.exchange.came
@@ -113,7 +113,7 @@ def answer_of(command: Command) -> Case:
 
 
 def _other_number(command: Command, value: Any) -> str:
-    """Return the first component that was accepted with another number than was put; empty: there is none."""
+    """Return the first component that the response shows with another number than was PUT; empty if none."""
     given = {"linear": value} if command.linear_only else value
     for part, put in command.velocity.twist.items():
         for axis, number in put.items() if part in given else ():
@@ -124,10 +124,11 @@ def _other_number(command: Command, value: Any) -> str:
 
 
 def agreement(trace: Trace, limits: Limits) -> Iterator[tuple[str, Case]]:
-    """Yield whether velocity and linear part agree with the odometry: their medians while each was steady.
+    """Judge whether velocity and linear velocity agree with the odometry, by their medians while each was steady.
 
-    Only where no command was sent from that while's beginning on. Where answers take long it is as long as several
-    turns take. A robot that moves by itself may do so between two readings: what is read of it is then not steady.
+    Only readings without a command in between count. The window is long enough for several looks, also where responses
+    are
+    slow. A robot that moves by itself may do so between two reads: its readings are then not steady.
     """
     odometry = trace.turns[-SEVERAL].odometry if len(trace.turns) >= SEVERAL else None
     if odometry is None:
@@ -155,7 +156,7 @@ def agreement(trace: Trace, limits: Limits) -> Iterator[tuple[str, Case]]:
 
 
 def _is_steady(limits: Limits, readings: Sequence[Velocity]) -> bool:
-    """Return whether there are readings, all of them near their median."""
+    """Return whether there are readings and all of them are near their median."""
     return bool(readings) and all(is_near(limits, one, middle(readings), 0.5) for one in readings)
 
 
@@ -170,9 +171,9 @@ def _same(
 
 
 def speed(trace: Trace) -> Case | None:
-    """Return whether a robot without declared limits is no faster than it was commanded to be.
+    """Judge whether a robot without declared limits drives no faster than commanded.
 
-    None where there was no command, or too few samples that could be read.
+    Return None where there was no command or too few readable samples.
     """
     window = velocities(newest(trace.turns))
     if len(window) < SEVERAL or not trace.commands:
@@ -185,7 +186,7 @@ def speed(trace: Trace) -> Case | None:
 
 
 def arrival(trace: Trace, reach: Reach, limits: Limits) -> Case:
-    """Return whether a velocity was reached by the last turns of a wait, from its ``since`` on."""
+    """Judge whether the robot reached a velocity, by the last looks of the wait."""
     seen = trace.turns[: reach.turns]
     turns = [turn for turn in seen[-_LOOKED_AT:] if turn.at >= reach.since]
     window = velocities(newest(turns))
@@ -197,5 +198,5 @@ def arrival(trace: Trace, reach: Reach, limits: Limits) -> Case:
 
 
 def rounded(velocity: Velocity) -> Velocity:
-    """Return a velocity as it is shown."""
+    """Return a velocity rounded for display."""
     return Velocity(*(round(value, 4) for value in velocity))

@@ -1,4 +1,4 @@
-"""What was commanded and what was seen along one drive, as a value that can be judged without a robot."""
+"""The commands and readings of one drive, as data that rules can judge without a robot."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class Command:
 
     Attributes:
         velocity: the velocity that was sent.
-        sent, answered: s of the run's clock.
-        exchange: the evidence.
-        linear_only: whether only the linear part was put: the angular one need not last the longer for it.
+        sent, answered: times of request and response, s of the run's clock.
+        exchange: the PUT's request and response.
+        linear_only: whether only the linear part was PUT, which does not prolong the angular part.
         integers: whether whole numbers were written without a fraction.
-        renewal: whether it only repeats the one before, so that its velocity goes on.
+        renewal: whether it only repeats the command before it.
     """
 
     velocity: Velocity
@@ -35,14 +35,14 @@ class Command:
 
 @dataclass(frozen=True)
 class Turn:
-    """One reading of all resources that show the velocity, one after another.
+    """One look: a GET of each resource that shows the velocity, one after another.
 
     Attributes:
-        odometry: read first; None where it cannot be read.
-        at: when the velocity was requested, s of the run's clock.
-        velocity, linear: of their resources; None where they cannot be read.
-        velocity_exchange, linear_exchange: the evidence.
-        commands: how many commands had been given before.
+        odometry: the odometry, read first; None where it cannot be read.
+        at: when the GET of the velocity was sent, s of the run's clock.
+        velocity, linear: the values of these resources; None where they cannot be read.
+        velocity_exchange, linear_exchange: their requests and responses.
+        commands: number of commands sent before.
     """
 
     odometry: Odometry | None
@@ -56,16 +56,16 @@ class Turn:
 
 @dataclass(frozen=True)
 class Reach:
-    """A wait until the velocity is the commanded one.
+    """A wait until the robot has the commanded velocity.
 
     Attributes:
-        shows: ids of the requirements that say that it has to come to this.
+        shows: ids of the requirements that say that the robot must reach it.
         wanted: the velocity.
         part: the components that count.
-        since: readings before that do not count, s of the run's clock.
-        turns: how many turns there were at the end of the wait.
-        there: whether it was reached.
-        outlasted: whether a response takes longer than a velocity holds, so that nothing can be said where it was not.
+        since: readings before this time do not count, s of the run's clock.
+        turns: number of looks in the trace at the end of the wait.
+        there: whether the robot reached it.
+        outlasted: whether responses take longer than the robot holds a velocity: a miss then proves nothing.
     """
 
     shows: tuple[str, ...]
@@ -79,15 +79,15 @@ class Reach:
 
 @dataclass(frozen=True)
 class Sighting:
-    """A look whether the robot does what a requirement says.
+    """What one look shows about a requirement.
 
     Attributes:
         shows: id of the requirement.
-        holds: whether it does; None: the readings came too late to say.
+        holds: whether the robot meets it; None where the readings came too late to tell.
         exchange: the last reading.
-        expected: what the requirement asks for here.
-        observed: what was seen.
-        cause: sightings of one cause are one finding.
+        expected: what the requirement demands here.
+        observed: what the robot showed.
+        cause: sightings with the same cause become one finding.
     """
 
     shows: str
@@ -100,14 +100,14 @@ class Sighting:
 
 @dataclass(frozen=True)
 class Trace:
-    """One drive so far.
+    """The commands and readings of one drive so far.
 
     Attributes:
-        begun: when, s of the run's clock.
-        commands, turns, reaches, sightings: in their order.
-        odometry: of all turns in which it could be read.
-        measured: the velocity beside each of them; its own where the velocity's resource could not be read.
-        outlasted: whether a response takes longer than a velocity holds: then no way can be summed up.
+        begun: start of the drive, s of the run's clock.
+        commands, turns, reaches, sightings: all of these, in order.
+        odometry: the odometry of all looks in which it could be read.
+        measured: the velocity read with each odometry; the odometry's own where the velocity could not be read.
+        outlasted: whether responses take longer than the robot holds a velocity: the pose then cannot be predicted.
     """
 
     begun: float
@@ -120,11 +120,11 @@ class Trace:
     outlasted: bool = False
 
     def commanded(self, command: Command) -> Trace:
-        """Return the trace with one command more."""
+        """Return the trace with one more command."""
         return replace(self, commands=(*self.commands, command))
 
     def looked(self, turn: Turn) -> Trace:
-        """Return the trace with one turn more."""
+        """Return the trace with one more look."""
         longer = replace(self, turns=(*self.turns, replace(turn, commands=len(self.commands))))
         if turn.odometry is None:
             return longer
@@ -132,31 +132,31 @@ class Trace:
         return replace(longer, odometry=(*self.odometry, turn.odometry), measured=(*self.measured, velocity))
 
     def upto(self, turns: int) -> Trace:
-        """Return the trace as it was after so many turns."""
+        """Return the trace as it was after the given number of looks."""
         seen = self.turns[:turns]
         return replace(self, turns=seen, commands=self.commands[: seen[-1].commands] if seen else ())
 
     @property
     def sent(self) -> float:
-        """When the last command was sent."""
+        """Return the time at which the last command was sent."""
         return self.commands[-1].sent if self.commands else self.begun
 
     @property
     def last_full(self) -> Command | None:
-        """The last command of all components."""
+        """Return the last command of all components."""
         return next((one for one in reversed(self.commands) if not one.linear_only), None)
 
     @property
     def full_sent(self) -> float:
-        """When the last command of all components was sent."""
+        """Return the time at which the last command of all components was sent."""
         return self.last_full.sent if self.last_full else self.begun
 
     @property
     def last_command(self) -> Command | None:
-        """The last one that was no renewal; None before the first."""
+        """Return the last command that was no renewal; None before the first."""
         return next((one for one in reversed(self.commands) if not one.renewal), None)
 
     @property
     def answered(self) -> float:
-        """When the last command that was no renewal was answered."""
+        """Return the time of the response to the last command that was no renewal."""
         return self.last_command.answered if self.last_command else self.begun

@@ -1,4 +1,4 @@
-"""A drive of a check that talks and judges in one function: judged when it ends, whatever ends it."""
+"""A drive for checks that both talk and judge: its trace is judged when the drive ends, also after an exception."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,7 +10,7 @@ from conformance.packs.table1.robot.robot import Robot
 
 @contextmanager
 def driving(robot: Robot, *, way: bool = False) -> Iterator[Drive]:
-    """Give a drive, and judge its trace at the end; ``way``: also whether the pose followed the velocity."""
+    """Yield a drive and judge its trace at the end; ``way``: also whether the pose followed the velocity."""
     drive = Drive(robot)
     try:
         yield drive

@@ -1,4 +1,4 @@
-"""The contract's examples made fit for one robot: within its limits, near where it is, in its frames."""
+"""Adapt the contract's example values to one robot: its limits, its position and its frames."""
 
 from collections.abc import Callable
 from typing import Any
@@ -15,10 +15,10 @@ _SLOW_M_S = 0.1
 
 
 class Examples:
-    """Values within one robot's limits, near where it is, in its frames.
+    """Returns values within one robot's limits, near its position and in its frames.
 
     Args:
-        statement: what the vendor says of it.
+        statement: the vendor's statement about the robot.
     """
 
     def __init__(self, statement: Statement) -> None:
@@ -35,7 +35,10 @@ class Examples:
         }
 
     def fit(self, api: RestInterface, operation_id: str, value: Any) -> Any:
-        """Return a value fit for the robot. For goals, plans and deliveries up to 24 plans are asked for."""
+        """Return an example value adapted to the robot.
+
+        For goals, plans and deliveries this requests up to 24 plans from the robot.
+        """
         fitted = self._fitted.get(operation_id)
         return value if fitted is None or not isinstance(value, dict) else fitted(api, value)
 
@@ -56,7 +59,7 @@ class Examples:
         }
 
     def _direction(self) -> int:
-        """Return ahead and back by turns, so that a robot does not creep up to a wall over many runs."""
+        """Return 1 and -1 in turn, so that the robot does not drift towards a wall over many runs."""
         self._turns += 1
         return 1 if self._turns % 2 else -1
 
@@ -69,7 +72,7 @@ class Examples:
         return {**value, "goal": {"target_pose": target}}
 
     def _near(self, api: RestInterface) -> Pose | None:
-        """Return a pose near the robot that it can reach; None where it knows no way to any."""
+        """Return a pose near the robot to which it has a plan; None where it has none."""
         robot = Robot(api)
         here = robot.map_pose()
         for distance in _FAR_M if here is not None else ():

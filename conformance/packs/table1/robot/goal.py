@@ -1,4 +1,4 @@
-"""Goals as they are put, and as they have to come back."""
+"""Build goals, send them, and compare the goal that the robot shows with the one that was sent."""
 
 import math
 from http import HTTPStatus
@@ -24,13 +24,13 @@ _ARRIVED_M: Final = 0.35
 
 
 def goal_body(pose: Pose, frame: str, id_: str | None = None, *, length: float = 1.0) -> dict[str, Any]:
-    """Return a MoveBaseActionGoal as a client puts it.
+    """Return the JSON body of a goal's PUT (move_base_msgs/MoveBaseActionGoal).
 
     Args:
-        pose: where to go.
-        frame: of the pose.
-        id_: goal_id.id, or None: the robot chooses.
-        length: of the quaternion.
+        pose: the target.
+        frame: frame of the pose.
+        id_: goal_id.id, or None: the robot chooses one.
+        length: length of the quaternion.
     """
     body: dict[str, Any] = {
         "goal": {
@@ -49,9 +49,9 @@ def goal_body(pose: Pose, frame: str, id_: str | None = None, *, length: float =
 
 
 def difference(goal: Any, put: dict[str, Any]) -> str:
-    """Return in what the goal that the robot shows differs from the one that was put; empty: in nothing.
+    """Return where the goal that the robot shows differs from the one that was PUT; empty if nowhere.
 
-    A quaternion and its negative are one orientation.
+    A quaternion and its negative are the same orientation.
     """
     if "goal_id" in put and goal["goal_id"]["id"] != put["goal_id"]["id"]:
         return f"goal_id.id {shown(goal['goal_id']['id'])} for {shown(put['goal_id']['id'])}"
@@ -71,7 +71,7 @@ def difference(goal: Any, put: dict[str, Any]) -> str:
 
 
 def status_fault(goal: Any) -> str:
-    """Return what is wrong with the status of an active goal; empty: nothing."""
+    """Return what is wrong with the status of an active goal, or an empty text."""
     problem = STATUS.problem(goal.get("status"), "status")
     if problem:
         return problem
@@ -80,10 +80,10 @@ def status_fault(goal: Any) -> str:
 
 
 def await_goal(robot: Robot, *put: dict[str, Any]) -> tuple[Any, str, Exchange]:
-    """Read the active goal until it is the one that was put, or one of several, for as long as commands may take.
+    """GET the active goal until it is one of those that were PUT, for at most the time the robot has to apply commands.
 
     Returns:
-        The goal (None: the robot shows no goal), in what it differs, and the evidence.
+        The goal (None: the robot shows no goal), where it differs from those PUT, and the last exchange.
     """
     patience = robot.patience(robot.settle_s)
     for _ in poll(robot.clock, _STEP_S, lambda: patience.over):
@@ -95,7 +95,7 @@ def await_goal(robot: Robot, *put: dict[str, Any]) -> tuple[Any, str, Exchange]:
 
 
 def await_none(robot: Robot, seconds: float | None = None) -> Exchange:
-    """Read the active goal until there is none, for as long as commands may take, or for so many seconds."""
+    """GET the active goal until there is none, for ``seconds`` or the time the robot has to apply commands."""
     patience = robot.patience(robot.settle_s if seconds is None else seconds)
     for _ in poll(robot.clock, _STEP_S, lambda: patience.over):
         exchange = robot.get(GOAL_PATH)
@@ -105,11 +105,11 @@ def await_none(robot: Robot, seconds: float | None = None) -> Exchange:
 
 
 def arrived(robot: Robot, pose: Pose) -> bool:
-    """Return whether the robot is so near to a goal that it may have ended already."""
+    """Return whether the robot is so near a goal that the goal may have ended."""
     here = robot.map_pose()
     return here is None or here.distance(pose) < _ARRIVED_M
 
 
 def put_goal(robot: Robot, body: dict[str, Any]) -> Exchange:
-    """Send a goal."""
+    """PUT a goal."""
     return robot.put(GOAL_PATH, body)

@@ -1,7 +1,7 @@
-"""Judges what every GET of the goal in a run shows: one goal, each time, and not a part of the one before.
+"""Judge every GET of the goal in a run: no response may mix two goals, and an unchanged goal must stay the same.
 
-A client that waits for its goal sees the right one in the end. What it was shown at first may have been a mixture: the
-id of the new goal, and a stamp or a pose of the old one. And what nobody changed is shown in one way.
+A mixture has, for instance, the new goal's id with the old goal's stamp or pose. A client that waits for its goal sees
+the right one in the end, so only the first responses after a change show the fault.
 """
 
 from collections import Counter, deque
@@ -26,7 +26,7 @@ Shown = dict[str, Any]
 
 
 class GoalObserver(Listener):
-    """Listens to the exchanges of one run.
+    """Listens to all exchanges of one run and judges the goals in them.
 
     Args:
         api: the robot's REST interface.
@@ -48,7 +48,7 @@ class GoalObserver(Listener):
         self._living: set[str] = set()
 
     def answered(self, exchange: Exchange) -> None:
-        """Take an exchange, whatever it is."""
+        """Take one exchange of the run; only those about the goal count."""
         if exchange.request.url != self._url:
             return
         if exchange.request.method != "GET":
@@ -76,7 +76,9 @@ class GoalObserver(Listener):
             self._look(self._before, self._since[0], self._since[1], self._first)
 
     def _compare(self) -> None:
-        """Judge what was shown between two readings that are alike, where nothing was asked of the goal."""
+        """Judge a GET by the GETs before and after it, when those two agree and no request changed the goal in
+        between.
+        """
         if len(self._newest) < _SHOWN:
             return
         (first, _), (between, exchange), (last, _) = self._newest
@@ -94,7 +96,9 @@ class GoalObserver(Listener):
         )
 
     def _look(self, before: Shown, first: Shown, later: Shown, exchange: Exchange) -> None:
-        """Judge what was shown first after a change, by what was shown before and later."""
+        """Judge the first goal shown after a change: each field must be the old goal's or the new one's, not a
+        mixture.
+        """
         others = {place for place, value in later.items() if before.get(place) != value}
         stale = {place for place in others if first.get(place) == before.get(place)}
         self._changed.update(others)
@@ -113,6 +117,6 @@ class GoalObserver(Listener):
 
 
 def _whole(place: str) -> str:
-    """Return the place of a value, or of the stamp that it is a part of."""
+    """Return the field's place, or that of the whole stamp for a part of a stamp."""
     parent = place.rpartition(".")[0]
     return parent if parent.endswith("stamp") else place

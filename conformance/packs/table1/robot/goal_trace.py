@@ -1,4 +1,4 @@
-"""What was done with goals, and what the robot showed, as values that can be judged without a robot."""
+"""Records of goals that were sent and of what the robot then showed, as data that rules can judge without a robot."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from conformance.transport.exchange import Exchange
 
 @dataclass(frozen=True)
 class NoGoal:
-    """A robot without a goal: it is read, and cancelled all the same.
+    """GET and DELETE of the goal while the robot has none.
 
     Attributes:
-        read, cancelled: the responses.
+        read, cancelled: the responses to GET and DELETE.
     """
 
     read: Exchange
@@ -25,15 +25,15 @@ class NoGoal:
 
 @dataclass(frozen=True)
 class Put:
-    """A goal that was put, and what the robot then showed.
+    """The PUT of a goal, and the goal that the robot then showed.
 
     Attributes:
-        exchange: of the PUT.
-        body: the goal.
+        exchange: the PUT's request and response.
+        body: the goal that was sent.
         shown: the goal that the robot showed; None: it showed none.
-        read: of the GET that showed it.
-        differs: in what it differs from the one that was put; empty: in nothing.
-        ended: whether the goal may have ended before it could be read, as the robot was there.
+        read: the GET that showed it.
+        differs: where it differs from the goal sent; empty if nowhere.
+        ended: whether the robot was already at the target, so that the goal may have ended before the GET.
     """
 
     exchange: Exchange
@@ -46,13 +46,13 @@ class Put:
 
 @dataclass(frozen=True)
 class Cancelled:
-    """A goal that was cancelled.
+    """The DELETE of a goal, and what followed.
 
     Attributes:
-        exchange: of the DELETE.
-        read: of the last GET.
+        exchange: the DELETE's request and response.
+        read: the last GET of the goal.
         gone: whether the robot had no goal in the end.
-        drive: the wait for rest.
+        drive: the readings while the suite waited for the robot to stand still.
     """
 
     exchange: Exchange
@@ -63,19 +63,19 @@ class Cancelled:
 
 @dataclass(frozen=True)
 class GoalLife:
-    """The trace of the scenario goal_life: a goal is put, repeated, contradicted, replaced by another, and cancelled.
+    """The trace of the scenario goal_life: a goal is PUT, repeated, contradicted, replaced by another, and cancelled.
 
     Attributes:
-        none: readings and DELETEs before the first goal was put.
+        none: GETs and DELETEs before the first goal.
         first: the PUT of the first goal, which has all optional members.
         stamps: the first goal's stamp in two readings.
-        repeated: the PUTs of the active goal again.
-        contradicted: the PUTs of another pose under the active goal's id.
-        velocity: the response to a velocity that was sent while a goal was active; None: no velocity was sent.
+        repeated: repeated PUTs of the active goal.
+        contradicted: PUTs of another pose under the active goal's id.
+        velocity: the response to a velocity PUT while a goal was active; None: no velocity was sent.
         drive: commands and readings of that velocity, where the robot accepted it.
         second: the PUT of another goal without an id.
-        renamed: whether the second goal is accepted when it has an id; None: it was accepted without an id.
-        cancelled: the DELETEs of the active goal; empty: the goal had ended before.
+        renamed: whether the robot accepted the second goal only with an id; None: it accepted it without one.
+        cancelled: DELETEs of the active goal; empty: the goal had ended before.
     """
 
     none: tuple[NoGoal, ...] = ()
@@ -92,21 +92,21 @@ class GoalLife:
 
 @dataclass(frozen=True)
 class GoalReached:
-    """A goal that the robot drove to, or did not.
+    """The trace of a goal that the robot had to drive to.
 
     Attributes:
-        put: of the PUT.
-        there: the goal, in the frame of goals.
-        here: where the robot was in the end.
-        way_m: how far the robot came from where it was at first, m; has_to_m: how far it has to come at least.
-        left_m: how far it still is from the goal, m; reached_m: how near it has to come.
-        drive: all that was read on the way.
+        put: the PUT's request and response.
+        there: the target, in the frame of goals.
+        here: the robot's last pose.
+        way_m: distance driven, m; has_to_m: least distance that counts as driving, m.
+        left_m: distance left to the target, m; reached_m: distance that counts as reached, m.
+        drive: all readings on the way.
         read: the last GET of the goal.
-        ended: whether there was no goal any more.
-        undecided: whether the robot was still on its way when the time was over.
-        turned: the drive behind it, which shows whether a velocity from before the goal is taken up again; or None.
-        start: where a plan begins behind it; or None.
-        again: of the PUT of the same goal, once it had ended; or None.
+        ended: whether the robot had no goal any more.
+        undecided: whether the robot was still driving when the time was over.
+        turned: a drive after the goal that shows whether the robot resumes a velocity from before it; or None.
+        start: where a plan begins after the goal; or None.
+        again: the PUT of the same goal after it had ended; or None.
     """
 
     put: Exchange
@@ -127,11 +127,11 @@ class GoalReached:
 
 @dataclass(frozen=True)
 class SpecialGoal:
-    """A goal that was put because of one thing that is special about it.
+    """The PUT of a goal that is special in one respect.
 
     Attributes:
-        special: that thing, as a noun phrase: "a quaternion of length 2".
-        exchange: of the PUT.
+        special: that respect, as a noun phrase: "a quaternion of length 2".
+        exchange: the PUT's request and response.
     """
 
     special: str
@@ -140,12 +140,12 @@ class SpecialGoal:
 
 @dataclass(frozen=True)
 class FarGoal:
-    """A goal outside every map that was put.
+    """The PUT of a goal outside every map.
 
     Attributes:
-        exchange: of the PUT.
-        read: of the last GET of the goal; None: the goal was not accepted, so it was not read.
-        waited_s: how long the robot had to end the goal, s.
+        exchange: the PUT's request and response.
+        read: the last GET of the goal; None: the robot rejected it, so there was no GET.
+        waited_s: the time the robot had to end the goal, s.
     """
 
     exchange: Exchange
@@ -155,11 +155,11 @@ class FarGoal:
 
 @dataclass(frozen=True)
 class RefusedGoals:
-    """Goals that a robot has to refuse, and two that only nearly have to be refused.
+    """The trace of goals that a robot must reject, and of two that are just valid.
 
     Attributes:
         not_unit: goals with a quaternion whose length is not 1.
-        unit: goals with a quaternion whose length is 1 within the tolerance.
+        unit: valid goals, whose quaternion's length is 1 within the tolerance.
         unknown_frames: goals in frames that the robot does not know.
         far: goals outside every map.
     """

@@ -1,4 +1,4 @@
-"""Goals in any order, as a state machine: put, repeated, contradicted, displaced, cancelled, put again."""
+"""A Hypothesis state machine that PUTs, repeats, contradicts, replaces and cancels goals in random order."""
 
 from collections.abc import Sequence
 from http import HTTPStatus
@@ -30,11 +30,11 @@ _WHICH: Final = st.integers(0, 1)
 
 
 class GoalMachine(RuleBasedStateMachine):
-    """Knows which goal has to be active.
+    """Sends random goal requests and judges each response by the goal that must be active.
 
     Args:
-        walk: what it shares with the other walks of its check.
-        poses: where to send the robot.
+        walk: state shared by all walks of one check.
+        poses: targets to choose from.
     """
 
     def __init__(self, walk: Walk, poses: Sequence[Pose]) -> None:
@@ -46,29 +46,29 @@ class GoalMachine(RuleBasedStateMachine):
         walk.step(self._clear)
 
     def teardown(self) -> None:
-        """Cancel."""
+        """Cancel the goal."""
         self._walk.step(self._clear)
 
     @rule()
     def ask(self) -> None:
-        """Read the active goal, or 404."""
+        """GET the goal: it must be the active one, or 404."""
         self._walk.step(self._look)
 
     @rule(id_=_IDS, which=_WHICH)
     def put(self, id_: str | None, which: int) -> None:
-        """Put a goal: by its id it is new, a repetition, or a contradiction."""
+        """PUT a goal; its id makes it a new goal, a repetition or a contradiction of the active one."""
         self._walk.step(lambda: self._put(id_, which))
 
     @rule()
     def repeat(self) -> None:
-        """Put the active goal again."""
+        """PUT the active goal again."""
         if self._active is not None and "goal_id" in self._active:
             which = self._poses.index(self._pose)
             self._walk.step(lambda: self._put(self._id, which))
 
     @rule()
     def cancel(self) -> None:
-        """Cancel, with a goal or without."""
+        """DELETE the goal, whether there is one or not."""
         self._walk.step(self._cancel)
 
     @property
@@ -101,7 +101,7 @@ class GoalMachine(RuleBasedStateMachine):
         return self._put_new(body, self._poses[which])
 
     def _put_again(self, body: dict[str, Any], pose: Pose) -> bool:
-        """Put a goal under the active goal's id: a repetition, or a contradiction."""
+        """PUT a goal under the active goal's id: with the same pose or with another."""
         exchange = put_goal(self._robot, body)
         status = exchange.response.status
         if arrived(self._robot, self._pose):
@@ -115,7 +115,7 @@ class GoalMachine(RuleBasedStateMachine):
         return well and self._look()
 
     def _put_new(self, body: dict[str, Any], pose: Pose) -> bool:
-        """Put another goal than the active one, or the first."""
+        """PUT the first goal, or one that replaces the active goal."""
         exchange = put_goal(self._robot, body)
         status = exchange.response.status
         displaces = self._active is not None

@@ -1,4 +1,4 @@
-"""Where a robot may be sent."""
+"""Choose targets that the robot can reach, and drive it to open space."""
 
 import math
 from collections.abc import Callable
@@ -25,10 +25,11 @@ _ARRIVES_S: Final = 10.0
 
 
 def choose_goals(robot: Robot, distance: float, count: int) -> list[Pose]:
-    """Return so many different poses about ``distance`` metres from the robot (nearer where the statement says so).
+    """Return ``count`` different poses about ``distance`` metres from the robot (nearer where the statement says so).
 
-    Poses to which the robot has a plan, or that lie on the way to one. Ends the check that asks, as one that cannot be
-    judged, where the robot has no plan to anywhere near; a robot that answers no such question is sent straight ahead.
+    The robot has a plan to each, or it lies on the way of one. Where the robot has no plan to any pose nearby, the
+    check
+    ends as not possible. A robot without a plan resource gets poses straight ahead.
     """
     here = robot.map_pose() or Pose(0.0, 0.0, 0.0)
     reach = min(distance, robot.statement.motion.radius_m) if robot.statement.motion.arena is None else distance
@@ -45,7 +46,7 @@ def choose_goals(robot: Robot, distance: float, count: int) -> list[Pose]:
 
 
 def _on_the_way(robot: Robot, here: Pose, goal: Pose, share: float) -> Pose | None:
-    """Return the pose at a share of the straight way to a goal, where the robot has a plan to it."""
+    """Return the pose at a share of the straight line to a goal, where the robot has a plan to that pose."""
     x, y = (one + share * (other - one) for one, other in zip(here[:2], goal[:2], strict=True))
     pose = Pose(x, y, goal.yaw)
     _, plan, _ = ask(robot, pose)
@@ -53,22 +54,22 @@ def _on_the_way(robot: Robot, here: Pose, goal: Pose, share: float) -> Pose | No
 
 
 def _turned(goal: Pose, part: int) -> Pose:
-    """Return the place of a goal with another heading: another pose, and as reachable."""
+    """Return the goal's position with another heading, which is as reachable."""
     return Pose(goal.x, goal.y, math.remainder(goal.yaw + part, math.tau))
 
 
 def meanwhile(robot: Robot, id_: str, act: Callable[[dict[str, Any], Pose, dict[str, Any]], bool]) -> bool:
-    """Do at once what is to be done while a goal is active, with a goal of its own, which is far away.
+    """Run ``act`` while a new, distant goal is active.
 
-    Where each answer takes long, a goal is over before all is done that clients do with one; not before the first.
+    Where responses are slow a goal may end before all requests about it are sent, so that a check uses several goals.
 
     Args:
-        robot: that may have another goal, which is displaced.
-        id_: of the goal, with a number.
-        act: what is done, with the goal, its pose, and another goal under its id; whether the goal was there till then.
+        robot: the robot; another active goal is replaced.
+        id_: the goal's id, to which a number is added.
+        act: called with the goal, its pose and another goal under its id; returns whether the goal was still active.
 
     Returns:
-        Whether that could be done; it is tried a few times.
+        Whether ``act`` ran while the goal was active, in one of a few tries.
     """
     frame = robot.statement.motion.frame
     for number in range(_ATTEMPTS):
@@ -85,14 +86,15 @@ def meanwhile(robot: Robot, id_: str, act: Callable[[dict[str, Any], Pose, dict[
 
 
 def make_room(robot: Robot, ahead_m: float = _FAR_M) -> None:
-    """Drive a robot that stands close to something to where it can be driven about by its velocity.
+    """Drive a robot that stands close to an obstacle to a place from which it can drive freely.
 
-    A simulated robot's wheels go on turning against a wall, and its pose then moves otherwise than its velocity says.
-    Where the robot stays if it knows of no such place, or does not go there, is for the checks to find out.
+    A simulated robot's wheels turn on against a wall, and its pose then contradicts its velocity. Where the robot knows
+    no
+    such place or does not get there, it stays, and the checks judge what follows.
 
     Args:
-        robot: at rest.
-        ahead_m: how far ahead or back it may get; more than a few decimetres aside is no check's affair.
+        robot: a robot at rest.
+        ahead_m: how far checks will drive it ahead or back, m; sideways they need only a few decimetres.
     """
     here = robot.map_pose()
     if here is None or _is_open(robot, here, min(max(ahead_m, _NEAR_M), _FAR_M)):
@@ -109,7 +111,7 @@ def make_room(robot: Robot, ahead_m: float = _FAR_M) -> None:
 
 
 def _is_open(robot: Robot, pose: Pose, ahead_m: float) -> bool:
-    """Return whether the robot knows plain ways from a pose into all directions, of another length ahead and back."""
+    """Return whether the robot has straight plans from a pose in all directions, ``ahead_m`` long ahead and back."""
     around = [pose.ahead(_NEAR_M, math.radians(angle)) for angle in range(60, 360, 60)]
     for there in (pose.ahead(ahead_m), pose.ahead(-ahead_m), *around):
         _, plan, _ = ask(robot, there, pose)

@@ -1,6 +1,6 @@
-"""What the robot's answers hold: the schemas of the contract's OpenAPI description, and how answers are read by them.
+"""JSON schemas of the robot's responses, from the contract's OpenAPI, and functions that read responses by them.
 
-A robot may add fields to what a schema names.
+A robot may add fields to those in a schema.
 """
 
 import json
@@ -18,7 +18,7 @@ _ANSWERS: Final = {operation.id: operation.shape for operation in operations_of(
 
 
 def _answer_of(operation_id: str) -> Schema:
-    """Return the schema of what an operation of the contract answers where it succeeds."""
+    """Return the schema of an operation's successful response in the contract."""
     schema = _ANSWERS[operation_id]
     if schema is None:
         raise ValueError(f"{operation_id} answers nothing")
@@ -26,7 +26,7 @@ def _answer_of(operation_id: str) -> Schema:
 
 
 def _without(schema: Schema, name: str) -> Schema:
-    """Return a schema of an object less one of its fields."""
+    """Return the schema of an object without one of its fields."""
     return {
         **schema,
         "required": [one for one in schema["required"] if one != name],
@@ -35,7 +35,9 @@ def _without(schema: Schema, name: str) -> Schema:
 
 
 def _with_any_type(entries: Schema) -> Schema:
-    """Return a list of entries, less what has requirements of its own: the form of ``type``, and no entry twice."""
+    """Return the schema of a list without the rules that other requirements judge: the form of ``type``, and
+    duplicates.
+    """
     entry = entries["items"]
     return {
         "type": "array",
@@ -62,10 +64,10 @@ SERVICE_TYPE: Final = Shape(_SERVICES["items"]["properties"]["type"])
 
 
 def read_as(response: Response, shape: Shape) -> tuple[Any, str]:
-    """Return the value of a shape in an answer with status 200.
+    """Parse a response with status 200 by a schema.
 
     Returns:
-        (value, ""), or (None, what is wrong with the answer).
+        (value, ""), or (None, what is wrong with the response).
     """
     if response.status != HTTPStatus.OK:
         return None, f"status {response.status}"
@@ -75,5 +77,5 @@ def read_as(response: Response, shape: Shape) -> tuple[Any, str]:
 
 
 def body_of(value: Mapping[str, Any]) -> bytes:
-    """Return a JSON body."""
+    """Return a value as a JSON request body."""
     return json.dumps(value).encode()

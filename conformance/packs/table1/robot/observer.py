@@ -1,6 +1,6 @@
-"""Judges every plain reading of the robot's state in a run, whichever check asks for it.
+"""Judge every plain GET of the robot's state in a run, whichever check sends it.
 
-A fault that shows once in fifty answers is seen by reading often; all reading that is done anyway counts.
+A fault that shows in one of fifty responses is found by reading often; observing counts all reads of all checks.
 """
 
 import math
@@ -34,7 +34,7 @@ _OLD_S: Final = 1.5
 
 
 class _Samples:
-    """The newest velocities that one resource told, one of each sample of the odometry."""
+    """The newest velocities in one resource's responses, one for each odometry stamp."""
 
     def __init__(self) -> None:
         self._newest: deque[Any] = deque(maxlen=SEVERAL)
@@ -42,7 +42,7 @@ class _Samples:
         self._begun = -math.inf
 
     def add(self, twist: Any, stamp: tuple[int, int] | None) -> None:
-        """Take a reading; ``stamp`` is that of the odometry read last, by any resource."""
+        """Add a velocity; ``stamp`` is that of the odometry read last by any resource."""
         now = WALL_CLOCK.now()
         if self._newest and stamp == self._stamp and now - self._begun < LONGEST_SAMPLE_S:
             self._newest[-1] = twist
@@ -51,14 +51,14 @@ class _Samples:
         self._stamp, self._begun = stamp, now
 
     def fastest(self, part: str) -> float:
-        """Return the greatest component, each of which is a median; 0 while there are too few samples to say."""
+        """Return the largest of the components' medians; 0 while there are too few samples."""
         if len(self._newest) < SEVERAL:
             return 0.0
         return max(abs(median(float(twist[part][axis]) for twist in self._newest)) for axis in "xyz")
 
 
 class Observer(Listener):
-    """Listens to the exchanges of one run."""
+    """Listens to all exchanges of one run and judges the plain GETs."""
 
     def __init__(self, api: RestInterface, clock: Clock) -> None:
         self._api = api
@@ -80,7 +80,7 @@ class Observer(Listener):
         self._fast = {path: _Samples() for path in _READINGS}
 
     def answered(self, exchange: Exchange) -> None:
-        """Judge one exchange, where it is a plain reading."""
+        """Judge one exchange if it is a plain GET of the robot's state."""
         reading = self._readings.get(exchange.request.url)
         if reading is None or exchange.request.method != "GET" or not self._plain(exchange):
             return
@@ -107,7 +107,7 @@ class Observer(Listener):
         self._limits(self._fast[path], value, exchange)
 
     def _single(self, path: str, value: Any, exchange: Exchange) -> None:
-        """Compare single readings that came one after another: of several clients' answers, some may have crossed."""
+        """Compare single readings that came one after another; skip those read by several clients at once."""
         judge, limits = self._api.run.judge, said_of(self._api.run).limits
         received = _received_s(exchange)
         if received - exchange.response.elapsed_ms / 1000 < self._read_until:
@@ -121,7 +121,7 @@ class Observer(Listener):
             self._beside.velocity(Velocity.of(value), exchange, received)
 
     def _unavailable(self, path: str, exchange: Exchange) -> None:
-        """Judge a 503: it has Retry-After, and the velocity is 503 as well."""
+        """Judge a 503: it must have Retry-After, and the velocity must be 503 as well."""
         judge = self._api.run.judge
         name = "pose-unavailable" if path == POSE else "pose-fresh"
         after = bool(exchange.response.header("retry-after"))
@@ -135,7 +135,7 @@ class Observer(Listener):
             self._none, self._velocity_of_none = True, None
 
     def _plain(self, exchange: Exchange) -> bool:
-        """Return whether a request has only the usual headers, so that it has to be answered 200."""
+        """Return whether a request has only usual headers, so that the robot must answer 200."""
         fields = {name.lower(): value for name, value in exchange.request.headers}
         # The client shows its own token by this name; a check may send another one, or none, to see it refused.
         if fields.get("authorization") != ("Bearer $ROAAS_TOKEN" if self._api.client.connection.token else None):
@@ -182,7 +182,7 @@ class Observer(Listener):
         self._last_received = max(self._last_received, now)
 
     def _limits(self, samples: _Samples, twist: Any, exchange: Exchange) -> None:
-        """Judge that the measured speed is within the declared limits, also on the robot's own missions."""
+        """Judge that the measured speed is within the declared limits, also while the robot pursues a goal."""
         limits = said_of(self._api.run).limits
         samples.add(twist, self._last_stamp)
         linear, angular = limits.tolerance_linear_m_s, limits.tolerance_angular_rad_s
@@ -205,5 +205,5 @@ class Observer(Listener):
 
 
 def _received_s(exchange: Exchange) -> float:
-    """Return when a response was received, s of the monotonic clock."""
+    """Return when a response arrived, s of the monotonic clock."""
     return exchange.response.received_s or WALL_CLOCK.now()

@@ -1,10 +1,9 @@
-"""Whether a pose moves by what its velocity says: the velocity is summed up and compared with the way that was made.
+"""Judge whether the pose follows the velocity: integrate the velocity and compare it with the pose.
 
-Not only from the first reading to the last, each of which may be out: windows of a quarter of the way begin all along
-it, and the median window counts, as far as it would lead on the whole way. A jump of the localisation is in fewer than
-half of them, and readings that are far apart, over a slow link, make windows coarse; what is wrong with the robot, as
-another unit, is in most windows and in the whole. Where the odometry itself was held up, nobody knows what the robot
-did in between: such a step counts on neither side.
+The first and last reading may each be wrong. Therefore the readings are cut into overlapping windows of a quarter of
+the way, and the median window counts, extrapolated to the whole way. A jump of the localisation is in fewer than half
+of the windows, and a slow link makes windows coarse; a real fault, such as a wrong unit, is in most windows and in the
+whole. Where the odometry itself was delayed, the robot's motion in between is unknown, and that step is left out.
 """
 
 from __future__ import annotations
@@ -50,17 +49,16 @@ _SKIPPED_S: Final = 0.15
 
 
 class _Sum(NamedTuple):
-    """A velocity summed up by one clock, up to one reading.
+    """The integral of the velocity by one clock, up to one reading.
 
     Attributes:
-        x, y: way in the odometry frame, m; turn: change of heading, rad.
-        length, turned: the same without signs.
-        off, off_turn: by how much the sum may be wrong because the velocity changed between two samples.
-        x_error, y_error, turn_error: what was made less what was summed up, step by step, so that whole turns do not
-            matter.
-        along_error, turned_error: the same along the way and the turn that the velocity says, whatever its direction: a
-            robot that drives ahead and back, or turns left and right, makes up for no error of its scale. Of readings
-            that are close together only.
+        x, y: integrated position in the odometry frame, m; turn: integrated change of heading, rad.
+        length, turned: the integrals of the absolute speeds.
+        off, off_turn: bound of the integration error, as the velocity changes between two samples.
+        x_error, y_error, turn_error: measured minus integrated, summed step by step, so that whole turns do not matter.
+        along_error, turned_error: the same in the direction of motion, so that driving ahead and back (or turning left
+            and
+            right) does not cancel an error of scale. Only readings close together count.
     """
 
     x: float = 0.0
@@ -77,7 +75,7 @@ class _Sum(NamedTuple):
     turned_error: float = 0.0
 
     def miss(self, earlier: _Sum) -> _Miss:
-        """Return by how much pose and heading miss what was summed up since an earlier reading."""
+        """Return how far pose and heading are from the integral since an earlier reading."""
         way = math.hypot(self.x_error - earlier.x_error, self.y_error - earlier.y_error)
         way = max(way, abs(self.along_error - earlier.along_error))
         turn = max(abs(self.turn_error - earlier.turn_error), abs(self.turned_error - earlier.turned_error))
@@ -86,27 +84,28 @@ class _Sum(NamedTuple):
 
 
 class _Miss(NamedTuple):
-    """By how far a pose, m, and a heading, rad, are elsewhere than the velocity says."""
+    """The distance between measured and integrated pose, m, and heading, rad."""
 
     way: float
     turn: float
 
 
 class _Sums(NamedTuple):
-    """The sums up to each reading, and where the robot said to be."""
+    """The integrals up to each reading, and the poses that were read."""
 
     trace: Sequence[Odometry]
     each: Sequence[_Sum]
 
     def middle_miss(self, course: Sequence[float], part: Callable[[_Miss], float]) -> float:
-        """Return the median window's miss, as far as it would lead on the whole course.
+        """Return the median window's miss, extrapolated to the whole course.
 
-        A window counts for as much of the course as lies between its first reading and the next one, so that a robot
-        which rests, and is read meanwhile, has no more say than one that drives.
+        A window is weighted with the distance between its first reading and the next one, so that many readings of a
+        resting
+        robot do not outweigh those of a moving one.
 
         Args:
-            course: the length, or the turn, that was summed up to each reading.
-            part: of a miss that counts.
+            course: length or turn integrated up to each reading.
+            part: selects the part of a miss that counts.
         """
         wanted = _WINDOW * course[-1]
         found: list[tuple[float, float]] = []
@@ -123,7 +122,7 @@ class _Sums(NamedTuple):
 
     @property
     def whole_miss(self) -> _Miss:
-        """By how far the way from the first reading to the last misses the pose and the heading."""
+        """Return the distance between measured and integrated pose and heading over all readings."""
         return self.each[-1].miss(self.each[0])
 
 
@@ -166,12 +165,12 @@ def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_sta
 
 
 def _signed(error: float, speed: float, fastest: float) -> float:
-    """Return an error in the direction of a speed; none where that is little, and its direction perhaps noise."""
+    """Return an error in the direction of motion; 0 at low speed, where the direction may be noise."""
     return math.copysign(error, error * speed) if error and abs(speed) > _MOVES * fastest else 0.0
 
 
 def _longest_lapse(trace: Sequence[Odometry]) -> float:
-    """Return how far the stamps of two samples may be apart that nothing has held up, s."""
+    """Return the longest time between two stamps that counts as undelayed odometry, s."""
     lapses = [two.stamp - one.stamp for one, two in itertools.pairwise(trace) if two.stamp != one.stamp]
     return max(_SKIPPED_S, _HELD_UP_TIMES * median(lapses)) if lapses else _SKIPPED_S
 
@@ -179,18 +178,17 @@ def _longest_lapse(trace: Sequence[Odometry]) -> float:
 def way_and_turn(
     trace: Sequence[Odometry], measured: Sequence[Velocity], noise: Noise
 ) -> tuple[Case | None, Case | None]:
-    """Return whether the pose moved, and whether it turned, by what the velocity adds up to along a drive.
+    """Judge whether position and heading moved as the integrated velocity says, one case for each.
 
-    None for either where the robot did not go, or turn, far enough to tell.
+    Return None in place of a case where the robot did not drive, or turn, far enough to judge.
 
-    The robot's stamps or the time of the readings has to fit, as a simulation may run slower than the clock on the
-    wall; and the odometry's own velocity or the one that was measured beside it: whether these two agree is another
-    requirement.
+    Either clock may fit, the robot's stamps or the local time of the readings, as simulations may run slower than real
+    time. Either velocity may fit, the odometry's own or the one read beside it: another requirement compares these two.
 
     Args:
-        trace: readings of the odometry, in their order.
-        measured: a reading of GET /robot/velocity/ for each of them.
-        noise: of the robot's odometry.
+        trace: odometry readings in order.
+        measured: the velocity read with each of them.
+        noise: noise of the robot's odometry.
     """
     if len(trace) < _FEWEST:
         return None, None
@@ -205,7 +203,7 @@ def way_and_turn(
 
 
 def _longest_unbroken(trace: Sequence[Odometry]) -> slice:
-    """Return the longest part of the readings in which none is held up."""
+    """Return the longest run of readings without a delay of the odometry."""
     steps = [two.sent - one.sent for one, two in itertools.pairwise(trace)]
     most = max(_HELD_UP_S, _HELD_UP_TIMES * median(steps))
     ends = [0, *(index for index, step in enumerate(steps, 1) if step > most), len(trace)]

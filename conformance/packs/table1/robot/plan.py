@@ -1,4 +1,4 @@
-"""Asking for plans, and finding poses near the robot that it can reach."""
+"""Request plans from the robot, and find poses near the robot that it can reach."""
 
 import itertools
 import math
@@ -29,11 +29,11 @@ _STARTS: Final = 3
 
 @dataclass(frozen=True)
 class Plan:
-    """A nav_msgs/Path.
+    """A plan (nav_msgs/Path).
 
     Attributes:
-        frames: of the path and of its poses.
-        poses: at least one.
+        frames: the frames of the path and of its poses.
+        poses: the path; at least one pose.
     """
 
     frames: frozenset[str]
@@ -41,24 +41,24 @@ class Plan:
 
     @property
     def length(self) -> float:
-        """From the first pose to the last, m."""
+        """Return the length of the path, m."""
         return sum(one.distance(two) for one, two in itertools.pairwise(self.poses))
 
     @property
     def longest_step(self) -> float:
-        """The greatest distance between two poses that follow each other, m."""
+        """Return the largest distance between two successive poses, m."""
         return max((one.distance(two) for one, two in itertools.pairwise(self.poses)), default=0.0)
 
 
 def plan_of(message: Any) -> Plan:
-    """Return the plan in a nav_msgs/GetPlan response of the right shape."""
+    """Return the plan in a nav_msgs/GetPlan response that satisfies the schema."""
     path = message["plan"]
     frames = {path["header"]["frame_id"], *(pose["header"]["frame_id"] for pose in path["poses"])}
     return Plan(frozenset(frames), tuple(pose_of(pose["pose"]) for pose in path["poses"]))
 
 
 def query(**parameters: float | str | None) -> str:
-    """Return the target of a plan request; parameters that are None are left out."""
+    """Return the path and query of a plan request, without the parameters that are None."""
     given = {
         name: value if isinstance(value, str) else repr(float(value))
         for name, value in parameters.items()
@@ -70,10 +70,10 @@ def query(**parameters: float | str | None) -> str:
 def ask(
     robot: Robot, goal: Pose, start: Pose | None = None, **more: float | str | None
 ) -> tuple[str, Plan | None, Exchange]:
-    """Ask for a plan in the frame of goals.
+    """Request a plan in the frame of goals.
 
     Returns:
-        What is wrong with the answer (empty for a plan), the plan, and the evidence.
+        What is wrong with the response (empty for a plan), the plan, and the exchange.
     """
     parameters: dict[str, float | str | None] = {"x": goal.x, "y": goal.y, "yaw": goal.yaw}
     if start is not None:
@@ -87,9 +87,11 @@ def ask(
 
 
 def reachable(robot: Robot, here: Pose, distance: float, count: int = 1) -> list[Pose]:
-    """Return poses inside the arena, about so many metres away, to which the robot has a plan without a detour.
+    """Return poses inside the arena, about ``distance`` metres away, to which the robot has a plan without a detour.
 
-    Declared goals come first, where they are about so far away; a distance at which there is nothing is halved, twice.
+    The statement's goals come first where they are about that far away. Where there is no such pose, the distance is
+    halved
+    up to twice.
     """
     found = [
         pose
@@ -119,13 +121,13 @@ def reachable(robot: Robot, here: Pose, distance: float, count: int = 1) -> list
 
 @dataclass(frozen=True)
 class Start:
-    """Where the path of a plan begins, and where the robot was.
+    """Where a plan's path begins, compared with the robot's position.
 
     Attributes:
         first: the first pose of the path.
-        robot: the robot's pose just before the plan.
-        exchange: of the plan.
-        beyond_m: by how much the path begins farther from the robot than it may, m, for each plan that was requested.
+        robot: the robot's pose just before the plan was requested.
+        exchange: the plan's request and response.
+        beyond_m: for each plan requested, how much farther from the robot its path begins than it may, m.
     """
 
     first: Pose
@@ -135,7 +137,9 @@ class Start:
 
     @property
     def case(self) -> Case:
-        """Whether the path begins at the robot: one reading of a localisation may be wrong, most may not."""
+        """Judge whether the path begins at the robot, by the median of the plans: one localisation reading may be
+        wrong.
+        """
         return Case(
             self.beyond_m[0] <= 0 or median(self.beyond_m) <= 0,
             self.exchange,
@@ -151,11 +155,11 @@ def start_of(
     """Return where a path begins; None where the robot's pose cannot be read.
 
     Args:
-        robot: which.
-        plan: with the path.
-        before: the robot's pose just before it; the robot may have moved since.
-        exchange: the evidence.
-        again: asks for the same plan once more, where the path does not begin at the robot.
+        robot: the robot.
+        plan: the plan with the path.
+        before: the robot's pose just before the plan was requested; it may have moved since.
+        exchange: the plan's request and response.
+        again: requests the same plan once more, where the path does not begin at the robot.
     """
     after = robot.map_pose()
     if after is None:
@@ -170,5 +174,5 @@ def start_of(
 
 
 def _beyond_start(plan: Plan, before: Pose, after: Pose) -> float:
-    """Return by how much a path begins farther away from the robot than it may, m; not above zero where it does not."""
+    """Return how much farther from the robot a path begins than it may, m; zero or less where it conforms."""
     return plan.poses[0].distance(before) - START_OFF - before.distance(after)

@@ -1,7 +1,6 @@
-"""Judges every plan of a run, whichever check asks for it: a fault that shows once in many answers is seen by counting.
+"""Judge every plan of a run, whichever check requests it: no path may jump aside to one pose and back.
 
-How long a step may be depends on how far a plan leads, and is for those to judge who know what they asked for. That a
-path does not leap aside and back again holds of all.
+The allowed step length depends on the request, so that other checks judge it.
 """
 
 import itertools
@@ -25,7 +24,7 @@ _FEWEST: Final = 6
 
 
 class PlanObserver(Listener):
-    """Listens to the exchanges of one run.
+    """Listens to all exchanges of one run and judges the plans in them.
 
     Args:
         api: the robot's REST interface.
@@ -38,7 +37,7 @@ class PlanObserver(Listener):
         self._url = f"{rest.scheme}://{rest.authority}{rest.prefix}{PLAN}?"
 
     def answered(self, exchange: Exchange) -> None:
-        """Take an exchange, whatever it is."""
+        """Judge one exchange if it is a plan."""
         response = exchange.response
         if (
             exchange.request.method != "GET"
@@ -61,7 +60,7 @@ class PlanObserver(Listener):
 
 
 def longest_leap(poses: tuple[Pose, ...]) -> float:
-    """Return how far a path leaps to one of its poses and back again, m; 0 where it does not."""
+    """Return how far a path jumps aside to one of its poses and back again, m; 0 where it does not."""
     if len(poses) < _FEWEST:
         return 0.0
     steps = [one.distance(two) for one, two in itertools.pairwise(poses)]

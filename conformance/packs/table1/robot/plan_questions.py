@@ -1,4 +1,4 @@
-"""Plans to different places: whose question an answer belongs to shows by where its path ends."""
+"""Requests for plans to different places, whose responses can be told apart by where the path ends."""
 
 from collections.abc import Callable
 
@@ -18,7 +18,7 @@ _APART_M = 0.4
 
 
 def plan_questions(api: RestInterface) -> list[Question]:
-    """Return questions for plans to places around the robot; none where it has no plans, or no such contract."""
+    """Return requests for plans to places around the robot; none where the robot or the contract has no plans."""
     robot = Robot(api)
     here = robot.map_pose()
     places: list[Pose] = []
@@ -33,7 +33,7 @@ def plan_questions(api: RestInterface) -> list[Question]:
 
 
 def _ends_elsewhere(place: Pose, others: list[Pose]) -> Callable[[Response], str]:
-    """Return whether a path ends nearer to the goal of another client's request."""
+    """Return a function that reports when a response's path ends nearer to another request's goal."""
 
     def mismatch(answer: Response) -> str:
         message, problem = read_as(answer, GET_PLAN)

@@ -1,4 +1,4 @@
-"""Plans that were requested, and what came, as values that can be judged without a robot."""
+"""Records of plan requests and their responses, as data that rules can judge without a robot."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from conformance.transport.exchange import Exchange
 
 @dataclass(frozen=True)
 class PlanRead:
-    """A plan that was requested in the frame of goals.
+    """A plan requested in the frame of goals.
 
     Attributes:
-        goal: where it has to end.
+        goal: where the plan must end.
         tolerance_m: how far from there it may end, m.
-        exchange: the evidence.
+        exchange: the plan's request and response.
         problem: what is wrong with the response; empty: it has a plan.
         plan: the plan, or None.
-        begin: where the request says that the plan begins; None: where the robot is.
-        start: where the plan begins and where the robot was; None: the request has a start, or that cannot be said.
+        begin: the start in the request; None: the robot's position.
+        start: where the plan begins compared with the robot; None where the request has a start or the pose is unknown.
     """
 
     goal: Pose
@@ -34,11 +34,11 @@ class PlanRead:
 
 @dataclass(frozen=True)
 class PlansFromRobot:
-    """Plans from where the robot is.
+    """Plans that start at the robot.
 
     Attributes:
-        reads: those to poses to which there has to be a plan, or was one.
-        nowhere: the response to one of the requests, where the robot has no plan to any pose around it.
+        reads: plans to poses to which the robot must have a plan, or had one.
+        nowhere: one of the responses, where the robot has no plan to any pose around it.
     """
 
     reads: tuple[PlanRead, ...] = ()
@@ -47,11 +47,11 @@ class PlansFromRobot:
 
 @dataclass(frozen=True)
 class DefaultPlan:
-    """A plan whose request leaves out all that may be left out.
+    """A plan whose request leaves out all optional parameters.
 
     Attributes:
-        goal: where it has to end.
-        exchange: the evidence.
+        goal: where the plan must end.
+        exchange: the plan's request and response.
         problem: what is wrong with the response; empty: it has a plan.
         plan: the plan, or None.
         explicit: the plan for the same request with the defaults written out.
@@ -66,11 +66,11 @@ class DefaultPlan:
 
 @dataclass(frozen=True)
 class PlansFromStart:
-    """Plans from a start that the request names.
+    """Plans from a start given in the request.
 
     Attributes:
-        reads: with a heading.
-        defaults: without heading, frame and tolerance.
+        reads: requests with a heading.
+        defaults: requests without heading, frame and tolerance.
     """
 
     reads: tuple[PlanRead, ...] = ()
@@ -79,15 +79,15 @@ class PlansFromStart:
 
 @dataclass(frozen=True)
 class FramePlan:
-    """A plan that was requested in another frame than that of goals.
+    """A plan requested in another frame than that of goals.
 
     Attributes:
         frame: the frame.
-        begin, goal: where the robot is, and where the plan has to end, in that frame.
-        exchange: the evidence.
+        begin, goal: the robot's position, and where the plan must end, in that frame.
+        exchange: the plan's request and response.
         problem: what is wrong with the response; empty: it has a plan.
         plan: the plan, or None.
-        moved_m: how far the robot moved meanwhile, m; None: the frame is unknown, so it has no places.
+        moved_m: how far the robot moved in the meantime, m; None: the frame is unknown to the suite.
     """
 
     frame: str
