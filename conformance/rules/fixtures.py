@@ -23,7 +23,7 @@ _NEEDED_LATER: Final = ("conformance.api.soap.zeep_client", "schemathesis.specs.
 
 @pytest.fixture(scope="session", autouse=True)
 def _watched(run: Run, interfaces: Interfaces, connection: Connection) -> None:
-    """Have every exchange judged from the first check on. Here, and nowhere else, observers are registered."""
+    """Register the observers, so that every exchange of the run is judged; no other code registers any."""
     services = interfaces.soap.there.values()
     api = interfaces.rest
     observers: list[Listener] = []
@@ -38,7 +38,7 @@ def _watched(run: Run, interfaces: Interfaces, connection: Connection) -> None:
 
 @pytest.fixture
 def _prepared(interfaces: Interfaces) -> Iterator[None]:
-    """Import and compile what later checks need, while this one mostly waits for the robot."""
+    """Import modules that later checks need in a background thread, while the current check waits for the robot."""
     services = tuple(interfaces.soap.there.values())
     for service in services:
         _ = service.own  # may send requests: here, and not at any moment of a drive

@@ -23,7 +23,7 @@ _BEHAVIOUR = "describe/openapi-behaviour"
 
 
 def _document(rest: HttpClient) -> tuple[Any, Exchange, str]:
-    """Return the description, the exchange that brought it, and what is wrong with it."""
+    """Return the description served by the robot, the exchange that fetched it, and what is wrong with it."""
     exchange = rest.send("GET", _PATH, headers=[("Accept", "application/json")])
     answer = exchange.response
     if answer.status != 200:
@@ -36,14 +36,14 @@ def _document(rest: HttpClient) -> tuple[Any, Exchange, str]:
 
 @lru_cache(maxsize=2)
 def _read(body: bytes) -> tuple[Any, str]:
-    """Return a description and what is wrong with it; three checks look at the same one."""
+    """Parse a description and return it with what is wrong with it; cached, as three checks read the same one."""
     text = read_json(body)
     return text.value, text.problem or openapi_fault(text.value)
 
 
 @pytest.mark.requirement("describe/openapi")
 def test_openapi_is_served(rest: HttpClient, judge: Judge) -> None:
-    """Get the description: it is there, it is JSON, and it is valid by the schema of its version."""
+    """GET the description: the robot must serve it as JSON that is valid by the OpenAPI schema of its version."""
     _, exchange, fault = _document(rest)
     expect(judge, "describe/openapi", exchange).that(not fault, "status 200 with a valid OpenAPI 3 description", fault)
 

@@ -1,4 +1,4 @@
-"""Whether the interfaces that the claimed classes need respond at all: the prerequisite of everything else."""
+"""Check that each interface that the claimed classes need responds at all."""
 
 import pytest
 
@@ -37,7 +37,7 @@ def _needed(run: Run, class_: str) -> tuple[Interface, ...]:
 
 
 def _look(interfaces: Interfaces, name: Interface) -> tuple[str, Attempt | None]:
-    """Return why an interface is not there, or an empty text; and the evidence."""
+    """Return why an interface does not respond, or an empty text, and the exchange."""
     try:
         if name is Interface.REST:
             if interfaces.rest is None:

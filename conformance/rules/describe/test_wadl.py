@@ -32,7 +32,7 @@ def _without(api: RestInterface) -> bool:
 
 
 def _read(rest: HttpClient) -> tuple[list[Described], Exchange, str]:
-    """Return the operations, the exchange that brought them, and what is wrong."""
+    """Return the WADL's operations, the exchange that fetched it, and what is wrong with it."""
     exchange = rest.send("GET", _PATH)
     answer = exchange.response
     if answer.status != 200:
@@ -47,7 +47,7 @@ def _read(rest: HttpClient) -> tuple[list[Described], Exchange, str]:
 
 @pytest.mark.requirement("describe/wadl")
 def test_wadl_is_served(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
-    """Get the WADL: it is there, and is a WADL application."""
+    """GET the WADL: the robot must serve a WADL application."""
     if _without(api):
         return
     _, exchange, fault = _read(rest)

@@ -41,7 +41,7 @@ class _Served:
 
 
 def _services(soap: SoapServices, *ids: str) -> list[SoapService]:
-    """Return the services with a contract, also the one that moves the robot: getting its WSDL moves nothing."""
+    """Return the services of the contract, including the one that moves the robot: reading its WSDL is harmless."""
     found = []
     for service in (soap.publishers, soap.subscribers):
         if service is None or service.contract_wsdl_path is None:
@@ -156,7 +156,7 @@ def test_profile(soap: SoapServices, judge: Judge, effort: Effort) -> None:
 
 
 def _guarded(check: Callable[[Description], Iterator[str]], description: Description) -> Iterator[str]:
-    """Yield what breaks a rule; a description too broken for the rule breaks it as well."""
+    """Yield the violations that a check finds; a description too broken for the check is a violation as well."""
     try:
         yield from check(description)
     except DescriptionError as error:

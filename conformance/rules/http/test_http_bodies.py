@@ -60,7 +60,7 @@ def _valid(api: RestInterface, judge: Judge, ids: tuple[str, ...]) -> Iterator[C
 
 
 def _padded(call: Call, octets: int) -> bytes:
-    """Return a call's JSON body with so much white space in it that it has so many octets."""
+    """Return a call's JSON body, padded with white space to ``octets`` bytes."""
     return call.body[:1] + b" " * (octets - len(call.body)) + call.body[1:]
 
 
@@ -118,7 +118,7 @@ def _judge_too_large(api: RestInterface, judge: Judge, call: Call, fields: tuple
 
 @pytest.mark.requirement("http/chunked", "http/chunk-forms")
 def test_chunked_content(api: RestInterface, judge: Judge) -> None:
-    """Send content in chunks of one octet, of a few, and of all; 64 KiB as well; and with extensions and trailers."""
+    """Send content in chunks of one byte, of a few, and in one; 64 KiB as well; and with extensions and trailers."""
     for call in _valid(api, judge, ("http/chunked",)):
         large = _padded(call, TAKEN_OCTETS)
         for body, size in (

@@ -22,12 +22,12 @@ _IN_A_ROW = 6
 
 @pytest.fixture(scope="module")
 def asked() -> list[Question]:
-    """Return the list of questions, which the first check fills and the others share."""
+    """Return the list of distinguishable requests, which the first check fills and the others share."""
     return []
 
 
 def _questions(api: RestInterface, known: list[Question]) -> list[Question]:
-    """Return the questions; skip the check where the robot's responses to them cannot be told apart."""
+    """Return requests whose responses can be told apart; skip the check where the robot has none."""
     if not known:
         known += questions(api, api.device.questions(api))
     if not known:
@@ -72,7 +72,7 @@ def test_answers_come_in_order(api: RestInterface, rest: HttpClient, judge: Judg
 
 
 def _judge_forgotten(api: RestInterface, judge: Judge, octets: bytes, attempt: Unanswered) -> None:
-    """Judge a connection that stays open without a response, by a second one: the first may have been held up."""
+    """Judge a connection that stays open without a response, by trying again: the first try may have been delayed."""
     again = by_hand.talk(api, octets, answers=_IN_A_ROW, refused=True)
     count = raw.answers_in(again.octets, _IN_A_ROW)
     expect(judge, "http/pipelining", attempt).that(

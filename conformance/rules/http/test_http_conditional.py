@@ -1,4 +1,4 @@
-"""Requests as caches and downloads make them: with conditions that hold, and for parts (RFC 9110 13, 14)."""
+"""Conditional requests and range requests, as caches and download clients send them (RFC 9110 13, 14)."""
 
 import re
 
@@ -24,7 +24,7 @@ _STANDARD = 10
 
 @pytest.mark.requirement(_PRECONDITIONS)
 def test_what_a_cache_asks(api: RestInterface, judge: Judge) -> None:
-    """Send conditions of a client that has nothing current: it must get the whole resource, and not 304."""
+    """Send conditions of a client without a current copy: the response must be 200 with content, not 304."""
     for call in api.run.effort.draw(answered(api, _PRECONDITIONS), _STANDARD, f"{api.run.seed}/preconditions"):
         exchange = call.send(api, ("If-None-Match", _NO_TAG))
         expected = "another status than 304 when the robot never sent the entity tag"
@@ -38,7 +38,7 @@ def test_what_a_cache_asks(api: RestInterface, judge: Judge) -> None:
 
 @pytest.mark.requirement(_RANGE)
 def test_a_part(api: RestInterface, judge: Judge) -> None:
-    """Request a part of each resource: the response is the whole, or says which part it is."""
+    """Send a range request to each resource: the response is the whole, or 206 with its Content-Range."""
     for call in api.run.effort.draw(answered(api, _RANGE), _STANDARD, f"{api.run.seed}/range")[:_STANDARD]:
         exchange = call.send(api, ("Range", "bytes=0-3"))
         answer = exchange.response

@@ -27,7 +27,7 @@ _GARBAGE = (
 
 
 def _first(api: RestInterface) -> Call:
-    """Return a read that every robot has, without parameters where there is one."""
+    """Return a GET that every robot of the contract has, without parameters where possible."""
     calls = [call for call in reads(api) if not call.operation.optional] or reads(api)
     return min(calls, key=lambda call: "?" in call.path)
 
@@ -35,9 +35,9 @@ def _first(api: RestInterface) -> Call:
 @pytest.mark.phase("silence")
 @pytest.mark.requirement("http/framing")
 def test_every_octet_of_an_answer(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
-    """Read responses from the socket: a status line, valid fields, and exactly as many octets as announced.
+    """Read responses from the socket: a status line, valid fields, and exactly as many bytes as announced.
 
-    Read so often that a robot which fails one time in fifty is noticed: client libraries ignore surplus octets.
+    Client libraries ignore surplus bytes. The check reads often enough to notice a fault in one of fifty responses.
     """
     calls = reads(api)
     turns = -(-_IN_ALL // max(1, len(calls))) if not api.run.effort.slow else 1
@@ -77,7 +77,7 @@ def test_answers_stay_aligned(api: RestInterface, rest: HttpClient, judge: Judge
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/host-missing", "http/host-twice", "http/host-repeated", "http/content-length-conflict")
 def test_fields_that_have_to_be_refused(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
-    """Send no Host, two of them, and two lengths for one body (RFC 9112 3.2, 6.3)."""
+    """Send requests without Host, with two, and with two lengths; the robot must reject them (RFC 9112 3.2, 6.3)."""
     path = _first(api).path
     host = f"Host: {rest.authority}"
     for id_, closing, octets in (
@@ -98,7 +98,7 @@ def test_fields_that_have_to_be_refused(api: RestInterface, rest: HttpClient, ju
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/malformed-request")
 def test_octets_that_are_no_request(api: RestInterface, judge: Judge) -> None:
-    """Send octets that are no HTTP request: the robot refuses or cuts them off, and answers the next request."""
+    """Send bytes that are not HTTP: the robot must respond 4xx or close, and still serve the next request."""
     judge.at_risk = ("http/malformed-request",)
     for octets in _GARBAGE:
         attempt, _ = _ask_by_hand(api, octets)
@@ -107,7 +107,7 @@ def test_octets_that_are_no_request(api: RestInterface, judge: Judge) -> None:
 
 
 def _ask_by_hand(api: RestInterface, octets: bytes, most_s: float = _THINK_S) -> tuple[Attempt, raw.RawAnswer]:
-    """Send octets, and return what became of them within so many seconds, as an attempt and as it came."""
+    """Send bytes over a socket; return the outcome within ``most_s`` seconds as an attempt and as raw bytes."""
     patience_s = min(api.client.connection.timeout_s, most_s + 4 * api.run.effort.usual_ms / 1000)
     came = raw.talk(api.client, octets, timeout_s=patience_s, answers=1)
     return raw.read_one(api.client, octets, came, "GET")[0], came

@@ -23,7 +23,7 @@ _ALWAYS_ALLOWED = frozenset({"HEAD", "OPTIONS", "TRACE"})
 
 
 def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
-    """Return each resource with a valid request for it; extensions that this robot lacks are left out."""
+    """Return each resource with a valid request for it, without optional resources that this robot lacks."""
     found = []
     for resource in resources_of(api.run.contract):
         first = example_call(api, next(iter(resource.operations.values())))
@@ -39,7 +39,7 @@ def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
 
 @pytest.mark.requirement("http/method-not-allowed", "http/allow", "http/allow-agrees")
 def test_methods_that_a_resource_has_not(api: RestInterface, judge: Judge) -> None:
-    """Send each resource each method that the contract does not give it."""
+    """Send to each resource each method that the contract does not define for it: the robot must respond 405."""
     for resource, call in _resources(api):
         there = {*resource.methods, *(("HEAD",) if "GET" in resource.methods else ())}
         for method in api.run.effort.subsample([name for name in _STANDARD if name not in there], 2):
@@ -51,7 +51,7 @@ def test_methods_that_a_resource_has_not(api: RestInterface, judge: Judge) -> No
 
 @pytest.mark.requirement("http/unknown-method", "http/unknown-method-refused")
 def test_methods_that_nobody_knows(api: RestInterface, judge: Judge) -> None:
-    """Send methods that no resource has, which a server may refuse before any resource sees them."""
+    """Send unknown methods, which a server may reject before it looks at the resource."""
     for _, call in api.run.effort.subsample(_resources(api), 2):
         for method in _UNKNOWN:
             attempt: Attempt
@@ -67,7 +67,7 @@ def test_methods_that_nobody_knows(api: RestInterface, judge: Judge) -> None:
 
 @pytest.mark.requirement("http/options", "http/allow-agrees")
 def test_options(api: RestInterface, judge: Judge) -> None:
-    """Ask each resource for its methods with OPTIONS."""
+    """Send OPTIONS to each resource and judge the Allow header."""
     for resource, call in _resources(api):
         exchange = call.send(api, method="OPTIONS")
         if expect(judge, "http/options", exchange).status(200, 204):
@@ -90,7 +90,7 @@ def _judge_allow(judge: Judge, requirement: str, resource: Resource, exchange: E
 
 
 def _formats(call: Call, most: int) -> list[str]:
-    """Return JSON, and so many of the other formats of a read."""
+    """Return JSON and ``most`` of the other formats of a GET."""
     return [JSON, *[name for name in call.operation.formats if name != JSON][:most]]
 
 

@@ -1,4 +1,4 @@
-"""Formats that a client rules out are not sent (RFC 9110 12.4.2, 12.5.1, 15.5.7)."""
+"""The robot must not send a format that the client excludes (RFC 9110 12.4.2, 12.5.1, 15.5.7)."""
 
 import pytest
 
@@ -15,7 +15,7 @@ _NOTHING = ("image/png", "application/vnd.roaas-nobody-has-this", "audio/*;q=0.5
 
 @pytest.mark.requirement("http/not-acceptable")
 def test_no_acceptable_format(api: RestInterface, judge: Judge) -> None:
-    """Accept only formats that the robot does not have."""
+    """Send Accept with only formats that the robot does not offer."""
     cases = [(call, accept) for call in answered(api, "http/not-acceptable") for accept in _NOTHING]
     for call, accept in api.run.effort.draw(cases, 120, f"{api.run.seed}/not acceptable"):
         exchange = call.send(api, ("Accept", accept))
@@ -24,7 +24,7 @@ def test_no_acceptable_format(api: RestInterface, judge: Judge) -> None:
 
 @pytest.mark.requirement("http/q-zero")
 def test_quality_zero(api: RestInterface, judge: Judge) -> None:
-    """Rule formats out with q=0: the robot sends another format, or 406."""
+    """Exclude formats by q=0: the robot must send another format, or 406."""
     for call in api.run.effort.subsample(answered(api, "http/q-zero"), 2):
         first = call.operation.formats[0] if call.operation.formats else "application/json"
         others = [name for name in call.operation.formats if name != first]
@@ -41,7 +41,7 @@ def test_quality_zero(api: RestInterface, judge: Judge) -> None:
 
 @pytest.mark.requirement("http/accept-parameters")
 def test_charset_in_accept(api: RestInterface, judge: Judge) -> None:
-    """Write a charset into Accept, as many clients do."""
+    """Send a charset parameter in Accept, as many clients do."""
     cases = [(call, media_type) for call in answered(api) for media_type in call.operation.formats]
     for call, media_type in api.run.effort.draw(cases, 20, f"{api.run.seed}/accept charset"):
         if call.send(api, ("Accept", media_type)).response.media_type != media_type:

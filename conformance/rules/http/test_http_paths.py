@@ -61,7 +61,7 @@ def test_unknown_paths(api: RestInterface, rest: HttpClient, judge: Judge) -> No
 
 
 def _leads_nowhere(api: RestInterface, exchange: Exchange) -> bool:
-    """Return whether a response redirects to another unknown path below the base URL, or to another place."""
+    """Return whether a response redirects outside the base URL or to another unknown path."""
     location = exchange.response.header("location")
     if exchange.response.status not in {301, 302, 303, 307, 308} or location is None:
         return False
@@ -102,7 +102,7 @@ def _leads_to(exchange: Exchange, path: str) -> bool:
 
 @pytest.mark.requirement("http/uri-too-long", "http/declared-body")
 def test_long_targets(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
-    """Send long targets: the robot takes or refuses them, and answers the next request."""
+    """Send long targets: the robot must accept or reject them, and still serve the next request."""
     judge.at_risk = ("http/uri-too-long",)
     for call in [call for call in reads(api) if not call.operation.optional]:
         usual = call.send(api).response.status

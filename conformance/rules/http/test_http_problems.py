@@ -1,4 +1,4 @@
-"""Problem documents: an error says in words what was wrong, and where (RFC 9457 3.1.4)."""
+"""Problem documents: an error response names the field or parameter that is wrong (RFC 9457 3.1.4)."""
 
 from functools import partial
 

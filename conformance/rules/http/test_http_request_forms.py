@@ -1,4 +1,4 @@
-"""One request in the forms that clients write, and in several segments (RFC 9110 5; RFC 9112 2, 5, 9)."""
+"""One request in the notations that real clients use, and in several TCP segments (RFC 9110 5; RFC 9112 2, 5, 9)."""
 
 import pytest
 
@@ -30,7 +30,7 @@ def _asked(api: RestInterface, path: str, *fields: str, cuts: tuple[int, ...] = 
 
 
 def _kind(attempt: Attempt) -> tuple[int, str]:
-    """Return status and media type of a response, which show how the request was understood."""
+    """Return status and media type of a response, which show how the robot understood the request."""
     if isinstance(attempt, Unanswered):
         return 0, attempt.problem
     return attempt.response.status, attempt.response.media_type
@@ -43,7 +43,7 @@ def _named(kind: tuple[int, str]) -> str:
 
 
 def _telling_read(api: RestInterface) -> tuple[Call, str, tuple[int, str]] | None:
-    """Return a read, a media type that changes its response, and how; None where no media type does."""
+    """Return a GET, an Accept that changes its response, and that response's kind; None where none does."""
     for call in answered(api)[:1]:
         usual = _kind(_asked(api, call.path))
         for media_type in (*call.operation.formats, _NOTHING):
@@ -93,7 +93,7 @@ def test_requests_in_pieces(api: RestInterface, rest: HttpClient, judge: Judge) 
 @pytest.mark.phase("describe")
 @pytest.mark.requirement("http/close", "http/old-client")
 def test_the_end_of_a_connection(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
-    """Ask for the end of the connection, and ask as a client of HTTP/1.0, which knows no chunks."""
+    """Send Connection: close, and requests of an HTTP/1.0 client, which does not know chunked encoding."""
     judge.at_risk = ("http/close",)
     for call in answered(api, "http/close", "http/old-client")[:1]:
         octets = raw.head(rest, "GET", call.path, "Connection: close")

@@ -25,14 +25,14 @@ _WATCHED_S = 0.15
 @pytest.mark.phase("resting")
 @pytest.mark.requirement("http/safe")
 def test_reading_changes_nothing(api: RestInterface, judge: Judge) -> None:
-    """Compare what was steady before GET, HEAD and OPTIONS of everything with what is there after them."""
+    """Compare the state that was steady before GET, HEAD and OPTIONS of every resource with the state after them."""
     _judge_safe(api, judge)
 
 
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/safe")
 def test_reading_changes_nothing_after_input(api: RestInterface, judge: Judge) -> None:
-    """Compare the same while the robot has something to lose: a list that is not empty, a value that was set."""
+    """Compare the same after input that a safe request could destroy: a list with entries, a value that was set."""
     if api.run.allow_motion:  # else nothing was put, and the check before this one has judged the same
         api.device.bring_to_rest(api)
         _judge_safe(api, judge)
@@ -41,9 +41,9 @@ def test_reading_changes_nothing_after_input(api: RestInterface, judge: Judge) -
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/safe")
 def test_reading_leaves_what_was_put(api: RestInterface, judge: Judge) -> None:
-    """Send PUT for something (a goal), and look whether it is still there after HEAD and OPTIONS of everything.
+    """PUT a resource (a goal), and check that HEAD and OPTIONS of every resource do not remove it.
 
-    What does not last twice as long by itself is not judged: a goal ends when it is reached.
+    A resource that does not last twice as long by itself is not judged: a goal ends when the robot reaches it.
     """
     calls = [Call(call.operation, call.values) for call in reads(api)]
     others = api.run.effort.subsample(calls, 1)
@@ -67,10 +67,10 @@ def test_reading_leaves_what_was_put(api: RestInterface, judge: Judge) -> None:
 def _put_and_watch(
     api: RestInterface, call: Call, reader: Call, asked: list[Call], seconds: float
 ) -> tuple[bool, Exchange, float]:
-    """Send PUT, then HEAD and OPTIONS to some resources, and watch whether what was put stays there for so long.
+    """Send PUT, then HEAD and OPTIONS to other resources, and read for ``seconds`` whether the new resource stays.
 
     Returns:
-        Whether it does, the last reading, and how long all of it took, s.
+        Whether it stayed, the last reading, and the total time, s.
     """
     api.device.halt(api)
     call.send(api)
@@ -87,9 +87,9 @@ def _put_and_watch(
 
 
 def _judge_safe(api: RestInterface, judge: Judge) -> None:
-    """Compare what is steady before and after safe requests; what changes without them as well is no effect of them.
+    """Compare the steady state before and after safe requests; state that also changes without them does not count.
 
-    A robot that changes by itself changes in some turns; one whose safe methods have effects changes in every turn.
+    A robot that changes by itself does so in some rounds; one whose safe requests have effects changes in every round.
     """
     calls = api.run.effort.subsample(reads(api), 3)
     suspects: dict[tuple[str, str], Exchange] = {}
@@ -125,7 +125,7 @@ def _judge_safe(api: RestInterface, judge: Judge) -> None:
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/put-idempotent")
 def test_put_twice(api: RestInterface, judge: Judge) -> None:
-    """Send the same PUT twice: it succeeds twice, and leaves the resource as PUT once does."""
+    """Send the same PUT twice: both succeed, and the resource is as after the first."""
     wanted = applicable_operations(api, ["http/put-idempotent"], lambda item: item.method == "PUT", "is a PUT")
     for operation in wanted:
         api.device.bring_to_rest(api)
@@ -160,7 +160,7 @@ def test_put_twice(api: RestInterface, judge: Judge) -> None:
 
 
 def _pair(api: RestInterface, call: Call) -> tuple[Exchange, str | None, Exchange]:
-    """Send a PUT twice; return both exchanges, and between them what the resource shows otherwise than was put."""
+    """Send a PUT twice; return both exchanges, and where the resource differed from the request in between."""
     first = call.send(api)
     second = call.send(api)
     return first, settles_at(api, call), second

@@ -1,6 +1,6 @@
 """Schemathesis over the contract's OpenAPI: examples, coverage, fuzzing and walks along its links.
 
-The suite judges its requests by what they are on the wire: valid ones by the contract's statuses, invalid ones by 4xx.
+The suite judges each request by its bytes: valid ones must get a declared status, invalid ones 4xx.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def _run(api: RestInterface, judge: Judge, explore: Explorer, guard: MotionGuard
 
 
 def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item: GeneratedRequest) -> None:
-    """Send one request where it is harmless, and judge the response by what the request is on the wire."""
+    """Send a generated request if it is harmless; a valid one must get a declared status, an invalid one 4xx."""
     fit = guard.admit(item)
     if fit is None:
         return

@@ -1,4 +1,4 @@
-"""Which format a robot sends for which Accept (RFC 9110 12.4.2, 12.5.1)."""
+"""Which format a robot sends for which Accept header (RFC 9110 12.4.2, 12.5.1)."""
 
 import pytest
 
@@ -47,7 +47,7 @@ _MATRIX = (
 
 @pytest.mark.requirement(_DEFAULT)
 def test_default_format(api: RestInterface, judge: Judge) -> None:
-    """Send no Accept, and */*: JSON comes."""
+    """Send no Accept header, and */*: the response must be JSON."""
     for call in api.run.effort.subsample(answered(api, _DEFAULT), 3):
         if "application/json" not in call.operation.formats:
             continue

@@ -28,7 +28,7 @@ _ECHO = 1e-9
 
 @pytest.mark.requirement("rest-formats/same-values", "rest-formats/xml-root")
 def test_formats_of_what_was_put(api: RestInterface, judge: Judge) -> None:
-    """Put a resource that is there only then (a goal), and compare its values in all formats."""
+    """PUT a resource that exists only then (a goal), and compare its values in all formats."""
     for operation in usable_operations(api, lambda item: item.method == "PUT" and bool(item.bodies)):
         api.device.halt(api)
         call = example_call(api, operation)
@@ -88,7 +88,7 @@ def test_xml_is_taken(api: RestInterface, judge: Judge) -> None:
 
 
 def _judge_echoes(api: RestInterface, call: Call, exchange: Exchange, echoes: list[dict[str, Any]]) -> None:
-    """Judge that the accepted value is the same in a JSON response and in one of another format."""
+    """Judge whether a JSON response and one in another format show the accepted value alike."""
     if not api.device.answers_alike(call.operation.template) or len(echoes) < len((JSON, XML)):
         return
     first, last = echoes
@@ -116,14 +116,14 @@ def _sent_form(api: RestInterface, call: Call) -> etree._Element | None:
 
 
 def _same(shown: Any, value: Any) -> bool:
-    """Return whether a value came back, a number nearly so: a robot may bring a quaternion to unit length."""
+    """Return whether two values are equal, numbers nearly so: a robot may normalize a quaternion."""
     if isinstance(shown, float) and isinstance(value, float):
         return math.isclose(shown, value, rel_tol=_ECHO, abs_tol=_ECHO)
     return bool(shown == value)
 
 
 def _echo(call: Call, exchange: Exchange) -> tuple[dict[str, Any], str]:
-    """Return what comes back of a value that was sent, by place (nothing may), and what of it differs."""
+    """Return the values in the response that were in the request, by place (maybe none), and where they differ."""
     answer = exchange.response
     schema = (call.operation.declared(answer.status) or {}).get(answer.media_type)
     if schema is None or not answer.body:

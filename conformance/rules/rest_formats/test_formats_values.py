@@ -1,4 +1,4 @@
-"""JSON, XML and text of one moment: each can be read, and all have the same values (contract, formats)."""
+"""JSON, XML and plain text of the same moment: each must be readable and have the same values (contract, formats)."""
 
 import pytest
 
@@ -30,7 +30,7 @@ def _say_lacking(api: RestInterface, media_type: str, *ids: str) -> None:
     "rest-formats/xml", "rest-formats/xml-root", "rest-formats/text", "rest-formats/charset", "rest-formats/vary"
 )
 def test_each_format_is_sent(api: RestInterface, judge: Judge, effort: Effort) -> None:
-    """Ask for each resource as XML and as text; the observers judge what is in the responses."""
+    """GET each resource as XML and as text; the observers judge the responses."""
     _say_lacking(api, _XML, "rest-formats/xml", "rest-formats/xml-root")
     _say_lacking(api, _TEXT, "rest-formats/text")
     if not any({_XML, _TEXT} & set(operation.formats) for operation in operations_of(api.run.contract)):
@@ -57,7 +57,7 @@ def test_each_format_is_sent(api: RestInterface, judge: Judge, effort: Effort) -
 
 
 def _root_fault(operation: Operation, body: bytes) -> str:
-    """Return what is wrong with the name of a root; a list has no type, so its root may have any name."""
+    """Return what is wrong with the root element's name; a list's root may have any name."""
     schema = operation.shape or {}
     wanted = root_name(schema)
     if not wanted or kind_of(schema) == "array":

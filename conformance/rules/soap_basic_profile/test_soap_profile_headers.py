@@ -21,7 +21,7 @@ _UNKNOWN = Node(clark(_STRANGE, "no_such_operation"))
 
 
 def _block(flag: str | None = None, actor: str | None = None, space: str = ENVELOPE) -> Node:
-    """Return a header block that no robot knows."""
+    """Return a header block in a namespace that no robot knows."""
     given = (("mustUnderstand", flag), ("actor", actor))
     attributes = tuple((clark(space, name), value) for name, value in given if value is not None)
     return Node(clark(_STRANGE, "Transaction"), "5", (), attributes)

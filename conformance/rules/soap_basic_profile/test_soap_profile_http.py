@@ -31,7 +31,7 @@ _TEXT_XML: Final = {
 
 
 def _message(service: SoapService) -> Node:
-    """Return a message that the robot takes, if there is one; else a well-formed message of no operation."""
+    """Return a message that the robot accepts, if known; else a well-formed message of no operation."""
     good = quiet_example(service)
     return good[1] if good else _ANY
 
@@ -50,7 +50,7 @@ def test_soap_action(soap: SoapServices, judge: Judge, effort: Effort) -> None:
 
 
 def _taken_otherwise(service: SoapService) -> Node | None:
-    """Return a message that the robot takes with a SOAPAction that the description does not declare, or without."""
+    """Return a message that the robot accepts with an undeclared SOAPAction or without one, or None."""
     for operation in service.contract.operations:
         declared = service.contract.shape(operation.request) if operation.request else None
         if declared is None:
@@ -63,7 +63,7 @@ def _taken_otherwise(service: SoapService) -> Node | None:
 
 
 def _malformed(message: Node) -> list[tuple[str, bytes]]:
-    """Return bodies that are no well-formed XML, none of which leaves a reader waiting for more."""
+    """Return bodies that are not well-formed XML, complete enough that no parser waits for more."""
     good = envelope([message]).written()
     end = good.rindex(b"</")
     return [
@@ -111,9 +111,9 @@ def _judge_malformed(judge: Judge, answer: SoapResponse, what: str) -> None:
 
 
 def _truncated(judge: Judge, service: SoapService) -> None:
-    """Send two thirds of a document over a connection of its own.
+    """Send two thirds of a document over a separate connection.
 
-    A server that reads XML as it comes may wait for the rest until its own deadline (gSOAP does): that is no breach.
+    A server that parses XML as it arrives may wait for the rest until its timeout (gSOAP does); that is no violation.
     """
     document = envelope([_message(service)]).written()
     apart = service.apart()

@@ -1,4 +1,4 @@
-"""Invalid SOAP messages are refused: each is a valid message broken in one way, confirmed by lxml and xmlschema."""
+"""The robot must reject invalid SOAP messages: valid ones broken in one way, confirmed by lxml and xmlschema."""
 
 import random
 from itertools import islice
@@ -32,7 +32,7 @@ def _targets(soap: SoapServices, service: SoapService) -> list[tuple[Element, No
 
 
 def _judged(judge: Judge, mutant: Mutation[Payload], answer: SoapResponse) -> bool:
-    """Judge whether a mutant was refused, and how; return whether that was right."""
+    """Judge whether the robot rejected an invalid message, and with which fault; return whether that was right."""
     why = f" ({mutant.reason})" if mutant.reason else ""
     refused = expect_answer(judge, f"strict-input/soap-{mutant.kind}", answer).that(
         answer.refused,
@@ -50,7 +50,7 @@ def _judged(judge: Judge, mutant: Mutation[Payload], answer: SoapResponse) -> bo
 
 @pytest.mark.requirement(*_IDS)
 def test_single_mutations(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """Send every single mutation of a message that the robot takes."""
+    """Send every single mutation of a message that the robot accepts."""
     chance = random.Random(soap.run.seed)  # noqa: S311 - choice of cases, not of secrets
     sent: dict[str, int] = dict.fromkeys(_KINDS, 0)
     services = callable_services(soap, *_IDS)

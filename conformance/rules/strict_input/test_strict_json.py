@@ -1,4 +1,4 @@
-"""Invalid JSON bodies are refused: each breaks the contract in one way, confirmed on the octets."""
+"""The robot must reject invalid JSON bodies: valid ones broken in one way, confirmed on the bytes."""
 
 from functools import partial
 
@@ -53,7 +53,7 @@ def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort)
 
 
 def _count(effort: Effort, kind: str) -> int:
-    """Return how many cases to send at standard effort; a deep body costs a robot a hundred times as much."""
+    """Return the number of cases at standard effort; fewer for deeply nested bodies, which cost a robot much more."""
     if kind == "depth":
         return 6 if effort.name != "quick" else 1
     return _EACH

@@ -1,4 +1,4 @@
-"""Invalid parameters are refused, and so are requests without a required one."""
+"""The robot must reject invalid parameters, and requests without a required one."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -68,7 +68,7 @@ def test_path_parameters(api: RestInterface) -> None:
 def _valid_calls(
     api: RestInterface, requirement: str, wanted: Callable[[Operation], bool], what: str
 ) -> Iterator[Call]:
-    """Yield valid requests that the robot accepts, so that it refuses another one for what was changed."""
+    """Yield valid requests that the robot accepts, so that only the later change can be why it rejects one."""
     for operation in applicable_operations(api, [requirement], wanted, what):
         call = readable(api, operation) if operation.method == "GET" else example_call(api, operation)
         exchange = call.send(api)
@@ -80,7 +80,7 @@ def _valid_calls(
 
 
 def _chosen(api: RestInterface, operation: Operation, where: str) -> list[Wrong]:
-    """Return wrong texts of the parameters: at little effort, one of each kind and some more."""
+    """Return invalid texts for the parameters: at quick effort one of each kind and a few more."""
     wrong = [item for parameter in operation.parameter(where) for item in wrong_texts(parameter)]
     first: dict[str, Wrong] = {}
     for item in wrong:

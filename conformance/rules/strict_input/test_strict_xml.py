@@ -1,4 +1,4 @@
-"""Invalid XML bodies are refused, by robots that take XML."""
+"""Robots that accept XML bodies must reject invalid ones."""
 
 from functools import partial
 

@@ -47,7 +47,7 @@ def _targets(contract: Contract) -> Iterator[tuple[str, str]]:
 
 
 def _template(rest: HttpClient, path: str) -> Template:
-    """Return the resource's own XML with a slot for its first value; else a document of no meaning."""
+    """Return the resource's own XML with a slot in place of its first value; else a minimal document with a slot."""
     exchange = rest.send("GET", path, headers=(("Accept", _XML),))
     answer = exchange.response
     plain = Template(f"<message>{VALUE_SLOT}</message>", "message", "1")
@@ -65,7 +65,7 @@ def _template(rest: HttpClient, path: str) -> Template:
 
 
 def _node(element: etree._Element, value: list[str]) -> Node:
-    """Return an element as a node with VALUE_SLOT for its first text, which is put into ``value``."""
+    """Return an element as a node with VALUE_SLOT in place of its first text, which is appended to ``value``."""
     children = tuple(_node(child, value) for child in elements(element))
     text = text_of(element).strip() if not children else ""
     if text and not value:

@@ -1,4 +1,4 @@
-"""XML attacks on the SOAP services: refused, nothing leaked, no address called, and the robot still responsive."""
+"""XML attacks on the SOAP services: the robot must reject them, leak nothing, call no address, and stay responsive."""
 
 import statistics
 from collections.abc import Iterator
@@ -48,7 +48,7 @@ _HALF = 0.5
 
 
 def _harmless(service: SoapService) -> tuple[Node, Node, str] | None:
-    """Return a message that the robot takes: as it is, with VALUE_SLOT for one of its values, and that value."""
+    """Return a message that the robot accepts, the same with VALUE_SLOT for one value, and that value."""
     found: tuple[Node, Node, str] | None = None
     for operation in service.contract.operations:
         message = example(service, operation)
@@ -111,7 +111,7 @@ def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
 def _attacks(
     service: SoapService, harmless: tuple[Node, Node, str], callbacks: CallbackServer, each: int
 ) -> Iterator[Attack]:
-    """Yield the attacks on the XML of a harmless message, in a value and in a Header block to be ignored."""
+    """Yield the attacks on a harmless message: in one of its values, and in a Header block that must be ignored."""
     _, marked, value = harmless
     aside = Node(clark("urn:example:strange", "Note"), IGNORED_SLOT)
     document = envelope([marked], (aside,)).written().decode()

@@ -74,9 +74,7 @@ class Drive:
         return drive_rules.answer_of(command).holds
 
     def _renew(self) -> None:
-        """Send the last command again to the same resource: a PUT of all components could hide a partial PUT's
-        fault.
-        """
+        """Send the last command again to the same resource, as a full PUT could hide a partial PUT's fault."""
         last = self.trace.last_command
         if last is None:
             return

@@ -20,9 +20,7 @@ class Pose(NamedTuple):
         return math.hypot(other.x - self.x, other.y - self.y)
 
     def ahead(self, distance: float, turn: float = 0.0) -> Pose:
-        """Return the pose ``distance`` metres away in the direction of the heading plus ``turn`` (rad), facing
-        that way.
-        """
+        """Return the pose ``distance`` m away in the direction of the heading plus ``turn`` (rad), facing that way."""
         yaw = wrapped(self.yaw + turn)
         return Pose(self.x + distance * math.cos(yaw), self.y + distance * math.sin(yaw), yaw)
 

@@ -76,9 +76,7 @@ class GoalObserver(Listener):
             self._look(self._before, self._since[0], self._since[1], self._first)
 
     def _compare(self) -> None:
-        """Judge a GET by the GETs before and after it, when those two agree and no request changed the goal in
-        between.
-        """
+        """Judge a GET by the GETs before and after it, if those agree and nothing changed the goal in between."""
         if len(self._newest) < _SHOWN:
             return
         (first, _), (between, exchange), (last, _) = self._newest
@@ -96,9 +94,7 @@ class GoalObserver(Listener):
         )
 
     def _look(self, before: Shown, first: Shown, later: Shown, exchange: Exchange) -> None:
-        """Judge the first goal shown after a change: each field must be the old goal's or the new one's, not a
-        mixture.
-        """
+        """Judge the first goal shown after a change: each field is the old goal's or the new one's, not mixed."""
         others = {place for place, value in later.items() if before.get(place) != value}
         stale = {place for place in others if first.get(place) == before.get(place)}
         self._changed.update(others)

@@ -1,6 +1,6 @@
-"""What a velocity that is not renewed shows: it holds for its time, then begins to stop, and ends in rest.
+"""Judge a velocity that is not renewed: it must hold for its time, then begin to stop, and end in rest.
 
-Every function judges a record and talks to nobody.
+Functions here judge a record and send nothing.
 """
 
 import itertools
@@ -31,25 +31,25 @@ _ENDS_S: Final = 10.0
 
 
 def certain_s(hold_s: float | None, share: float = _COUNTED_ON) -> float:
-    """Return how long after its command was sent a velocity certainly still holds, s; ``share``: of the hold time."""
+    """Return how long after its command a velocity certainly holds, s; ``share``: counted share of the hold time."""
     return COUNTED_ON_S if hold_s is None else share * hold_s - _LATE_S
 
 
 def ends_by(limits: Limits, settle_s: float) -> float:
-    """Return how long after its command a velocity has to have ended, s; ``settle_s``: the robot has for stopping."""
+    """Return how long after its command a velocity must have ended, s; ``settle_s``: time the robot has to stop."""
     return _ENDS_S if limits.hold_s is None else 1.1 * limits.hold_s + settle_s
 
 
 @dataclass(frozen=True)
 class LetGo:
-    """A velocity that was commanded and not renewed.
+    """A velocity that was commanded and not renewed, and the readings after it.
 
     Attributes:
-        velocity: which.
-        full: when the last command of all components was sent, s of the monotonic clock.
-        answered: when the last command was answered.
-        turns: what was seen since.
-        resumed: the first turn after a while without requests; None: there was no such while.
+        velocity: the velocity.
+        full: when the last command of all components was sent, s of the run's clock.
+        answered: when its response arrived.
+        turns: the readings since.
+        resumed: the first reading after a pause without requests; None: there was no pause.
     """
 
     velocity: Velocity
@@ -59,7 +59,7 @@ class LetGo:
     resumed: int | None = None
 
     def holds_by(self, limits: Limits, count: int) -> bool | None:
-        """Return whether the first turns, so many, end with the velocity; None where they are too few to say."""
+        """Return whether the first ``count`` readings end with the velocity; None where they are too few to tell."""
         begin = max(0, count - _LOOKED_AT)
         if self.resumed is not None and count > self.resumed:
             # Samples from before the silence say nothing of what is behind it.
@@ -67,19 +67,19 @@ class LetGo:
         return windows.verdict(limits, self.turns[begin:count], self.velocity, _OFF)
 
     def was_held(self, limits: Limits) -> bool:
-        """Return whether the velocity was seen while it had to hold: a robot may respond too late for that."""
+        """Return whether a reading showed the velocity within its hold time; slow responses may come too late."""
         certain = self.full + certain_s(limits.hold_s or 0.0, JUDGED)
         in_time = sum(turn.at <= certain for turn in self.turns)
         return any(self.holds_by(limits, count) for count in range(1, in_time + 1))
 
     def rests(self, limits: Limits) -> bool:
-        """Return whether the newest samples say that the robot is at rest."""
+        """Return whether the newest samples show the robot at rest."""
         return bool(windows.shown(limits, self.turns[-_LOOKED_AT:], STILL))
 
     def early(self, limits: Limits) -> Turn | None:
-        """Return the first turn in which the velocity had ended before its time, if there is one.
+        """Return the first reading in which the velocity ended before its hold time, or None.
 
-        Without a declared hold time that is a moment: what was reached before does not end by being asked for again.
+        Without a declared hold time the velocity must hold only for a moment.
         """
         hold_s = limits.hold_s
         certain = self.answered + _AT_LEAST_S if hold_s is None else self.full + certain_s(hold_s, JUDGED)
@@ -91,7 +91,7 @@ class LetGo:
         return None
 
     def late(self, limits: Limits) -> Turn | None:
-        """Return the first turn in which the velocity still held after it had to end, if there is one."""
+        """Return the first reading in which the velocity still held after it had to end, or None."""
         if limits.hold_s is None:
             return None
         last = self.answered + self.longest(limits)
@@ -101,9 +101,9 @@ class LetGo:
         return None
 
     def longest(self, limits: Limits) -> float:
-        """Return for how long after the command the velocity may be seen, s.
+        """Return how long after the command the velocity may be seen, s.
 
-        A command and an odometry are on their way for a part of the settle time; half as long again is no such delay.
+        Commands and odometry are delayed by part of the settle time; half as long again is no such delay.
         """
         hold = limits.hold_s or 0.0
         samples = windows.newest(self.turns[: self.resumed], len(self.turns))
@@ -112,7 +112,7 @@ class LetGo:
         return hold + max(0.4 * hold, 0.5 * limits.settle_s, windows.LONGEST_SAMPLE_S) + 2 * period
 
     def is_void(self, limits: Limits) -> bool:
-        """Return whether a response came so late that the turns say nothing of the hold time."""
+        """Return whether a response was so slow that the readings prove nothing about the hold time."""
         gap = _GAP * (limits.hold_s or 0.0)
         before, behind = self.turns[: self.resumed], self.turns[len(self.turns[: self.resumed]) :]
         times = [self.full, self.answered, *(turn.at for turn in before)]

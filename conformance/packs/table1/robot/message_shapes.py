@@ -35,9 +35,7 @@ def _without(schema: Schema, name: str) -> Schema:
 
 
 def _with_any_type(entries: Schema) -> Schema:
-    """Return the schema of a list without the rules that other requirements judge: the form of ``type``, and
-    duplicates.
-    """
+    """Return a list's schema without the rules that other requirements judge (form of ``type``, duplicates)."""
     entry = entries["items"]
     return {
         "type": "array",

@@ -137,9 +137,7 @@ class Start:
 
     @property
     def case(self) -> Case:
-        """Judge whether the path begins at the robot, by the median of the plans: one localisation reading may be
-        wrong.
-        """
+        """Judge whether the path begins at the robot, by the median of the plans, as single readings may be wrong."""
         return Case(
             self.beyond_m[0] <= 0 or median(self.beyond_m) <= 0,
             self.exchange,

@@ -1,4 +1,4 @@
-"""A robot as the checks of its domain see it: read, driven, and judged by the shape of all that it answers."""
+"""The robot as the paper pack's checks use it: typed reads and writes over REST, with units and frames."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ JSON_BODY: Final = (("Content-Type", "application/json"), ("Accept", "applicatio
 
 
 class Velocity(NamedTuple):
-    """A geometry_msgs/Twist: m/s and rad/s."""
+    """A velocity (geometry_msgs/Twist): m/s and rad/s."""
 
     linear_x: float = 0.0
     linear_y: float = 0.0
@@ -44,17 +44,17 @@ class Velocity(NamedTuple):
 
     @classmethod
     def of(cls, twist: Mapping[str, Any]) -> Velocity:
-        """Return the velocity in JSON."""
+        """Return the velocity in a Twist in JSON."""
         return cls(*(float(twist[part][axis]) for part in ("linear", "angular") for axis in "xyz"))
 
     @property
     def linear(self) -> dict[str, float]:
-        """The linear part as JSON."""
+        """Return the linear part as a JSON object."""
         return dict(zip("xyz", self[:3], strict=True))
 
     @property
     def twist(self) -> dict[str, dict[str, float]]:
-        """As JSON."""
+        """Return the velocity as a Twist in JSON."""
         return {"linear": self.linear, "angular": dict(zip("xyz", self[3:], strict=True))}
 
     def __str__(self) -> str:
@@ -72,14 +72,14 @@ _SELDOM_HZ: Final = 5.0
 
 
 def is_near(limits: Limits, measured: Velocity, wanted: Velocity, factor: float = 1.0, samples: float = 1) -> bool:
-    """Return whether each component is what was wanted, within ``factor`` times the declared tolerance, and the noise.
+    """Return whether each component is the wanted one, within ``factor`` times the declared tolerance plus noise.
 
     Args:
-        limits: of the robot.
+        limits: the robot's limits, tolerance and noise.
         measured: one sample, or the median of several.
-        wanted: what it should be.
-        factor: how much of the tolerance.
-        samples: of how many samples the median is: noise counts the less, the more there are.
+        wanted: the wanted velocity.
+        factor: multiple of the tolerance.
+        samples: number of samples in the median; the more, the smaller is the noise.
     """
     noise = limits.noise
     off = FARTHEST / math.sqrt(samples)
@@ -96,11 +96,11 @@ class Odometry:
     """One reading of the odometry.
 
     Attributes:
-        sent, received: when it was requested and received, s of the monotonic clock.
-        stamp: the robot's own, s.
-        pose: in the odometry frame.
-        velocity: in the robot's frame.
-        exchange: the evidence.
+        sent, received: times of request and response, s of the monotonic clock.
+        stamp: the robot's timestamp, s.
+        pose: the pose in the odometry frame.
+        velocity: the velocity in the robot's frame.
+        exchange: the GET's request and response.
     """
 
     sent: float
@@ -112,10 +112,10 @@ class Odometry:
 
 
 class Robot:
-    """One robot, over REST.
+    """One robot over REST.
 
     Attributes:
-        clock: by which it is watched.
+        clock: the run's clock, used for every wait.
     """
 
     def __init__(self, api: RestInterface, clock: Clock = WALL_CLOCK) -> None:
@@ -131,24 +131,24 @@ class Robot:
 
     @property
     def limits_declared(self) -> bool:
-        """Whether the statement says how fast the robot can be, so that beyond it is known."""
+        """Return whether the statement declares all velocity limits, so that requests beyond them can be made."""
         return self.limits.linear_declared and self.limits.angular_declared
 
     @property
     def settle_s(self) -> float:
-        """How long to wait before a velocity that is not reached is held against the robot, s.
+        """Return how long the robot has to reach a velocity before a miss counts as a failure, s.
 
-        A quarter more than declared and a quarter of a second, for a loaded machine and a network between.
+        The declared time, a quarter more, and 0.25 s for a loaded machine and the network.
         """
         return 1.25 * self.limits.settle_s + 0.25 + 4 * self.usual_s
 
     @property
     def sample_s(self) -> float:
-        """How long the robot has one sample of its odometry, and one interface may be behind another, at most, s."""
+        """Return the longest time between odometry samples, by which two interfaces may differ, s."""
         return 1 / (self.limits.odometry_hz or _SELDOM_HZ)
 
     def patience(self, seconds: float) -> Patience:
-        """Return a wait of so many seconds, in which delays of the responses do not count."""
+        """Return a wait of ``seconds``, not counting the time that the robot's responses take."""
         return Patience(self.rest.connection.pace, seconds, self.clock)
 
     def get(self, path: str) -> Exchange:
@@ -162,23 +162,23 @@ class Robot:
         return self.rest.send("GET", path, headers=ACCEPT_JSON)
 
     def read(self, path: str, shape: Shape) -> tuple[Any, Exchange]:
-        """Read a message, without members that a robot adds; None where the response is something else."""
+        """GET a message and remove the fields that the robot adds to its schema; None where the response is invalid."""
         exchange = self.get(path)
         value, problem = read_as(exchange.response, shape)
         return (None if problem else projected(value, shape.schema)), exchange
 
     def put(self, path: str, value: Mapping[str, Any]) -> Exchange:
-        """Send a PUT of JSON that is valid by the contract's schema.
+        """PUT JSON that is valid by the contract's schema.
 
         Raises:
-            HarnessError: it does not.
+            HarnessError: the value is not valid by the schema.
         """
         body = body_of(value)
         require_valid(self._contract, "PUT", path, JSON, body)
         return self.rest.send("PUT", path, headers=JSON_BODY, body=body)
 
     def odometry(self) -> Odometry | None:
-        """Return the odometry, or None where it cannot be read (which the observers have judged)."""
+        """GET the odometry; None where the response is invalid (the observers have judged it)."""
         sent = self.clock.now()
         message, exchange = self.read(POSE, ODOMETRY)
         if message is None:
@@ -194,69 +194,69 @@ class Robot:
         )
 
     def velocity(self) -> tuple[Velocity | None, Exchange]:
-        """Return the measured velocity, or None where it cannot be read."""
+        """GET the measured velocity; None where the response is invalid."""
         twist, exchange = self.read(VELOCITY, TWIST)
         return (None if twist is None else Velocity.of(twist)), exchange
 
     def linear(self) -> tuple[Velocity | None, Exchange]:
-        """Return the linear part of the measured velocity, as a velocity that does not turn."""
+        """GET the linear part of the measured velocity, as a velocity whose angular part is zero."""
         vector, exchange = self.read(LINEAR, VECTOR3)
         return (None if vector is None else Velocity(*(float(vector[axis]) for axis in "xyz"))), exchange
 
     def put_velocity(self, velocity: Velocity) -> Exchange:
-        """Command a velocity."""
+        """PUT a velocity."""
         return self.put(VELOCITY, velocity.twist)
 
     def put_linear(self, velocity: Velocity) -> Exchange:
-        """Command the linear part of a velocity."""
+        """PUT the linear part of a velocity."""
         return self.put(LINEAR, velocity.linear)
 
     def goal(self) -> tuple[Any, Exchange]:
-        """Return the active goal as JSON, or None."""
+        """GET the active goal as JSON; None where there is none."""
         exchange = self.get(GOAL_PATH)
         return read_as(exchange.response, GOAL)[0], exchange
 
     def delete_goal(self, *headers: tuple[str, str]) -> Exchange:
-        """Cancel the goal."""
+        """DELETE the goal, which cancels it."""
         return self.rest.send("DELETE", GOAL_PATH, headers=headers)
 
     def map_pose(self) -> Pose | None:
-        """Return where the robot is in the frame of goals and plans, by the statement's transform."""
+        """Return the robot's pose in the frame of goals, from the odometry and the statement's transform."""
         odometry = self.odometry()
         return self.in_map(odometry.pose) if odometry else None
 
     def in_map(self, pose: Pose) -> Pose:
-        """Return a pose of the odometry in the frame of goals and plans."""
+        """Transform a pose from the odometry frame to the frame of goals."""
         return pose.seen_from(Pose(*self.statement.motion.odom_to_map))
 
     def in_odometry(self, pose: Pose) -> Pose:
-        """Return a pose in the frame of goals and plans, in the odometry's frame."""
+        """Transform a pose from the frame of goals and plans to the odometry frame."""
         return pose.seen_in(Pose(*self.statement.motion.odom_to_map))
 
     def in_arena(self, pose: Pose) -> bool:
-        """Return whether the statement lets the robot be driven to a pose in the frame of goals."""
+        """Return whether a pose in the frame of goals lies in the area where the statement allows driving."""
         arena = self.statement.motion.arena
         return arena is None or (arena[0] <= pose.x <= arena[2] and arena[1] <= pose.y <= arena[3])
 
     def near(self, measured: Velocity, wanted: Velocity, factor: float = 1.0) -> bool:
-        """Return whether each component is what was wanted, within ``factor`` times the tolerance."""
+        """Return whether each component is the wanted one, within ``factor`` times the tolerance."""
         return is_near(self.limits, measured, wanted, factor)
 
     def share_of_limits(self, linear: float, angular: float) -> Velocity:
-        """Return a velocity ahead and turning, by shares of the limits; zero in what the robot cannot actuate."""
+        """Return a velocity of given shares of the limits; zero in components that the robot cannot move in."""
         return Velocity(
             linear_x=linear * self.limits.linear_m_s if self.actuated(0) else 0.0,
             angular_z=angular * self.limits.angular_rad_s if self.actuated(5) else 0.0,
         )
 
     def limit_of(self, component: int) -> float:
-        """Return the limit of a component by its place in Velocity, declared or not, m/s or rad/s."""
+        """Return the limit of a component (index into Velocity), declared or assumed, m/s or rad/s."""
         return self.limits.linear_m_s if component < len("xyz") else self.limits.angular_rad_s
 
     def limit_declared(self, component: int) -> bool:
-        """Return whether the statement names the limit of a component."""
+        """Return whether the statement declares the limit of a component."""
         return self.limits.linear_declared if component < len("xyz") else self.limits.angular_declared
 
     def actuated(self, component: int) -> bool:
-        """Return whether the statement says that the robot can actuate a component."""
+        """Return whether the statement says that the robot can move in a component."""
         return Velocity._fields[component].replace("_", ".") in self.statement.motion.actuated

@@ -1,9 +1,8 @@
-"""Single readings of the state that are out: what no sample of the odometry can have been.
+"""Find single wrong readings of the state: values that no sample of the odometry can have had.
 
-A sample of the odometry may be out, and then all who tell of it are: that fails nobody. But what is told of one sample,
-which its stamp names, is the same each time; and a reading of the velocity lies between what the odometry had for a
-while before it and just after it: a robot may smooth its velocity, and be a sample behind. Of that only what comes
-again and again in a run is judged.
+A wrong odometry sample is shown by every resource and fails nothing. But all responses with one stamp must show the
+same values, and a velocity must lie between the odometry samples shortly before and just after it: a robot may smooth
+its velocity and lag one sample behind. A velocity outside them counts only when it happens repeatedly.
 """
 
 from __future__ import annotations
@@ -43,14 +42,14 @@ _ABSOLUTE: Final = 0.02
 
 
 class OneSample:
-    """Judges that the odometry's pose and velocity are the same whenever they are told with the same stamp.
+    """Judges that odometry responses with the same stamp contain the same pose and velocity.
 
-    A robot that computes its pose when it is asked, under a stamp that is coarse, tells another one each time; but none
-    that goes back to the very numbers from before.
+    A robot that computes its pose for each request, under a coarse stamp, shows another pose each time; but it never
+    returns to exactly the numbers from before. Only such a return fails.
 
     Args:
         judge: takes the evidence.
-        limits: of the robot, whose noise may be in each answer.
+        limits: the robot's limits, whose noise may be in each response.
     """
 
     def __init__(self, judge: Judge, limits: Limits) -> None:
@@ -60,7 +59,7 @@ class OneSample:
         self._told: deque[tuple[dict[str, float], Exchange]] = deque(maxlen=_TOLD)
 
     def odometry(self, stamp: Stamp, message: Any, exchange: Exchange) -> None:
-        """Take one reading, in the order in which they were asked for."""
+        """Judge one reading; readings come in the order of their requests."""
         if stamp != self._stamp:
             self._stamp = stamp
             self._told.clear()
@@ -81,7 +80,7 @@ class OneSample:
 
 
 def _numbers(message: Any) -> dict[str, float]:
-    """Return the numbers of pose and twist, by their places; what a robot adds to the message is not looked at."""
+    """Return the numbers of pose and twist by their places, without fields that the robot adds."""
     pose, twist = message["pose"]["pose"], message["twist"]["twist"]
     return {
         **{f"position.{axis}": pose["position"][axis] for axis in "xyz"},
@@ -104,7 +103,7 @@ class _Sample(NamedTuple):
 
 
 class _Reading(NamedTuple):
-    """One reading of the velocity, what was read before it and, one by one, after it."""
+    """One reading of the velocity with the odometry samples read before and after it."""
 
     velocity: Velocity
     exchange: Exchange
@@ -113,17 +112,17 @@ class _Reading(NamedTuple):
 
 
 class BesideOdometry:
-    """Judges the readings of the velocity in one run, in their order.
+    """Judges a run's velocity readings by the odometry samples around each.
 
     Args:
         judge: takes the evidence.
-        limits: of the robot.
-        out: how many readings were out before.
-        requirement: of which the readings are.
+        limits: the robot's limits.
+        out: number of wrong readings so far.
+        requirement: the requirement that the readings are judged by.
 
     Attributes:
-        out: how many have been out.
-        judged: how many could be told from what was read around them.
+        out: number of wrong readings.
+        judged: number of readings that could be judged.
     """
 
     def __init__(self, judge: Judge, limits: Limits, out: int = 0, *, requirement: str = _VELOCITY) -> None:
@@ -137,7 +136,7 @@ class BesideOdometry:
         self.judged = 0
 
     def odometry(self, stamp: float, velocity: Velocity, received: float) -> None:
-        """Take a reading of the odometry; ``stamp`` by the robot's clock, s."""
+        """Take a reading of the odometry; ``stamp``: by the robot's clock, s."""
         sample = _Sample(stamp, velocity, received)
         if self._samples and stamp > self._samples[-1].stamp:
             self._lapses.append(stamp - self._samples[-1].stamp)
@@ -174,7 +173,7 @@ class BesideOdometry:
             )
 
     def _neighbours(self, around: tuple[_Sample, ...]) -> bool:
-        """Return whether no sample lies between these that was not read."""
+        """Return whether these samples are consecutive, so that the suite missed none between them."""
         if not self._lapses:
             return False
         hertz = self._limits.odometry_hz
@@ -183,6 +182,6 @@ class BesideOdometry:
 
 
 def _between(velocity: Velocity, around: list[Velocity]) -> Velocity:
-    """Return the velocity of which each component lies between some others, and nearest to that of this one."""
+    """Return the velocity nearest to the given one whose components lie within the range of the others."""
     ranges = [(min(some), max(some)) for some in zip(*around, strict=True)]
     return Velocity(*(max(low, min(one, high)) for one, (low, high) in zip(velocity, ranges, strict=True)))

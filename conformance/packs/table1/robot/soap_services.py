@@ -1,4 +1,4 @@
-"""The robot's SOAP services as its checks use them: deliveries are sent, states are asked for."""
+"""Send deliveries to the robot's SOAP services, and read its state from them."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ _NEAR = ((0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5))
 def send_delivery(
     publishers: SoapService, values: Delivery, *, coffee: bool = False, style: XmlStyle | None = None
 ) -> Exchange:
-    """Send a delivery once, on a connection of its own so that nothing is sent again.
+    """Send a delivery once, on a new connection so that no retry can send it twice.
 
     Args:
-        publishers: the service.
-        values: of the delivery.
-        coffee: by ExecuteCoffeeRequest, which knows the code by itself.
-        style: how its XML is written.
+        publishers: the SOAP service.
+        values: the delivery.
+        coffee: use ExecuteCoffeeRequest, which implies the delivery code.
+        style: how the XML is written.
     """
     operation = "ExecuteCoffeeRequest" if coffee else "ExecuteDeliveryRequest"
     given = values._asdict() | ({"message_code": COFFEE} if coffee else {})
@@ -48,14 +48,14 @@ def send_delivery(
 
 
 def delivery_outgoing(publishers: SoapService, values: Delivery, *, coffee: bool = False) -> Outgoing:
-    """Return the same as a request that is to be sent beside others."""
+    """Return a delivery as a request to be sent at the same time as others."""
     operation = "ExecuteCoffeeRequest" if coffee else "ExecuteDeliveryRequest"
     given = values._asdict() | ({"message_code": COFFEE} if coffee else {})
     return outgoing(publishers, request(operation, **given))
 
 
 def outgoing(service: SoapService, payload: Node) -> Outgoing:
-    """Return a call that is to be sent beside others."""
+    """Return a SOAP call as a request to be sent at the same time as others."""
     headers = (("Content-Type", MEDIA_TYPE), ("SOAPAction", '""'))
     return Outgoing(
         service.client, "POST", service.path, headers, envelope((require_valid_message(service, payload),)).written()
@@ -63,12 +63,12 @@ def outgoing(service: SoapService, payload: Node) -> Outgoing:
 
 
 def ask(subscribers: SoapService, operation: str, **parameters: float | str) -> Exchange:
-    """Ask the subscribers service."""
+    """Call an operation of the subscribers service."""
     return call_valid(subscribers, request(operation, **parameters)).exchange
 
 
 def declared_return(service: SoapService, operation: str) -> Element:
-    """Return what an operation returns, by the contract.
+    """Return the XSD declaration of what an operation returns.
 
     Raises:
         NotPossibleError: the contract has no such operation.
@@ -80,7 +80,7 @@ def declared_return(service: SoapService, operation: str) -> Element:
 
 
 def returned(exchange: Exchange) -> tuple[list[etree._Element], str]:
-    """Return the ``return`` elements of a response, and what is wrong where it is none."""
+    """Return the ``return`` elements of a response, and what is wrong with a response that has none."""
     answer = read_exchange(exchange)
     if not answer.accepted or answer.first is None:
         return [], f"no SOAP response: {exchange.came}"
@@ -88,7 +88,7 @@ def returned(exchange: Exchange) -> tuple[list[etree._Element], str]:
 
 
 def position(subscribers: SoapService) -> tuple[float, float] | None:
-    """Return where GetPose says that the robot is, in its odometry frame, m; None where it does not say.
+    """Call GetPose and return the position in the odometry frame, m; None where the response has none.
 
     Raises:
         NoAnswerError: no HTTP response came.
@@ -101,7 +101,7 @@ def position(subscribers: SoapService) -> tuple[float, float] | None:
 
 
 def known_messages(service: SoapService, operation: Operation) -> Iterator[Node]:
-    """Yield messages that a robot takes, likeliest first; none for operations that need none but the obvious.
+    """Yield messages that the robot is likely to accept for an operation; none where the generic suite finds its own.
 
     Raises:
         NoAnswerError: no HTTP response came.

@@ -1,4 +1,4 @@
-"""A state of the robot as SOAP tells it, between two readings of the same over REST."""
+"""Compare a state read over SOAP with readings of the same state over REST before and after it."""
 
 from collections.abc import Callable
 from typing import Any, Final
@@ -25,7 +25,7 @@ STATES: Final[dict[str, tuple[str, str, Shape]]] = {
 
 
 def answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
-    """Return the one value that a response returns, and what is wrong where it returns none."""
+    """Return the value that a SOAP response returns, and what is wrong where it returns none."""
     found, problem = returned(exchange)
     if problem or len(found) != 1:
         return None, problem or f"{len(found)} return elements"
@@ -33,9 +33,9 @@ def answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
 
 
 def difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float) -> tuple[str | None, Exchange]:
-    """Read a state over REST, over SOAP and over REST again, so far apart: in what SOAP's lies not between the others.
+    """Read a state over REST, SOAP and REST, ``apart_s`` apart; return where SOAP's value is not between the others.
 
-    None where REST gives none: judged by those who observe it.
+    Return None where REST has no value; the observers have judged that.
     """
     path, operation, shape = STATES[name]
     before, _ = robot.read(path, shape)
@@ -58,7 +58,7 @@ def difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float
 
 
 def restamped(message: Any, *others: Any) -> str:
-    """Return how a stamp differs by less than a sample from another message's: it is the same one, written wrongly."""
+    """Return how a stamp differs from another's by less than a sample: the same stamp, written wrongly."""
     sec, nanosec = stamp_of(message)
     for other in map(stamp_of, others):
         apart_ns = 1e9 * (sec - other[0]) + nanosec - other[1]
@@ -68,7 +68,7 @@ def restamped(message: Any, *others: Any) -> str:
 
 
 def contradiction(message: Any, before: Any, after: Any) -> str:
-    """Return how a message contradicts the one with its stamp that REST gave before and after it."""
+    """Return how a SOAP message differs from the REST message with the same stamp, before or after it."""
     of_one_sample = stamp_of(before) == stamp_of(message) == stamp_of(after) != (0.0, 0.0)
     if not of_one_sample or disagreement(before, after, before, _SLACK):
         return ""
@@ -76,19 +76,19 @@ def contradiction(message: Any, before: Any, after: Any) -> str:
 
 
 def _slack(robot: Robot) -> Slack:
-    """Return by how much a sample may lie outside those before and after it, as each has its own noise."""
+    """Return how far a sample may lie outside its neighbours because of noise."""
     noise = robot.limits.noise
     return Slack(_SLACK.absolute + FARTHEST * max(msgspec.structs.astuple(noise)), _SLACK.relative)
 
 
 def compare(robot: Robot, subscribers: SoapService, name: str, renew: Callable[[], object] = lambda: None) -> None:
-    """Judge a state as REST and SOAP give it; asked again where one may be an odometry message behind the other.
+    """Judge whether REST and SOAP show the same state; repeat where one may lag an odometry message behind the other.
 
     Args:
-        robot: over REST.
-        subscribers: over SOAP.
+        robot: the robot over REST.
+        subscribers: its SOAP service.
         name: "pose" or "velocity".
-        renew: what keeps the state as it is, before each try.
+        renew: called before each try to keep the state as it is.
     """
     if f"equivalence/{name}" in robot.judge.refuted():
         return  # it costs three tries each time
@@ -102,7 +102,7 @@ def compare(robot: Robot, subscribers: SoapService, name: str, renew: Callable[[
 
 
 def judge_difference(robot: Robot, name: str, problem: str, exchange: Exchange) -> None:
-    """Judge one comparison, or what several have in common."""
+    """Judge one comparison, or the result of several."""
     robot.judge.check(
         f"equivalence/{name}",
         not problem,

@@ -1,4 +1,4 @@
-"""Bringing a robot to rest: before a check that needs it there, and at the end of every run."""
+"""Bring a robot to rest: before a check that needs it, and at the end of every run."""
 
 import math
 from dataclasses import replace
@@ -29,9 +29,9 @@ _LAST_S: Final = 3.0
 
 
 def bring_to_rest(api: RestInterface) -> str:
-    """Cancel what the robot is doing and wait until it stands still.
+    """Cancel the goal, command zero velocity, and wait until the robot stands still.
 
-    Sends PUT and DELETE: only for checks that may move the robot. Whatever a robot answers or not, nothing is raised.
+    Sends PUT and DELETE: only for checks that may move the robot. Never raises, whatever the robot responds.
 
     Returns:
         Empty when the robot is at rest (as far as it can be read), else why it is not.
@@ -44,18 +44,18 @@ def bring_to_rest(api: RestInterface) -> str:
 
 
 def halt(api: RestInterface) -> None:
-    """Cancel and stop what the robot may be doing, without waiting until it stands still.
+    """Cancel the goal and command zero velocity, without waiting until the robot stands still.
 
-    Between checks for which it does not matter that the robot still slows down; the others bring it to rest.
+    Used between checks that may start while the robot slows down; the others bring it to rest.
     """
     if api.run.allow_motion:
         _Stiller(api.client, _slowest(api)).halt(_CANCEL_S)
 
 
 def leave_at_rest(api: RestInterface) -> None:
-    """Stop the robot at the end of a run, also one that was interrupted, and also a robot that hardly answers.
+    """Stop the robot at the end of a run, even an interrupted one, and even if it hardly responds.
 
-    Does nothing where the robot could not have been moved. Bounded to a few seconds; raises nothing.
+    Does nothing where no request could have moved the robot. Takes at most a few seconds; never raises.
     """
     if not api.run.allow_motion:
         return
@@ -74,7 +74,7 @@ def leave_at_rest(api: RestInterface) -> None:
 
 
 def _slowest(api: RestInterface) -> Velocity:
-    """Return the greatest velocity that counts as rest: two noisy samples of which may follow each other."""
+    """Return the highest velocity that counts as rest, twice the noise of a sample."""
     limits = said_of(api.run).limits
     linear = limits.tolerance_linear_m_s + 3 * limits.noise.linear_m_s
     angular = limits.tolerance_angular_rad_s + 3 * limits.noise.angular_rad_s
@@ -82,7 +82,7 @@ def _slowest(api: RestInterface) -> Velocity:
 
 
 def _shows(answer: Response) -> bool:
-    """Return whether an answer shows anything that may be a goal."""
+    """Return whether a response may contain a goal."""
     text = read_json(answer.body)
     return not text.unreadable and isinstance(text.value, dict) and bool(text.value)
 
@@ -91,8 +91,8 @@ class _Stiller:
     """Stops one robot.
 
     Args:
-        client: its REST interface.
-        slowest: the greatest velocity that counts as rest.
+        client: the robot's REST interface.
+        slowest: the highest velocity that counts as rest.
     """
 
     def __init__(self, client: HttpClient, slowest: Velocity) -> None:
@@ -101,11 +101,11 @@ class _Stiller:
         self._silent = ""
 
     def bring(self, cancel_s: float, settle_s: float) -> str:
-        """Cancel and stop; what bring_to_rest() says of it."""
+        """Cancel, stop and wait; return what bring_to_rest() returns."""
         return self.halt(cancel_s) or self._wait(self._patience(settle_s))
 
     def halt(self, cancel_s: float) -> str:
-        """Cancel what is there within so many seconds, and command rest; empty, or why something is still active."""
+        """Cancel the goal within ``cancel_s`` and command zero; return why something is still active, or nothing."""
         cancelled = self._no_goal_left(self._patience(cancel_s))
         # Also where the goal could not be cancelled: a robot that takes velocities meanwhile stops for a moment.
         self._ask("PUT", VELOCITY, JSON_BODY, body_of(STILL.twist))
@@ -141,7 +141,7 @@ class _Stiller:
         return f"it still moves: {velocity}"
 
     def _velocity(self) -> tuple[Velocity, str]:
-        """Return the measured velocity, and why it cannot be told."""
+        """Return the measured velocity, and why it cannot be read."""
         read = self._ask("GET", VELOCITY, ACCEPT_JSON)
         if read is not None and read.response.status == HTTPStatus.NOT_FOUND:
             return STILL, ""  # a robot without this resource: nothing says that it moves

@@ -1,9 +1,8 @@
-"""Whether a velocity or a goal whose PUT is answered as done has its effect: a PUT is applied or refused.
+"""Judge whether an accepted PUT of a velocity or goal has its effect: a robot must apply a PUT or reject it.
 
-What shows it is an effect that is missing while the same PUT has it when it is sent as usual: only the difference tells
-that it was the request that was not applied, and not a wall, a limit, or another client, that kept the robot where it
-is. And a reading counts only where whoever looks was in time: after what the robot has to settle, and before the
-velocity may have ended by itself.
+A missing effect counts only if the same PUT has the effect when it is sent in the usual form. Otherwise a wall, a limit
+or another client may have kept the robot where it is. A reading counts only after the settle time and before the
+velocity may have ended.
 """
 
 import math
@@ -37,16 +36,18 @@ _MOVED_RAD: Final = 0.3
 
 
 def velocity_has_effect(api: RestInterface, wanted: Velocity, put: Put, usual: Put) -> bool | None:
-    """Return whether a robot at rest moves when a velocity is put that is answered as done. Leaves it at rest.
+    """Return whether a robot at rest moves after an accepted PUT of a velocity. Leaves the robot at rest.
 
     Args:
-        api: of the robot.
+        api: the robot's REST interface.
         wanted: the velocity.
-        put: sends it.
-        usual: sends it as clients do.
+        put: sends it in the form under test.
+        usual: sends it in the usual form.
 
     Returns:
-        None where there is no telling: it is refused, moves the robot neither way, or ends before it can be read.
+        None where it cannot be told: the robot rejects the PUT, does not move after the usual one either, or stops
+            before
+        it can be read.
     """
     robot = Robot(api)
     if robot.near(wanted, STILL, 3):
@@ -55,22 +56,22 @@ def velocity_has_effect(api: RestInterface, wanted: Velocity, put: Put, usual: P
 
 
 def goal_has_effect(api: RestInterface, put: PutGoal, usual: PutGoal) -> bool | None:
-    """Return whether a goal is there, or was followed, when it is put and answered as done. Leaves the robot at rest.
+    """Return whether the robot shows or follows a goal after an accepted PUT. Leaves the robot at rest.
 
     Args:
-        api: of the robot.
-        put: sends a goal.
-        usual: sends it as clients do.
+        api: the robot's REST interface.
+        put: sends a goal in the form under test.
+        usual: sends it in the usual form.
 
     Returns:
-        None where there is no telling: it is refused, or over at once also where it is put as usual.
+        None where it cannot be told: the robot rejects the PUT, or the goal ends at once also in the usual form.
     """
     robot = Robot(api)
     return _beside(api, lambda: _follows(robot, put), lambda: _follows(robot, usual, _READINGS))
 
 
 def _beside(api: RestInterface, act: Act, usual: Act) -> bool | None:
-    """Return whether an act has its effect; False only if the usual one has it, and the act twice has not."""
+    """Return whether an action has its effect; False only if the usual one has it and the action lacks it twice."""
     found = act()
     bring_to_rest(api)
     if found is not False:
@@ -85,7 +86,7 @@ def _beside(api: RestInterface, act: Act, usual: Act) -> bool | None:
 
 
 def _moves(robot: Robot, wanted: Velocity, put: Put) -> bool | None:
-    """Put a velocity over and over; return whether the robot moves, or None where that cannot be said."""
+    """PUT a velocity repeatedly; return whether the robot moves, or None where that cannot be told."""
     limits = robot.limits
     hold_s = certain_s(limits.hold_s)
     since = last_sent = math.inf  # from when on it holds without a gap; when it was put last
@@ -115,12 +116,12 @@ def _moves(robot: Robot, wanted: Velocity, put: Put) -> bool | None:
 
 
 def turned_goal(robot: Robot, here: Pose) -> dict[str, Any]:
-    """Return a goal that a robot reaches by turning where it stands."""
+    """Return a goal at the robot's position with another heading, which it reaches by turning on the spot."""
     return goal_body(Pose(here.x, here.y, here.yaw + _TURN), robot.statement.motion.frame, "not acceptable")
 
 
 def _follows(robot: Robot, put: PutGoal, lasts: int = 1) -> bool | None:
-    """Put a goal; return whether the robot shows it in so many readings, or has moved."""
+    """PUT a goal; return whether the robot shows it in ``lasts`` readings, or has moved."""
     before = robot.map_pose()
     if before is None:
         return None

@@ -1,4 +1,4 @@
-"""A velocity that has to last: renewed, whatever is refused meanwhile; and its angular part beside a linear PUT."""
+"""Record whether a velocity lasts while it is renewed, while others are rejected, and beside linear PUTs."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ _LOOKS: Final = 4
 
 
 def renewed(robot: Robot, drive: Drive, turning: Velocity) -> bool:
-    """Renew a velocity, and send others that the robot refuses: the renewed one has to last.
+    """Renew a velocity and send others that the robot rejects; record whether the renewed one lasts.
 
     Args:
-        robot: with its limits.
-        drive: whose last command was this velocity, after another one, and which has reached it.
-        turning: the velocity that was commanded.
+        robot: the robot.
+        drive: a drive whose last command was this velocity, after another one, and which has reached it.
+        turning: the velocity.
 
     Returns:
         Whether it could be renewed in time.
@@ -73,9 +73,10 @@ class _Times:
     """When a velocity is renewed, s after its first command.
 
     Attributes:
-        every: so often; holds_s: for so long it certainly holds each time.
-        renewed_s: no more from then on. Not when the first command ends: a robot might take the next one for a new one.
-        seen_s: it is looked at when a robot that renews nothing has begun to stop.
+        every: interval between renewals.
+        holds_s: how long the velocity certainly holds after each.
+        renewed_s: end of the renewals; before the first command ends, as a robot might take the next one for a new one.
+        seen_s: time of the reading, when a robot that ignores renewals has begun to stop.
     """
 
     every: float = 0.2
@@ -85,7 +86,7 @@ class _Times:
 
     @classmethod
     def of(cls, limits: Limits) -> _Times:
-        """For a robot; where it declares no hold time, for what a velocity is counted on to hold."""
+        """Return the times for a robot, with an assumed hold time where it declares none."""
         hold_s = limits.hold_s
         if hold_s is None:
             return cls()
@@ -96,18 +97,18 @@ class _Times:
 def _renew(
     robot: Robot, drive: Drive, turning: Velocity, times: _Times, refused: tuple[Velocity, ...], reached: float = 0.0
 ) -> tuple[bool | None, str]:
-    """Command the same again and again, until the first command has certainly ended; in the end, what is refused.
+    """Command the same velocity repeatedly until the first command has ended; then send velocities to be rejected.
 
     Args:
-        robot: with its limits.
-        drive: whose last command was this velocity.
+        robot: the robot.
+        drive: a drive whose last command was this velocity.
         turning: the velocity.
-        times: when to command, and to look.
-        refused: velocities that the robot does not take.
-        reached: when the robot has had its time to reach the velocity, s of the monotonic clock.
+        times: when to command and to look.
+        refused: velocities that the robot must reject.
+        reached: when the robot must have reached the velocity, s of the run's clock.
 
     Returns:
-        Whether the velocity is still there (None: it was not renewed in time), and what was seen.
+        Whether the robot still has the velocity (None: it was not renewed in time), and the velocity read.
     """
     first = len(drive.trace.commands) - 1
     begun = drive.trace.sent
@@ -132,7 +133,7 @@ def _renew(
 
 
 def _refused(robot: Robot, drive: Drive, turning: Velocity) -> None:
-    """Send velocities that the robot refuses: it has to turn as before."""
+    """Send velocities that the robot must reject, and record whether it turns as before."""
     for bad in _BAD:
         drive.refresh(turning)
         robot.put_velocity(bad)
@@ -146,12 +147,12 @@ def _refused(robot: Robot, drive: Drive, turning: Velocity) -> None:
 
 
 def arc(robot: Robot, drive: Drive, bent: Velocity) -> None:
-    """Put the linear part, ahead and then back: the angular one has to stay.
+    """PUT the linear part, ahead and then back, and record whether the angular part stays.
 
     Args:
-        robot: with its limits.
-        drive: of that robot.
-        bent: the velocity that all of it ends with.
+        robot: the robot.
+        drive: a drive of that robot.
+        bent: the velocity at the end.
     """
     back = bent._replace(angular_z=0.0)
     drive.refresh(bent)

@@ -1,4 +1,4 @@
-"""The ends of the range of velocities that a robot declares, all of which it has to take and to reach."""
+"""The slowest and fastest velocities of the range that a robot declares; it must accept and reach them."""
 
 from typing import Final
 
@@ -23,12 +23,12 @@ def slowest(robot: Robot) -> Velocity:
 
 
 def fastest(robot: Robot, component: int) -> float:
-    """Return how fast a robot is driven by one component of its velocity, m/s or rad/s."""
+    """Return the highest speed that the suite commands in one component, m/s or rad/s."""
     return robot.limit_of(component) * (1.0 if robot.limit_declared(component) else _UNDECLARED)
 
 
 def reach(drive: Drive, velocity: Velocity) -> bool:
-    """Command a velocity of the range that the robot declares; return whether it is accepted and reached."""
+    """Command a velocity in the declared range; return whether the robot accepts and reaches it."""
     if not drive.command(velocity):
         drive.refused("rest-resources/velocity-range", f"2xx for {velocity}, which is within the declared limits")
         return False
@@ -36,6 +36,6 @@ def reach(drive: Drive, velocity: Velocity) -> bool:
 
 
 def direction(robot: Robot) -> int:
-    """Return ahead (1) where the arena has room for it, else back (-1)."""
+    """Return 1 (ahead) where the arena has room ahead, else -1 (back)."""
     pose = robot.map_pose()
     return 1 if pose is None or robot.in_arena(pose.ahead(robot.limits.linear_m_s)) else -1

@@ -1,4 +1,4 @@
-"""Velocities in any order, as a state machine: what was asked for last is what the robot does."""
+"""A Hypothesis state machine that sends velocities in random order; the robot must do what the last one says."""
 
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
@@ -17,15 +17,15 @@ _SHARES = st.floats(0.15, 1.0)
 
 
 def room_for(limits: Limits) -> float:
-    """Return how far from where it began a walk may take a robot, m: off its leash by one more velocity."""
+    """Return how far from its start a walk may take a robot, m: the leash plus one more velocity."""
     return _LEASH_M + _LINEAR_SHARE * limits.linear_m_s * limits.settle_s
 
 
 class VelocityMachine(RuleBasedStateMachine):
-    """Commands, corrections of the linear part, stops, refusals, renewals.
+    """Sends velocities, linear parts, stops, invalid velocities and renewals in random order.
 
     Args:
-        walk: what it shares with the other walks of its check.
+        walk: state shared by all walks of one check.
     """
 
     def __init__(self, walk: Walk) -> None:
@@ -35,35 +35,35 @@ class VelocityMachine(RuleBasedStateMachine):
         self._wanted = STILL
 
     def teardown(self) -> None:
-        """Stop."""
+        """Stop the robot."""
         self._walk.step(lambda: self._drive.command(STILL))
 
     @rule()
     def ask(self) -> None:
-        """Read: readings agree with each other at any time."""
+        """Read the state: readings must agree with each other at any time."""
         self._walk.step(lambda: self._drive.look()[0] is not None)
 
     @rule(forward=st.booleans(), left=st.booleans(), linear=_SHARES, angular=_SHARES, which=st.sampled_from("ab2"))
     def command(self, *, forward: bool, left: bool, linear: float, angular: float, which: str) -> None:
-        """Command a velocity within the limits: the robot reaches it."""
+        """Command a velocity within the limits, which the robot must reach."""
         ahead = self._ahead(linear, forward=forward) if which in "a2" else 0.0
         turn = angular * _ANGULAR_SHARE * self._robot.limits.angular_rad_s * (1 if left else -1) if which in "b2" else 0
         self._walk.step(lambda: self._full(Velocity(linear_x=ahead, angular_z=turn if self._robot.actuated(5) else 0)))
 
     @rule()
     def stop(self) -> None:
-        """Command zero, a velocity like others."""
+        """Command zero velocity."""
         self._walk.step(lambda: self._full(STILL))
 
     @rule(forward=st.booleans(), linear=_SHARES)
     def command_linear(self, *, forward: bool, linear: float) -> None:
-        """Command the linear part: the robot keeps the angular one."""
+        """PUT a linear part; the robot must keep the angular part."""
         self._walk.step(lambda: self._linear(self._ahead(linear, forward=forward)))
 
     @precondition(lambda self: self._wanted != STILL)
     @rule(component=st.integers(0, 5), times=st.sampled_from((1.0, -1.0)))
     def refused(self, component: int, times: float) -> None:
-        """Command a velocity that is refused: nothing changes."""
+        """PUT a velocity beyond the limits; the robot must reject it and drive on as before."""
         self._walk.step(lambda: self._refuse(component, times))
 
     def _ahead(self, share: float, *, forward: bool) -> float:

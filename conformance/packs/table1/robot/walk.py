@@ -1,4 +1,4 @@
-"""What the walks of a state machine share: they end by a refutation, an unreachable robot, or the clock."""
+"""State shared by the random walks of a check: they end by a failure, an unreachable robot, or a deadline."""
 
 from collections.abc import Callable
 
@@ -12,14 +12,14 @@ _TIME_IS_UP = "the time is up"
 
 
 class Walk:
-    """What all walks of one check share.
+    """The shared state of all random walks of one check.
 
     Attributes:
-        robot: that walks.
-        drive: its velocity.
-        ended: why no further step is made: a requirement was refuted, the time is up, the robot is busy.
-        unreachable: the request that was not answered, if that ended it.
-        left_out: how many steps were not made because the time was up.
+        robot: the robot.
+        drive: its velocity commands and readings.
+        ended: why no further step is made: a requirement failed, the time is up, or the robot is busy.
+        unreachable: the request without a response that ended the walk, if any.
+        left_out: number of steps left out because the time was up.
     """
 
     def __init__(self, robot: Robot, budget_s: float, trace: Trace | None = None) -> None:
@@ -32,7 +32,7 @@ class Walk:
         self._until = robot.clock.now() + budget_s
 
     def step(self, act: Callable[[], bool]) -> None:
-        """Make one step, unless the walk has ended; ``act`` tells whether all was well."""
+        """Make one step unless the walk has ended; ``act`` returns whether all was well."""
         if not self.ended and self.robot.clock.now() > self._until:
             self.ended = _TIME_IS_UP
         if self.ended:

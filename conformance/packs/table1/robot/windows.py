@@ -1,8 +1,7 @@
-"""What several samples of the odometry say together: medians, which one sample that is out does not move.
+"""Medians over several odometry samples, so that one wrong sample does not count.
 
-A robot's odometry comes five to a hundred times a second, and each sample has noise. Whoever reads faster sees one
-sample several times, so what is counted here is samples, told apart by their stamps. Everything judges a record, and
-talks to nobody.
+A robot publishes odometry 5 to 100 times a second with noise in each sample. A client that reads faster gets one sample
+several times; functions here count samples, told apart by their stamps. They judge a record and send nothing.
 """
 
 from collections.abc import Sequence
@@ -22,7 +21,7 @@ _NO_NEARER: Final = 0.8
 
 
 def newest(turns: Sequence[Turn], count: int = SEVERAL) -> list[Turn]:
-    """Return the last turn of each of the newest samples in which a velocity could be read, the oldest first."""
+    """Return the last reading of each of the newest ``count`` samples that have a velocity, oldest first."""
     found: list[Turn] = []
     for turn in reversed(turns):
         if turn.velocity is None:
@@ -41,7 +40,7 @@ def _is_another(turn: Turn, later: Turn) -> bool:
 
 
 def velocities(turns: Sequence[Turn]) -> list[Velocity]:
-    """Return what the turns say of the velocity."""
+    """Return the velocities of the readings."""
     return [turn.velocity for turn in turns if turn.velocity is not None]
 
 
@@ -57,7 +56,7 @@ def part_of(velocity: Velocity, part: slice) -> Velocity:
 
 
 def is_stuck(turns: Sequence[Turn], wanted: Velocity, part: slice = ALL) -> bool:
-    """Return whether several readings show a velocity that comes no nearer to another one."""
+    """Return whether several readings show a velocity that does not approach the wanted one."""
     seen = velocities(turns)
     if len(seen) < SEVERAL:
         return False
@@ -71,10 +70,10 @@ def _apart(one: Velocity, other: Velocity, part: slice) -> float:
 def verdict(
     limits: Limits, turns: Sequence[Turn], wanted: Velocity, factor: float = 1.0, part: slice = ALL
 ) -> bool | None:
-    """Return whether turns show a velocity: the newest does, or the median of the newest samples.
+    """Return whether readings show a velocity: the newest one does, or the median of the newest samples.
 
     Returns:
-        None where the newest does not and there are too few samples to say more.
+        None where the newest reading does not and there are too few samples for a median.
     """
     samples = velocities(newest(turns))
     if samples and is_near(limits, part_of(samples[-1], part), part_of(wanted, part), factor):

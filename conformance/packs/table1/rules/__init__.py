@@ -1,1 +1,1 @@
-"""The checks that only the paper's robot is judged by, a folder for each conformance class."""
+"""The checks that only the paper's robot is judged by, in a folder for each conformance class."""

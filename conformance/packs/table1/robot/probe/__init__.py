@@ -1,1 +1,1 @@
-"""A look at the robot's ROS side: a process of its own, so that the suite runs where no ROS is."""
+"""The ROS probe: observes the robot's topics from a process of its own, so that the suite itself needs no ROS."""

@@ -1,8 +1,7 @@
 """The ROS probe's process.
 
-Says in one line of JSON that it is ready, or what its problem is; then answers each line that it reads ("deliveries",
-"velocities", "graph") with one line of JSON, and ends when its input ends. Numbers are written in hexadecimal, which
-loses no bit.
+It prints one JSON line that says ready, or what the problem is. Then it answers each input line ("deliveries",
+"velocities", "graph") with one JSON line, and ends when its input ends. Numbers are in hexadecimal, which loses no bit.
 """
 
 import argparse
@@ -14,7 +13,7 @@ _DISCOVERY_S: Final = 10.0
 
 
 def main() -> int:
-    """Run the probe; 0 when its input ended, 3 when there is no ROS to look at."""
+    """Run the probe; return 0 when its input ended, 3 when ROS or the robot is not there."""
     parser = argparse.ArgumentParser(prog="python -m conformance.packs.table1.robot.probe", description=__doc__)
     parser.add_argument("--domain-id", type=int, required=True)
     parser.add_argument("--delivery-topic", required=True)

@@ -1,4 +1,4 @@
-"""The suite's end of the ROS probe: starts its process, asks it, and never waits for ever."""
+"""Start the ROS probe's process, send it requests and read its replies; every wait has a deadline."""
 
 import atexit
 import json
@@ -27,16 +27,16 @@ class ProbeError(Exception):
 
 
 class Probe:
-    """A probe that has been started; await_robot() before anything else.
+    """A started probe; call await_robot() before anything else.
 
     Args:
-        ros: the robot's ROS side.
+        ros: the statement's part on the robot's ROS side.
 
     Attributes:
-        heard_at: when all that came of the run's requests until then had arrived, s of the monotonic clock.
+        heard_at: time up to which all messages caused by the run's requests have arrived, s of the monotonic clock.
 
     Raises:
-        ProbeError: no process can be started.
+        ProbeError: the process cannot be started.
     """
 
     heard_at = -math.inf
@@ -68,10 +68,10 @@ class Probe:
         atexit.register(self.close)
 
     def await_robot(self) -> None:
-        """Wait until the probe sees the robot.
+        """Wait until the probe has discovered the robot.
 
         Raises:
-            ProbeError: it does not start, for want of ROS or of the message package, or sees no robot.
+            ProbeError: ROS or the message package is missing, or no robot is in the domain.
         """
         try:
             self._answer(_START_S)
@@ -80,18 +80,18 @@ class Probe:
             raise
 
     def deliveries(self) -> list[Delivery]:
-        """Return the DeliveryRequestMsg that came since the last call, in their order."""
+        """Return the DeliveryRequestMsg messages received since the last call, in order."""
         return [
             Delivery(int(code), *(float.fromhex(value) for value in values))
             for code, *values in self._ask("deliveries")["deliveries"]
         ]
 
     def velocities(self) -> list[Velocity]:
-        """Return the velocity commands that came since the last call, in their order."""
+        """Return the velocity commands received since the last call, in order."""
         return [Velocity(*map(float.fromhex, values)) for values in self._ask("velocities")["velocities"]]
 
     def topics(self) -> dict[str, list[str]]:
-        """Return the types of each topic that somebody publishes, by its full name."""
+        """Return the types of each published topic, by the topic's full name."""
         topics: dict[str, list[str]] = self._ask("graph")["topics"]
         return topics
 
@@ -139,10 +139,10 @@ class Probe:
 
 
 class RosProbe:
-    """The probe of one run: started before it is needed, as finding a robot may take seconds, and waited for then.
+    """The probe of one run. It is started early, since discovery may take seconds, and awaited when first needed.
 
     Args:
-        ros: the robot's ROS side, which may have no domain.
+        ros: the statement's part on the robot's ROS side; the domain may be missing.
     """
 
     def __init__(self, ros: Ros) -> None:
@@ -152,7 +152,7 @@ class RosProbe:
         self._sees_robot = False
 
     def start(self) -> None:
-        """Start it, where a domain is given, without waiting for it."""
+        """Start the process if the statement names a domain, without waiting for it."""
         if self._ros.domain_id is None or self._probe is not None or self._problem is not None:
             return
         try:
@@ -161,10 +161,10 @@ class RosProbe:
             self._problem = error
 
     def ready(self) -> Probe:
-        """Return the probe, once it sees the robot.
+        """Return the probe once it has discovered the robot.
 
         Raises:
-            ProbeError: no domain is given, or it cannot be used.
+            ProbeError: the statement names no domain, or the probe cannot be used.
         """
         self.start()
         if self._problem is not None:
@@ -181,6 +181,6 @@ class RosProbe:
         return self._probe
 
     def close(self) -> None:
-        """End it; nobody waits for that but the program's own end."""
+        """End the process without waiting for it."""
         if self._probe is not None:
             threading.Thread(target=self._probe.close, name="probe's end").start()

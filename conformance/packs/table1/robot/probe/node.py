@@ -1,4 +1,4 @@
-"""The ROS node of the probe: listens to deliveries and velocity commands, and looks at the graph."""
+"""The probe's ROS node: subscribes to deliveries and velocity commands, and reads the ROS graph."""
 
 import threading
 import time
@@ -23,11 +23,11 @@ _STAMPED: Final = "geometry_msgs/msg/TwistStamped"
 
 
 class ProbeNode:
-    """Sees what goes over the robot's graph.
+    """A ROS node that records the robot's deliveries and velocity commands.
 
     Args:
         domain_id: the robot's ROS domain.
-        delivery_topic, cmd_vel_topic: full names.
+        delivery_topic, cmd_vel_topic: full topic names.
     """
 
     def __init__(self, domain_id: int, delivery_topic: str, cmd_vel_topic: str) -> None:
@@ -44,11 +44,12 @@ class ProbeNode:
         self._thread.start()
 
     def find(self, seconds: float) -> int:
-        """Wait for the robot's publishers, then listen.
+        """Wait for the robot's publishers, then subscribe.
 
         Returns:
-            How many nodes and publishers there are; with none, the domain is not the robot's. Publishers
-            count as well, because they may be known before the names of their nodes are.
+            Number of nodes and publishers in the domain; 0 means that this is not the robot's domain. Publishers count
+            too, as
+            they may be discovered before their nodes' names.
         """
         topics = (self._delivery_topic, self._cmd_vel_topic)
         until = time.monotonic() + seconds
@@ -62,20 +63,20 @@ class ProbeNode:
         return found
 
     def deliveries(self) -> dict[str, Any]:
-        """Return what came on the delivery topic since the last call."""
+        """Return the messages received on the delivery topic since the last call."""
         return {"deliveries": _emptied(self._deliveries)}
 
     def velocities(self) -> dict[str, Any]:
-        """Return what came on the velocity topic since the last call."""
+        """Return the messages received on the velocity topic since the last call."""
         return {"velocities": _emptied(self._velocities)}
 
     def graph(self) -> dict[str, Any]:
-        """Return the topics that somebody publishes, with their types."""
+        """Return the published topics with their types."""
         topics = self._node.get_topic_names_and_types()
         return {"topics": {name: types for name, types in topics if self._node.count_publishers(name)}}
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Destroy the node."""
         self._executor.shutdown()
         self._thread.join(2)
         self._node.destroy_node()
@@ -96,7 +97,9 @@ class ProbeNode:
             )
 
     def _quality(self, topic: str) -> QoSProfile:
-        """Reliable, unless a publisher is not: a reliable subscription would not hear it."""
+        """Return a reliable QoS, or best effort where a publisher is best effort and a reliable subscriber gets
+        nothing.
+        """
         publishers = self._node.get_publishers_info_by_topic(topic)
         best_effort = any(one.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for one in publishers)
         reliability = ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE

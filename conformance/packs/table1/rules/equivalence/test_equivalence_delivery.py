@@ -1,4 +1,4 @@
-"""One request, one identical message, whichever interface it came by, and none that follows."""
+"""Every accepted delivery must become exactly one identical message, over REST and over SOAP."""
 
 from typing import Final
 

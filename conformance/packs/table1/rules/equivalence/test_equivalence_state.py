@@ -1,4 +1,4 @@
-"""One state, read over REST and over SOAP."""
+"""REST and SOAP must show the same state."""
 
 from typing import Final
 
@@ -43,7 +43,7 @@ _AHEAD: Final = 0.3
 @pytest.mark.phase("resting")
 @pytest.mark.requirement("equivalence/pose", "equivalence/velocity")
 def test_pose_and_velocity(robot: Robot, subscribers: SoapService, effort: Effort) -> None:
-    """Whatever the robot does just now."""
+    """Compare pose and velocity over REST and SOAP, whatever the robot is doing."""
     for turn in range(effort.cases(_POSES)):
         for name in STATES if turn < effort.cases(50) else ("pose",):
             compare(robot, subscribers, name)
@@ -52,7 +52,7 @@ def test_pose_and_velocity(robot: Robot, subscribers: SoapService, effort: Effor
 @pytest.mark.phase("resting")
 @pytest.mark.requirement("equivalence/velocity")
 def test_single_velocities(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
-    """Velocities over SOAP, each beside what the odometry had around it: what is out now and then fails too."""
+    """Compare each velocity over SOAP with the odometry around it, so that intermittent faults are found too."""
     if effort.name == "quick":
         return  # too few to notice it
     beside = BesideOdometry(judge, robot.limits, requirement="equivalence/velocity")
@@ -71,7 +71,7 @@ def test_single_velocities(robot: Robot, subscribers: SoapService, judge: Judge,
 @pytest.mark.phase("resting")
 @pytest.mark.requirement("equivalence/sensors", "equivalence/services")
 def test_lists(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
-    """The same entries, in any order."""
+    """Compare the lists' entries over REST and SOAP, in any order."""
     for _ in range(effort.cases(50)):
         for name, path, operation, shape in (
             ("sensors", SENSORS, "GetSensors", SENSORS_SHAPE),
@@ -104,7 +104,7 @@ def _compare_lists(
 @pytest.mark.phase("resting")
 @pytest.mark.requirement("equivalence/plan")
 def test_plan(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
-    """The same question, with all its parameters or with few, or in the odometry's frame, has the same answer."""
+    """Request the same plan over REST and SOAP, with all parameters, with few, and in the odometry frame."""
     odometry, _ = robot.read(POSE, ODOMETRY)
     here = robot.in_map(pose_of(odometry["pose"]["pose"])) if odometry else None
     goals = reachable(robot, here, max(1.0, robot.statement.motion.radius_m), 3) if here else []
@@ -155,7 +155,7 @@ def _compare_plans(
 @pytest.mark.motion
 @pytest.mark.requirement("equivalence/goal")
 def test_goal(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
-    """The active goal is the same one, and when there is none, both say so; also in the first answer after a change."""
+    """Compare the active goal, or its absence, over REST and SOAP, including the first response after a change."""
     _compare_goals(robot, subscribers, judge)
     goals = choose_goals(robot, 1.5, 2)
     late: list[tuple[str, Exchange]] = []
@@ -180,7 +180,7 @@ def test_goal(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effo
 
 
 def _compare_goals(robot: Robot, subscribers: SoapService, judge: Judge) -> None:
-    """Compare the goals that both interfaces show; the two may learn of a change one after the other."""
+    """Compare the goals over both interfaces, allowing one to learn of a change after the other."""
     patience = robot.patience(robot.settle_s)
     for _ in poll(robot.clock, 0.05, lambda: patience.over):
         problem, exchange = _goal_difference(robot, subscribers)
@@ -193,7 +193,7 @@ def _compare_goals(robot: Robot, subscribers: SoapService, judge: Judge) -> None
 
 
 def _goal_difference(robot: Robot, subscribers: SoapService) -> tuple[str | None, Exchange]:
-    """Return in what SOAP's goal is another than REST's; None where REST's has changed meanwhile."""
+    """Return where SOAP's goal differs from REST's; None where REST's changed in the meantime."""
     before, first = robot.goal()
     exchange = ask(subscribers, "GetGoal")
     found, problem = returned(exchange)

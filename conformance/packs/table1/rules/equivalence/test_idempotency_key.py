@@ -1,4 +1,4 @@
-"""Deliveries with an Idempotency-Key: the same one may be one message, others are one each."""
+"""Deliveries with an Idempotency-Key: one key may give one message; two keys give two."""
 
 import uuid
 from collections import Counter
@@ -21,14 +21,14 @@ _APART = Delivery(COURIER, 80.5, 81.5, 82.5, 83.5, 84.5, 85.5)
 
 
 def _put(api: RestInterface, delivery: Delivery, keys: Sequence[str]) -> list[Exchange]:
-    """Send a delivery by each of the keys, each on a connection of its own so that nothing is sent again."""
+    """PUT a delivery once with each key, each on a new connection so that the client does not retry."""
     fields = [(("Idempotency-Key", f'"{key}"'),) for key in keys]
     return [put_delivery(api, delivery.rest_path, headers=field, fresh=True) for field in fields]
 
 
 @pytest.mark.requirement("equivalence/idempotency-key", "equivalence/idempotency-other-key")
 def test_keys(api: RestInterface, probe: RosProbe, judge: Judge) -> None:
-    """Two requests with one key are one message, or two where a robot takes no keys; two with two keys are two."""
+    """Send two requests with one key (one message, or two from a robot without keys) and two with two keys (two)."""
     try:
         observer = observer_of(api, probe)
         observer.mark()

@@ -1,4 +1,4 @@
-"""What only a look at the robot's ROS graph shows."""
+"""Checks that compare the interfaces with the robot's ROS graph."""
 
 from typing import Final
 
@@ -24,7 +24,7 @@ _DISCOVERED_S: Final = 10.0
 
 @pytest.fixture(name="seeing")
 def _seeing(probe: RosProbe) -> Probe:
-    """Return the ROS probe, which sees the robot."""
+    """Return the ROS probe once it has discovered the robot."""
     try:
         return probe.ready()
     except ProbeError as error:
@@ -34,7 +34,7 @@ def _seeing(probe: RosProbe) -> Probe:
 @pytest.mark.phase("motion")
 @pytest.mark.requirement("equivalence/sensors-graph")
 def test_sensors_are_on_the_graph(robot: Robot, seeing: Probe, judge: Judge) -> None:
-    """Every entry is a topic that is published, with its type; and no plain kind of sensor is left out."""
+    """Check that each listed sensor is a published topic of its type, and no common sensor topic is missing."""
     entries, exchange = robot.read(SENSORS, SENSORS_SHAPE)
     if entries is None:
         pytest.skip("the robot's list of sensors cannot be read")
@@ -65,7 +65,7 @@ def test_sensors_are_on_the_graph(robot: Robot, seeing: Probe, judge: Judge) -> 
 @pytest.mark.motion
 @pytest.mark.requirement("equivalence/velocity-message")
 def test_velocity_is_published(robot: Robot, seeing: Probe, judge: Judge, effort: Effort) -> None:
-    """A velocity that was accepted comes to the velocity topic; on its way there it may be smoothed."""
+    """Check that an accepted velocity is published on the velocity topic; the robot may smooth it."""
     try:
         seeing.velocities()
         lost = 0

@@ -1,4 +1,4 @@
-"""Several deliveries at once: an answer belongs to its request."""
+"""Several deliveries at the same moment: each response must belong to its request."""
 
 import pytest
 
@@ -19,7 +19,7 @@ _NO_CODE = "none"
 @pytest.mark.motion
 @pytest.mark.requirement("http/concurrent-answers")
 def test_answers_to_deliveries_do_not_cross(api: RestInterface, judge: Judge) -> None:
-    """Of deliveries at one moment those that are valid are taken, and those that are not are refused."""
+    """Send valid and invalid deliveries at once: the robot must accept the valid ones and reject the others."""
     paths = [path_of(code, *_COORDINATES) for code in ("3", _NO_CODE)]
     require_valid(api.run.contract, "PUT", paths[0])
     # What is done with each alone is for others to judge.

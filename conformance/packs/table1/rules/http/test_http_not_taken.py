@@ -1,6 +1,6 @@
-"""A PUT whose answer no format can give is refused or done, and not both (contract, several clients).
+"""A PUT whose Accept excludes all formats is either rejected with 406 or applied (contract, several clients).
 
-What is answered 406 has no effect, and what is answered as done has one (RFC 9110 9.3.4).
+A PUT answered 406 must have no effect, and a PUT answered 2xx must have one (RFC 9110 9.3.4).
 """
 
 from collections.abc import Callable
@@ -37,7 +37,7 @@ _NOTHING: Final = "image/png"
 def test_what_is_not_acceptable_is_not_done(
     api: RestInterface, robot: Robot, standstill: Standstill, judge: Judge
 ) -> None:
-    """A velocity or a goal that is answered 406 moves nothing; one that is answered as done moves the robot."""
+    """PUT velocities and goals with an Accept that excludes all formats: after 406 the robot must not move."""
     refused, moved = _try_each(api, robot, 0.0)
     if not refused:
         judge.note(_ID, "no PUT of a velocity or a goal is answered 406")
@@ -53,17 +53,17 @@ def test_what_is_not_acceptable_is_not_done(
 
 
 def _put(robot: Robot, path: str, value: dict[str, Any]) -> Exchange:
-    """PUT as JSON, where no format of the answer is acceptable."""
+    """PUT JSON with an Accept header that excludes every format of the response."""
     fields = (("Content-Type", JSON), ("Accept", _NOTHING))
     return robot.rest.send("PUT", path, headers=fields, body=body_of(value))
 
 
 def _try_each(api: RestInterface, robot: Robot, watched_s: float) -> tuple[int, bool]:
-    """PUT what would move the robot where no format is acceptable, and watch each for so long.
+    """PUT velocities and goals with such an Accept header, and watch the robot for ``watched_s`` after each.
 
     Returns:
-        How many were answered 406, and whether the robot moves; what moves one that is not watched is left to others
-        to find out, and nothing more is tried.
+        How many were answered 406, and whether the robot moves. Without a watch, the first motion ends the check, and a
+        later repetition finds its cause.
     """
     fast = robot.share_of_limits(0.6, 0.4)
     straight = Velocity(*fast[:3])

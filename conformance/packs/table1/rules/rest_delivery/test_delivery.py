@@ -1,4 +1,4 @@
-"""The delivery PUT: whatever is valid is taken, whatever is no number is not."""
+"""The delivery's PUT: the robot must accept all valid values and reject all others."""
 
 from typing import Final
 
@@ -35,7 +35,7 @@ def _judge_taken(api: RestInterface, judge: Judge, path: str, expected: str) -> 
 
 @pytest.mark.requirement("rest-delivery/put", "rest-delivery/put-no-content", "rest-delivery/put-repeated")
 def test_deliveries(api: RestInterface, judge: Judge, explore: Explorer) -> None:
-    """The paper's example and any other are accepted, the first time and again."""
+    """PUT the paper's example and random deliveries, each once and again."""
 
     def try_delivery(delivery: Delivery) -> None:
         first = put_delivery(api, delivery.rest_path)
@@ -54,7 +54,7 @@ def test_deliveries(api: RestInterface, judge: Judge, explore: Explorer) -> None
 
 @pytest.mark.requirement("rest-delivery/put-range")
 def test_numbers_in_any_form(api: RestInterface, judge: Judge, explore: Explorer) -> None:
-    """Every finite double, with and without sign, fraction and exponent."""
+    """PUT finite doubles written with and without sign, fraction and exponent."""
 
     def try_forms(case: tuple[Delivery, tuple[str, ...]]) -> None:
         _, written = case
@@ -76,7 +76,7 @@ def test_numbers_in_any_form(api: RestInterface, judge: Judge, explore: Explorer
 
 @pytest.mark.requirement("rest-delivery/put-body")
 def test_a_body_is_ignored(rest: HttpClient, judge: Judge, effort: Effort) -> None:
-    """Whatever stands in the body, of whatever type."""
+    """PUT deliveries with bodies of any media type, which the robot must ignore."""
     for media_type, body in _BODIES * effort.cases(1):
         exchange = rest.send("PUT", _PAPER.rest_path, headers=(("Content-Type", media_type),), body=body)
         judge.check(
@@ -89,7 +89,7 @@ def test_a_body_is_ignored(rest: HttpClient, judge: Judge, effort: Effort) -> No
 
 @pytest.mark.requirement("rest-delivery/refuses-text", "rest-delivery/refuses-non-finite", "rest-delivery/refuses-code")
 def test_what_is_no_delivery(rest: HttpClient, judge: Judge, explore: Explorer, effort: Effort) -> None:
-    """Letters and nothing in place of any number; numbers that no double holds; other codes."""
+    """PUT invalid deliveries: text or nothing for a number, numbers beyond a double's range, other codes."""
 
     def refused(name: str, place: int, text: str) -> None:
         values = list(_VALID)

@@ -1,4 +1,4 @@
-"""The list of deliveries, an extension that a robot may leave out."""
+"""The list of deliveries, an optional resource."""
 
 import pytest
 
@@ -17,7 +17,7 @@ _LEAST = 50
 
 
 def _read(rest: HttpClient, judge: Judge) -> list[Delivery] | None:
-    """Return the list's requests, newest first; None where there is no list, or none that can be read."""
+    """Return the deliveries in the list, newest first; None where the robot has no list or it is invalid."""
     exchange = rest.send("GET", DELIVERIES, headers=ACCEPT_JSON)
     if exchange.response.status == 404:
         pytest.skip("the robot has no list of deliveries, which it may leave out")
@@ -34,7 +34,7 @@ def _read(rest: HttpClient, judge: Judge) -> list[Delivery] | None:
 
 @pytest.mark.requirement("rest-delivery/list")
 def test_list(rest: HttpClient, judge: Judge, effort: Effort) -> None:
-    """Each reading is a list of deliveries."""
+    """Check each reading of the list by its schema."""
     for _ in range(effort.cases(30)):
         _read(rest, judge)
 
@@ -42,7 +42,7 @@ def test_list(rest: HttpClient, judge: Judge, effort: Effort) -> None:
 @pytest.mark.motion
 @pytest.mark.requirement("rest-delivery/list-newest-first", "rest-delivery/list-values")
 def test_list_of_many(api: RestInterface, rest: HttpClient, judge: Judge, effort: Effort) -> None:
-    """More deliveries than the list has to hold are there, newest first, each with its values."""
+    """Send more deliveries than the list must hold, and check that it has the newest first with their values."""
     if _read(rest, judge) is None:
         pytest.skip("the robot's list of deliveries cannot be read")
     # A robot that takes its time is asked for fewer.

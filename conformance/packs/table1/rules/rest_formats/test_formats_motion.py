@@ -1,8 +1,8 @@
-"""XML, text and JSON of one moment: in motion and at rest elsewhere, of one goal and of one plan after another.
+"""XML, text and JSON must agree in motion, at rest elsewhere, for several goals and for several plans.
 
-At rest where a robot began, most of its values are zero, and none has ever been another. What a format told before a
-change may be what it tells first afterwards: so after each change the first reading counts, and what is out by it after
-each of several changes is judged. One may be out because a sample of the odometry came in between.
+At rest at the start most values are zero. A format that serves old values shows them first after a change; so the first
+reading after each change counts, and a fault must show after each of several changes. One difference may be an odometry
+sample that came between two reads.
 """
 
 from collections.abc import Iterator
@@ -39,7 +39,7 @@ _TRIES: Final = 3
 @pytest.mark.motion
 @pytest.mark.requirement("rest-formats/same-values")
 def test_formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> None:
-    """On an arc, and at rest after it, every value of pose and velocity is the same in all formats."""
+    """Compare pose and velocity in all formats while the robot drives an arc, and at rest after it."""
     calls = [call for call in reads(api) if call.operation.template in {POSE, VELOCITY, LINEAR} and _others(call)]
     if effort.name == "quick" or not calls:
         return  # the formats are compared at rest in any case
@@ -75,7 +75,7 @@ def test_formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> 
 @pytest.mark.motion
 @pytest.mark.requirement("rest-formats/same-values")
 def test_formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> None:
-    """One goal after another is the same in all formats, from the first reading on."""
+    """PUT several goals and compare each in all formats, from the first reading on."""
     call = _reader(api, GOAL_PATH)
     if effort.name == "quick" or call is None:
         return  # one goal is looked at in any case
@@ -98,7 +98,7 @@ def test_formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> N
 @pytest.mark.motion
 @pytest.mark.requirement(_QUOTED)
 def test_an_id_of_digits(api: RestInterface, robot: Robot, judge: Judge) -> None:
-    """A goal's id that is digits is a text in YAML; the goal is so far away that it is there when it is read."""
+    """PUT a distant goal whose id is digits: YAML text must show the id as a string."""
     if "text/plain" not in _others(_reader(api, GOAL_PATH)):
         judge.unclaimed(_QUOTED, "the goal is not described as plain text")
         return
@@ -131,7 +131,7 @@ def test_an_id_of_digits(api: RestInterface, robot: Robot, judge: Judge) -> None
 @pytest.mark.phase("resting")
 @pytest.mark.requirement("rest-formats/same-values")
 def test_formats_of_plans(api: RestInterface, robot: Robot, effort: Effort) -> None:
-    """One plan after another is the same in all formats, from the first reading on."""
+    """Request several plans and compare each in all formats, from the first reading on."""
     call = _reader(api, PLAN)
     here = robot.map_pose()
     if effort.name == "quick" or call is None or here is None:
@@ -153,7 +153,7 @@ def test_formats_of_plans(api: RestInterface, robot: Robot, effort: Effort) -> N
 
 
 def _judge_first(api: RestInterface, changes: Iterator[Call]) -> None:
-    """Read what is another one each time; what is out in the first reading each time, but the first, is judged."""
+    """Judge the first reading after each change: a difference fails that shows after each change but the first."""
     left: Found | None = None
     for number, call in enumerate(changes):
         found, exchange = one_turn(api, call, _others(call))
@@ -168,10 +168,10 @@ def _judge_first(api: RestInterface, changes: Iterator[Call]) -> None:
 
 
 def _reader(api: RestInterface, template: str) -> Call | None:
-    """Return what reads a resource, where it has several formats."""
+    """Return the GET of a resource that has several formats, or None."""
     return next((call for call in reads(api) if call.operation.template == template and _others(call)), None)
 
 
 def _others(call: Call | None) -> list[str]:
-    """Return the formats of a resource besides JSON."""
+    """Return the formats of a resource other than JSON."""
     return [name for name in call.operation.formats if name != JSON] if call else []

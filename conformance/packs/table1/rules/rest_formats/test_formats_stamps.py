@@ -1,4 +1,4 @@
-"""The stamp of the odometry in every format."""
+"""The odometry's stamp must be right in every format."""
 
 import pytest
 
@@ -18,7 +18,7 @@ _TURNS = 3
 
 @pytest.mark.requirement("rest-formats/same-values")
 def test_stamps_lie_between(api: RestInterface, judge: Judge) -> None:
-    """The odometry changes from answer to answer, but not back: XML's stamp lies between JSON's before and after."""
+    """Read JSON, another format, and JSON again: the stamp in the middle must lie between the other two."""
     pose = next((call for call in reads(api) if call.operation.template == POSE), None)
     for media_type in _FORMATS if pose is not None else ():
         if pose is None or media_type not in pose.operation.formats:
@@ -43,7 +43,7 @@ def test_stamps_lie_between(api: RestInterface, judge: Judge) -> None:
 
 
 def _stamp(exchange: Exchange) -> tuple[float, float] | None:
-    """Seconds and nanoseconds of an odometry in any format; None where it cannot be read."""
+    """Return seconds and nanoseconds of an odometry in any format; None where it cannot be read."""
     answer = exchange.response
     if not answer.ok:
         return None

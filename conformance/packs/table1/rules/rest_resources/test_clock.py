@@ -1,4 +1,4 @@
-"""The robot's clock, by all that was read of its odometry in the run."""
+"""The rate of the robot's clock, by all odometry stamps of the run."""
 
 import pytest
 
@@ -14,7 +14,7 @@ _STEP_S = 0.1
 
 @pytest.mark.requirement("rest-resources/pose-clock")
 def test_clock(robot: Robot, judge: Judge, clock: Clock) -> None:
-    """The stamps advance as the time on the wall does."""
+    """Check that the stamps advance as fast as local time."""
     for _ in poll_for(robot.clock, _STEP_S, SPAN_S + 1):
         robot.odometry()  # which is kept when the last reading is a while ago
         if clock.rate is not None:

@@ -1,4 +1,4 @@
-"""What drives show of velocity and pose: velocities are accepted and reached, and the pose follows them."""
+"""Rules on drives: the robot accepts and reaches velocities, and its pose follows them."""
 
 from collections.abc import Callable, Iterator
 
@@ -14,7 +14,7 @@ from conformance.verdict.run import Run
 
 
 def _shown(name: str, *scenarios: Scenario) -> Rule:
-    """Return the rule that judges a requirement by all that drives show of it."""
+    """Return a rule that judges one requirement by the traces of these drive scenarios."""
     requirement = f"rest-resources/{name}"
 
     def judge(trace: Driven, run: Run) -> Iterator[Outcome]:

@@ -1,4 +1,4 @@
-"""What a drive to a goal shows."""
+"""Rules on a drive to a goal."""
 
 from collections.abc import Iterator
 
@@ -19,7 +19,7 @@ def goal_put(trace: GoalReached) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-drives", on=(goal_reached,))
 def goal_drives(trace: GoalReached) -> Iterator[Outcome]:
-    """Judge that the robot drove, and where it is."""
+    """Judge that the robot drove, and to the target."""
     if trace.there is None or trace.read is None or trace.undecided:
         return  # refused, or slow but on its way: nothing to be said against it
     far = trace.way_m > trace.has_to_m
@@ -34,7 +34,7 @@ def goal_drives(trace: GoalReached) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-ended", on=(goal_reached,))
 def goal_ended(trace: GoalReached) -> Iterator[Outcome]:
-    """Judge that a goal ends where it is reached."""
+    """Judge that the goal ends when the robot has reached it."""
     if trace.read is not None and not trace.undecided:
         holds = trace.ended and trace.read.response.status == 404
         observed = "" if trace.ended else "a goal that is still active"
@@ -43,7 +43,7 @@ def goal_ended(trace: GoalReached) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-id-again", on=(goal_reached,))
 def goal_id_again(trace: GoalReached) -> Iterator[Outcome]:
-    """Judge that the id of a goal that has ended can be used again."""
+    """Judge that the id of an ended goal can be used again."""
     if trace.again is not None:
         holds = trace.again.response.status in NEW
         yield Case(holds, trace.again, "201 or 202 for a goal whose id has ended before")
@@ -51,20 +51,20 @@ def goal_id_again(trace: GoalReached) -> Iterator[Outcome]:
 
 @rule("rest-resources/plan-start", on=(goal_reached,))
 def plan_start(trace: GoalReached) -> Iterator[Outcome]:
-    """Judge that a plan begins where the robot is, away from where it was at first."""
+    """Judge that a plan requested after the drive begins at the robot's new position."""
     if trace.start is not None:
         yield trace.start.case
 
 
 @rule("rest-resources/velocity-odometry", on=(goal_reached,))
 def velocity_odometry(trace: GoalReached, run: Run) -> Iterator[Outcome]:
-    """Judge that velocity and odometry agree on the way."""
+    """Judge that velocity and odometry agree during the drive."""
     if trace.drive is not None:
         yield from outcomes("rest-resources/velocity-odometry", trace.drive, said_of(run).limits)
 
 
 @rule("rest-resources/pose-motion", on=(goal_reached,))
 def pose_motion(trace: GoalReached, run: Run) -> Iterator[Outcome]:
-    """Judge that the pose follows the velocity on the way."""
+    """Judge that the pose follows the velocity during the drive."""
     if trace.drive is not None:
         yield from outcomes("rest-resources/pose-motion", trace.drive, said_of(run).limits)

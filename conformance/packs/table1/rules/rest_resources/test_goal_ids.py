@@ -1,4 +1,4 @@
-"""Goals under all kinds of ids, each displacing the one before."""
+"""Goals with ids of all kinds, each replacing the one before."""
 
 import itertools
 from typing import Final
@@ -33,7 +33,7 @@ _KNOWN: Final = (
 
 @pytest.mark.requirement("rest-resources/goal-id", "rest-resources/goal-preempt", "rest-resources/goal-get")
 def test_goal_ids(robot: Robot, judge: Judge, explore: Explorer) -> None:
-    """Whatever its id, a goal is taken, becomes current and comes back under that id."""
+    """PUT goals with random ids: the robot must accept each, and show it as active under its id."""
     goals = itertools.cycle(choose_goals(robot, 1.5, 2))
     frame = robot.statement.motion.frame
     used: list[str] = []
@@ -78,7 +78,7 @@ def test_goal_ids(robot: Robot, judge: Judge, explore: Explorer) -> None:
 
 @pytest.mark.requirement("rest-resources/goal-get")
 def test_the_goal_shown_is_the_goal_put(robot: Robot, judge: Judge, explore: Explorer) -> None:
-    """Positions and headings come back as they were put, however long the goal is looked at."""
+    """PUT goals with random poses: the robot must show each as it was sent, in every reading."""
     goals = choose_goals(robot, 1.5, 2)
     numbers = itertools.count()
     strange: list[str] = []

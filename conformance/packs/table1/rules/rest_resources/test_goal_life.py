@@ -1,4 +1,4 @@
-"""What the life of a goal shows: each requirement on goals is judged by the scenario's trace."""
+"""Rules on the scenario goal_life: a goal is sent, repeated, contradicted, replaced and cancelled."""
 
 from collections.abc import Iterator
 
@@ -12,12 +12,12 @@ from conformance.verdict.run import Run
 
 
 def _puts(life: GoalLife) -> Iterator[Put]:
-    """Yield the goals that were new."""
+    """Yield the PUTs of new goals."""
     yield from (one for one in (life.first, life.second if life.renamed is None else None) if one is not None)
 
 
 def _read(life: GoalLife) -> Iterator[Put]:
-    """Yield the goals that were new and accepted, and could be read before they ended."""
+    """Yield the PUTs of new goals that the robot accepted and showed before they ended."""
     yield from (one for one in _puts(life) if one.exchange.response.status in NEW | REPEATED and not one.ended)
 
 
@@ -27,14 +27,14 @@ def _shown(put: Put) -> Case:
 
 @rule("rest-resources/goal-none", on=(goal_life,))
 def no_goal(trace: GoalLife) -> Iterator[Outcome]:
-    """Judge that there is no goal at first."""
+    """Judge that GET returns 404 before the first goal."""
     for one in trace.none:
         yield Case(one.read.response.status == 404, one.read, "404 without an active goal")
 
 
 @rule("rest-resources/goal-delete-none", on=(goal_life,))
 def cancelled_without_goal(trace: GoalLife) -> Iterator[Outcome]:
-    """Judge the response to a DELETE where there is no goal."""
+    """Judge the response to DELETE while there is no goal."""
     for one in trace.none:
         yield Case(one.cancelled.response.status == 404, one.cancelled, "404 for a DELETE without an active goal")
 
@@ -55,13 +55,13 @@ def goal_put(trace: GoalLife) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-get", on=(goal_life,))
 def goal_get(trace: GoalLife) -> Iterator[Outcome]:
-    """Judge that the active goal is the one that was put."""
+    """Judge that GET shows the goal that was sent."""
     return map(_shown, _read(trace))
 
 
 @rule("rest-resources/goal-id", on=(goal_life,))
 def goal_id(trace: GoalLife) -> Iterator[Outcome]:
-    """Judge that a goal comes back under its id."""
+    """Judge that GET shows the goal's id."""
     return (_shown(one) for one in _read(trace) if one is trace.first)
 
 
@@ -76,7 +76,7 @@ def goal_status(trace: GoalLife) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-repeat", on=(goal_life,))
 def goal_repeat(trace: GoalLife) -> Iterator[Outcome]:
-    """Judge that a repeated goal changes nothing, neither what was put nor its stamp."""
+    """Judge that repeating a goal's PUT changes neither the goal nor its stamp."""
     for one in trace.repeated:
         accepted, changed = one.exchange.response.status in REPEATED, one.differs
         # A robot that shows one stamp in two readings shows another one for another goal.
@@ -93,7 +93,7 @@ def goal_repeat(trace: GoalLife) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-conflict", on=(goal_life,))
 def goal_conflict(trace: GoalLife) -> Iterator[Outcome]:
-    """Judge that another pose under the active goal's id is refused."""
+    """Judge that the robot rejects another pose under the active goal's id."""
     for one in trace.contradicted:
         refused = one.exchange.response.status == 409
         yield Case(
@@ -106,7 +106,7 @@ def goal_conflict(trace: GoalLife) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-preempt", on=(goal_life,))
 def goal_preempt(trace: GoalLife) -> Iterator[Outcome]:
-    """Judge that another goal takes the active one's place."""
+    """Judge that another goal replaces the active one."""
     if trace.second is not None and trace.renamed is False:
         yield Case(False, trace.second.exchange, "201 or 202 for another goal")
     yield from (_shown(one) for one in _read(trace) if one is trace.second)
@@ -114,7 +114,7 @@ def goal_preempt(trace: GoalLife) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-fills-in", on=(goal_life,))
 def goal_fills_in(trace: GoalLife) -> Iterator[Outcome]:
-    """Judge that the robot fills in what a goal leaves out."""
+    """Judge that the robot fills in optional members that the goal leaves out."""
     second = trace.second
     if second is None:
         return
@@ -130,7 +130,7 @@ def goal_fills_in(trace: GoalLife) -> Iterator[Outcome]:
 
 @rule("rest-resources/velocity-goal", on=(goal_life,))
 def velocity_goal(trace: GoalLife, run: Run) -> Iterator[Outcome]:
-    """Judge that a velocity while a goal is active is driven, or refused with 409."""
+    """Judge that a velocity PUT while a goal is active is driven, or rejected with 409."""
     answer = trace.velocity
     if answer is not None:
         yield Case(answer.response.status in {200, 204, 409}, answer, "200, 204 or 409 while a goal is active")

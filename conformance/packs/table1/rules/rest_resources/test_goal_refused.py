@@ -1,4 +1,4 @@
-"""Goals that a robot has to refuse, and two that it has to accept."""
+"""Rules on goals that a robot must reject, and on two that it must accept."""
 
 from collections.abc import Iterator
 

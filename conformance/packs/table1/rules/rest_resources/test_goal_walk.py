@@ -1,4 +1,4 @@
-"""Goals in any order."""
+"""Random sequences of goal requests."""
 
 import pytest
 
@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mar
     "rest-resources/goal-delete-none-success",
 )
 def test_goal_walk(robot: Robot, effort: Effort, explore: Explorer) -> None:
-    """Whatever clients do with goals, in whatever order, the one that was put last is the active one."""
+    """Run the goal state machine: after every sequence of requests the goal sent last must be the active one."""
     walk = Walk(robot, 0.4 * effort.budget_s)
     poses = choose_goals(walk.robot, 1.5, 2)
     explore.machine(lambda: GoalMachine(walk, poses), cases=20, steps=effort.cases(12))

@@ -25,7 +25,7 @@ pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
     "rest-resources/sensors-stable",
 )
 def test_sensors(robot: Robot, judge: Judge, effort: Effort) -> None:
-    """Each reading is a list of {name, topic, type}, without repetition, and the same as the one before."""
+    """Check each reading: {name, topic, type} without duplicates, and the same list each time."""
     _read_often(robot, judge, "sensors", SENSORS, SENSORS_SHAPE, MESSAGE_TYPE, effort.cases(100))
 
 
@@ -36,7 +36,7 @@ def test_sensors(robot: Robot, judge: Judge, effort: Effort) -> None:
     "rest-resources/services-stable",
 )
 def test_services(robot: Robot, judge: Judge, effort: Effort) -> None:
-    """Each reading is a list of {name, type}, without repetition, and the same as the one before."""
+    """Check each reading: {name, type} without duplicates, and the same list each time."""
     _read_often(robot, judge, "services", SERVICES, SERVICES_SHAPE, SERVICE_TYPE, effort.cases(100))
 
 
@@ -65,7 +65,7 @@ def _read_often(robot: Robot, judge: Judge, what: str, path: str, shape: Shape, 
 
 
 def _judge_entries(judge: Judge, what: str, entries: list[Any], exchange: Exchange, full: Shape) -> list[str]:
-    """Judge one list; give its entries in a form that can be compared."""
+    """Judge one list, and return its entries as sorted texts."""
     names = ("name", "topic", "type") if what == "sensors" else ("name", "type")
     listed = sorted(json.dumps([entry[name] for name in names]) for entry in entries)
     twice = next((one for one, two in itertools.pairwise(listed) if one == two), "")

@@ -1,4 +1,4 @@
-"""What requests for plans show: where a path begins and ends, and in which frame it is."""
+"""Rules on plans: where a path begins and ends, how long its steps are, and in which frame it is."""
 
 from collections.abc import Iterator
 
@@ -26,7 +26,7 @@ _EXPECTED = "status 200 with a complete nav_msgs/GetPlan response of one pose at
 
 @rule("rest-resources/plan-type", on=(plans_from_robot,))
 def plan_type(trace: PlansFromRobot) -> Iterator[Outcome]:
-    """Judge that there are plans to poses around the robot, each of the right type."""
+    """Judge that the robot has plans to poses around it, each valid by the schema."""
     if trace.nowhere is not None:
         yield Case(False, trace.nowhere, "a plan to one of 8 poses around the robot")
     for one in trace.reads:
@@ -82,7 +82,7 @@ def plan_yaw(trace: Plans) -> Iterator[Outcome]:
 
 @rule("rest-resources/plan-continuous", on=(plans_from_robot, plans_from_start))
 def plan_continuous(trace: Plans) -> Iterator[Outcome]:
-    """Judge that no step of a plan is too long."""
+    """Judge that no step between two poses of a plan is too long."""
     for one in trace.reads:
         if one.plan is not None:
             step_m = one.plan.longest_step
@@ -102,14 +102,14 @@ def plan_frame(trace: Plans, run: Run) -> Iterator[Outcome]:
 
 @rule("rest-resources/plan-defaults", on=(plans_from_start,))
 def plan_defaults(trace: PlansFromStart) -> Iterator[Outcome]:
-    """Judge that what a request leaves out has its default."""
+    """Judge that omitted parameters have their defaults."""
     for one in trace.defaults:
         problem = one.problem if one.plan is None else _other_plan(one, one.plan)
         yield Case(not problem, one.exchange, "the plan that yaw=0, frame_id=map and tolerance=0.1 give", problem)
 
 
 def _other_plan(one: DefaultPlan, plan: Plan) -> str:
-    """Return in what a plan differs from the one with the defaults written out; empty: in nothing."""
+    """Return where a plan differs from the one with the defaults written out; empty if nowhere."""
     last, wanted = plan.poses[-1], one.explicit.poses[-1]
     off_m, apart_m = last.distance(one.goal), plan.poses[0].distance(one.explicit.poses[0])
     if off_m > 0.11:
@@ -123,7 +123,7 @@ def _other_plan(one: DefaultPlan, plan: Plan) -> str:
 
 @rule("rest-resources/plan-frame", on=(plans_in_frames,))
 def plan_in_its_frame(trace: tuple[FramePlan, ...]) -> Iterator[Outcome]:
-    """Judge that a plan is in the frame in the request, or refused."""
+    """Judge that a plan is in the requested frame, or rejected."""
     for one in trace:
         problem = "" if one.plan is None or one.plan.frames == {one.frame} else f"frames {_frames(one.plan)}"
         problem = "" if is_refused(one.exchange) else one.problem or problem
@@ -132,20 +132,20 @@ def plan_in_its_frame(trace: tuple[FramePlan, ...]) -> Iterator[Outcome]:
 
 @rule("rest-resources/plan-start", on=(plans_in_frames,))
 def plan_starts_in_its_frame(trace: tuple[FramePlan, ...]) -> Iterator[Outcome]:
-    """Judge that a plan in the odometry's frame begins where the odometry says."""
+    """Judge that a plan in the odometry frame begins at the odometry's pose."""
     for one, plan, moved_m in _placed(trace):
         yield _at(plan.poses[0], one.begin, START_OFF + moved_m, one.exchange)
 
 
 @rule("rest-resources/plan-end", on=(plans_in_frames,))
 def plan_ends_in_its_frame(trace: tuple[FramePlan, ...]) -> Iterator[Outcome]:
-    """Judge that a plan in the odometry's frame ends at the goal in the request."""
+    """Judge that a plan in the odometry frame ends at the requested goal."""
     for one, plan, _ in _placed(trace):
         yield _at(plan.poses[-1], one.goal, 0.1 * 1.05 + 0.01, one.exchange)
 
 
 def _placed(trace: tuple[FramePlan, ...]) -> Iterator[tuple[FramePlan, Plan, float]]:
-    """Yield the plans in a known frame that are in this frame, and how far the robot moved meanwhile, m."""
+    """Yield the plans that are in the known frame requested, and how far the robot moved in the meantime, m."""
     for one in trace:
         if one.plan is not None and one.moved_m is not None and one.plan.frames == {one.frame}:
             yield one, one.plan, one.moved_m
@@ -158,7 +158,7 @@ def _at(pose: Pose, wanted: Pose, off_m: float, exchange: Exchange) -> Case:
 
 @rule("rest-resources/plan-none", on=(plans_outside,))
 def plan_none(trace: tuple[Exchange, ...]) -> Iterator[Outcome]:
-    """Judge that there is no plan to a pose outside every map."""
+    """Judge that the robot responds without a plan to a goal outside every map."""
     for exchange in trace:
         yield Case(is_refused(exchange), exchange, "422 (another 4xx conforms) where there is no plan")
 

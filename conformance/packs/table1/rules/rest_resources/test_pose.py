@@ -1,4 +1,4 @@
-"""The robot's pose and its measured velocity, read while nothing is asked of the robot."""
+"""Pose and measured velocity, read while the suite commands nothing."""
 
 import pytest
 
@@ -28,7 +28,7 @@ _UNREAD = 5
     "rest-resources/pose-stamp",
 )
 def test_pose(robot: Robot, judge: Judge, effort: Effort) -> None:
-    """Each reading is a whole odometry, and from one to the next time goes on; the observer judges them one by one."""
+    """Read the odometry repeatedly: each must be complete, and the stamps must advance."""
     stamps: set[float] = set()
     exchange: Exchange | None = None
     patience = robot.patience(_PATIENCE_S)
@@ -58,7 +58,7 @@ def test_pose(robot: Robot, judge: Judge, effort: Effort) -> None:
 
 @pytest.mark.requirement("rest-resources/pose-sample", _BESIDE)
 def test_single_readings(robot: Robot, judge: Judge, effort: Effort) -> None:
-    """Odometry and velocity in turns, many of one sample: the observer judges each by those around it."""
+    """Read odometry and velocity in turn; the observer judges each by the readings around it."""
     unread, before, wanted = 0, judge.cases(_BESIDE), effort.cases(_TURNS)
     for turn in range(_READ * wanted):
         judged = judge.cases(_BESIDE) - before
@@ -79,7 +79,7 @@ def test_single_readings(robot: Robot, judge: Judge, effort: Effort) -> None:
     "rest-resources/linear-agrees",
 )
 def test_velocity_and_odometry(robot: Robot, effort: Effort) -> None:
-    """Velocity, its linear part and the odometry agree; observer and drive judge each reading."""
+    """Read velocity, linear velocity and odometry; observer and drive judge whether they agree."""
     # Two readings agree where the odometry has been steady for a while: so look for that long at least.
     with driving(robot) as drive:
         drive.keep(0.4 * robot.watchfulness)

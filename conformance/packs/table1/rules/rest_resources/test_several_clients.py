@@ -1,4 +1,4 @@
-"""What several clients that put at one moment get: one goal is one goal, and one client's value is there then."""
+"""Rules on simultaneous PUTs of several clients: the robot must end up with one client's whole value."""
 
 from collections.abc import Iterator
 
@@ -15,7 +15,7 @@ from conformance.verdict.run import Run
 
 @rule("rest-resources/goal-concurrent", on=(concurrent_goal,))
 def goal_concurrent(trace: tuple[ConcurrentGoal, ...]) -> Iterator[Outcome]:
-    """Judge that one client has put a new goal and the others have repeated it; cancelled once, it is gone."""
+    """Judge that several clients' PUTs of one new goal make one goal, which one DELETE cancels."""
     for one in trace:
         statuses = sorted(put.response.status for put in one.puts)
         yield Case(
@@ -32,14 +32,14 @@ def goal_concurrent(trace: tuple[ConcurrentGoal, ...]) -> Iterator[Outcome]:
 
 @rule("rest-resources/concurrent-puts", on=(concurrent_goals,))
 def one_goal_is_active(trace: tuple[GoalRead, ...]) -> Iterator[Outcome]:
-    """Judge that of different goals one is active: id and pose are the same client's."""
+    """Judge that of several clients' goals one is active, with id and pose of the same client."""
     for one in trace:
         yield Case(not one.differs, one.exchange, "the goal of one client, with its id and its pose", one.differs)
 
 
 @rule("rest-resources/concurrent-puts", on=(concurrent_velocities,))
 def one_velocity_is_reached(trace: tuple[ConcurrentVelocities, ...], run: Run) -> Iterator[Outcome]:
-    """Judge that of different velocities the robot reaches that of one client, in all components."""
+    """Judge that the robot reaches one client's velocity in all components."""
     limits = said_of(run).limits
     for one in trace:
         for accepted in one.accepted:
@@ -55,7 +55,7 @@ def one_velocity_is_reached(trace: tuple[ConcurrentVelocities, ...], run: Run) -
 
 
 def _echoed(accepted: Accepted) -> Iterator[Case]:
-    """Yield whether the velocity in the response, where there is one, is the one that was put."""
+    """Yield whether the velocity in the response, if any, is the one that was sent."""
     twist, problem = read_as(accepted.exchange.response, TWIST)
     if not problem:
         echo = Velocity.of(twist)

@@ -1,4 +1,4 @@
-"""What drives show of safety: a velocity holds for its time, ends by itself, can be renewed, and stops."""
+"""Rules on the safety of drives: a velocity holds for its time, ends by itself, can be renewed and stopped."""
 
 from collections.abc import Iterator
 
@@ -19,19 +19,19 @@ _LATE = NotTested("responses came too late to measure how long a velocity holds"
 
 @rule("safety/stop", on=(straight,))
 def stop(trace: Driven, run: Run) -> Iterator[Outcome]:
-    """Judge that zero stops the robot, before its velocity would have ended by itself."""
+    """Judge that zero velocity stops the robot before its watchdog would."""
     return outcomes("safety/stop", trace.drive, said_of(run).limits)
 
 
 @rule("safety/limits-hold", on=(straight, turn, velocity_walk))
 def limits_hold(trace: Driven, run: Run) -> Iterator[Outcome]:
-    """Judge, where no limits are declared, that the robot is no faster than it was commanded to be."""
+    """Judge that a robot without declared limits is no faster than commanded."""
     return outcomes("safety/limits-hold", trace.drive, said_of(run).limits)
 
 
 @rule("safety/refused-keeps", on=(turn, velocity_walk))
 def refused_keeps(trace: Driven, run: Run) -> Iterator[Outcome]:
-    """Judge that the robot keeps its velocity when it refuses another one."""
+    """Judge that the robot keeps its velocity when it rejects another one."""
     return outcomes("safety/refused-keeps", trace.drive, said_of(run).limits)
 
 
@@ -44,7 +44,7 @@ def renewal(trace: Driven, run: Run) -> Iterator[Outcome]:
 
 @rule("safety/hold", on=(turn,))
 def hold(trace: Driven, run: Run) -> Iterator[Outcome]:
-    """Judge that a velocity that is not renewed is there for the hold time."""
+    """Judge that a velocity that is not renewed lasts for the hold time."""
     limits = said_of(run).limits
     if limits.hold_s is None:
         yield Note("no hold time is declared: a velocity only has to last until it is reached")
@@ -68,7 +68,7 @@ def hold(trace: Driven, run: Run) -> Iterator[Outcome]:
 
 @rule("safety/hold-ends", on=(turn,))
 def hold_ends(trace: Driven, run: Run) -> Iterator[Outcome]:
-    """Judge that the robot begins to stop when the hold time is over."""
+    """Judge that the robot begins to stop at the end of the hold time."""
     limits = said_of(run).limits
     if limits.hold_s is None:
         yield Note("no hold time is declared")
@@ -106,13 +106,13 @@ def watchdog(trace: Driven, run: Run) -> Iterator[Outcome]:
 
 @rule("safety/cancel", on=(goal_life,))
 def cancel(trace: GoalLife, run: Run) -> Iterator[Outcome]:
-    """Judge that the robot stands still when its goal was cancelled."""
+    """Judge that the robot stands still after its goal was cancelled."""
     for one in trace.cancelled:
         yield from outcomes("safety/cancel", one.drive, said_of(run).limits)
 
 
 @rule("safety/watchdog", on=(goal_reached,))
 def not_taken_up(trace: GoalReached, run: Run) -> Iterator[Outcome]:
-    """Judge that a velocity from before a goal is not taken up again when the goal is reached."""
+    """Judge that the robot does not resume an old velocity when it has reached a goal."""
     if trace.turned is not None:
         yield from outcomes("safety/watchdog", trace.turned, said_of(run).limits)

@@ -1,4 +1,4 @@
-"""The publishers service of RoAAS's own contract: both operations, and what their answers are."""
+"""The publishers service over SOAP: the robot must accept all valid deliveries and reject all others."""
 
 import pytest
 from hypothesis import strategies as st
@@ -28,7 +28,7 @@ _VALID = "soap-delivery/response-valid"
 
 
 def _answered(judge: Judge, id_: str, operation: str, answer: SoapResponse, what: str) -> bool:
-    """Judge that a valid request was taken, and that the answer is what the XSD says."""
+    """Judge that the robot accepted a valid request and that the response is valid by the XSD."""
     taken = judge_answer(judge, id_, answer.accepted, answer, f"2xx for {what}")
     return _valid(judge, operation, answer) and taken if answer.succeeded else taken
 
@@ -51,7 +51,7 @@ def _valid(judge: Judge, operation: str, answer: SoapResponse) -> bool:
 
 @pytest.mark.requirement("soap-delivery/delivery", "soap-delivery/coffee", _VALID)
 def test_operations(publishers: SoapService, judge: Judge, effort: Effort) -> None:
-    """Both operations take the paper's example, again and again, and answer with their own empty wrapper."""
+    """Send the paper's example to both operations repeatedly: each must respond with its own empty wrapper."""
     for number in range(effort.cases(55)):
         for operation, id_ in zip(_BOTH, ("soap-delivery/delivery", "soap-delivery/coffee"), strict=True):
             code = "3" if operation == "ExecuteDeliveryRequest" and number % 2 else "4"
@@ -64,7 +64,7 @@ def test_operations(publishers: SoapService, judge: Judge, effort: Effort) -> No
 
 @pytest.mark.requirement("soap-delivery/range", _VALID)
 def test_range(publishers: SoapService, judge: Judge, explore: Explorer) -> None:
-    """Doubles over their whole range and both codes, each written in any form that XML Schema allows."""
+    """Send doubles over their whole range and both codes, in every notation that XML Schema allows."""
     declared = publishers.contract.shape(clark(delivery_messages.NAMESPACE, "ExecuteDeliveryRequest"))
     if declared is None:
         pytest.skip("the contract has no ExecuteDeliveryRequest")
@@ -99,7 +99,7 @@ def test_range(publishers: SoapService, judge: Judge, explore: Explorer) -> None
 
 @pytest.mark.requirement("soap-delivery/syntax", _VALID)
 def test_syntax(publishers: SoapService, judge: Judge, explore: Explorer, effort: Effort) -> None:
-    """Requests that differ only in how their XML is written are all taken."""
+    """Send requests that differ only in XML syntax (prefixes, quotes, white space): the robot must accept all."""
 
     def taken(operation: str, style: XmlStyle, what: str) -> None:
         document = serialize(envelope([delivery_messages.delivery(operation)]), style)
@@ -127,7 +127,7 @@ def test_syntax(publishers: SoapService, judge: Judge, explore: Explorer, effort
 
 @pytest.mark.requirement("soap-delivery/typed-values", _VALID)
 def test_typed_values(publishers: SoapService, judge: Judge) -> None:
-    """Values that say what type they are of, as PHP's and ksoap2's clients write them, are the same values."""
+    """Send values with xsi:type, as PHP and ksoap2 clients do: they must mean the same."""
     for operation in _BOTH:
         declared = publishers.contract.shape(clark(delivery_messages.NAMESPACE, operation))
         if declared is None:
@@ -140,7 +140,7 @@ def test_typed_values(publishers: SoapService, judge: Judge) -> None:
 
 @pytest.mark.requirement("soap-delivery/addressing")
 def test_addressing(publishers: SoapService, judge: Judge, effort: Effort) -> None:
-    """WS-Addressing headers change nothing, with the action as the paper prints it and as JAX-WS RI makes it."""
+    """Send WS-Addressing headers, with the paper's action and with that of JAX-WS RI: they must change nothing."""
     address = publishers.endpoint
     for number in range(repetitions(effort, 5)):
         for operation in _BOTH:
@@ -162,7 +162,7 @@ def test_addressing(publishers: SoapService, judge: Judge, effort: Effort) -> No
 
 @pytest.mark.requirement("soap-delivery/refuses-code", "strict-input/soap-code", "strict-input/soap-fault")
 def test_codes(publishers: SoapService, judge: Judge, effort: Effort) -> None:
-    """Codes other than 3 and 4 are refused."""
+    """Send codes other than 3 and 4: the robot must reject them."""
     if publishers.contract.target_namespace != delivery_messages.NAMESPACE:
         # The requirement on faults is one of every contract; these codes are not.
         return
@@ -183,7 +183,7 @@ def test_codes(publishers: SoapService, judge: Judge, effort: Effort) -> None:
 
 @pytest.mark.requirement("soap-delivery/size")
 def test_64_kib(publishers: SoapService, judge: Judge) -> None:
-    """A valid message of 64 KiB is taken."""
+    """Send a valid message of 64 KiB: the robot must accept it."""
     document = padded(envelope((delivery_messages.delivery(),)).written(), TAKEN_OCTETS)
     answer = send(publishers, require_valid_document(publishers, document))
     judge_answer(judge, "soap-delivery/size", answer.accepted, answer, f"2xx for a message of {TAKEN_OCTETS:,} octets")
@@ -191,7 +191,7 @@ def test_64_kib(publishers: SoapService, judge: Judge) -> None:
 
 @pytest.mark.requirement("soap-delivery/concurrent-answers")
 def test_answers_do_not_cross(publishers: SoapService, judge: Judge, effort: Effort) -> None:
-    """Clients that order at one moment by both operations are each answered by their own."""
+    """Call both operations at the same moment from several clients: each must get its own operation's response."""
     operations = [_BOTH[client % 2] for client in range(MOST_CLIENTS)]
     outgoing = [soap_services.outgoing(publishers, delivery_messages.delivery(name)) for name in operations]
     for came in send_together([outgoing] * effort.cases(20)):

@@ -1,4 +1,4 @@
-"""Interoperability: zeep, the common SOAP client for Python, is made from the description and calls everything."""
+"""Interoperability with zeep, a common SOAP client for Python: it must load the WSDL and call every operation."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ _AGAIN_S = 0.2
 
 
 def _has(result: Any, path: str) -> bool:
-    """Return whether there is a number at a path of names in what zeep returned, whatever it is wrapped in."""
+    """Return whether zeep's result has a number at a path of names, whatever wraps it."""
     from zeep.helpers import serialize_object  # noqa: PLC0415 - see _client
 
     return _found(serialize_object(result), path.split("."))
@@ -65,7 +65,7 @@ def _client(judge: Judge, id_: str, service: SoapService | None) -> ZeepCaller |
 
 
 def _plan(service: SoapService) -> dict[str, float]:
-    """Return the arguments of a plan that the robot gives to a message of our own; none where it gives none."""
+    """Return arguments of GetPlan for which the robot has a plan; empty where it has none."""
     operation = next((item for item in service.contract.operations if item.name == "GetPlan"), None)
     message = example(service, operation) if operation is not None else None
     return (
@@ -78,7 +78,7 @@ def _plan(service: SoapService) -> dict[str, float]:
 @pytest.mark.motion
 @pytest.mark.requirement("soap-delivery/interop")
 def test_publishers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """Both operations are called."""
+    """Call both operations of the publishers service with zeep."""
     client = _client(judge, "soap-delivery/interop", soap.publishers)
     if client is None:
         return
@@ -95,7 +95,7 @@ def test_publishers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
 @pytest.mark.needs("subscribers")
 @pytest.mark.requirement("soap-subscribers/interop")
 def test_subscribers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """All operations are called; those that have nothing to tell may answer with a fault."""
+    """Call all operations of the subscribers service with zeep; those without a value may return a fault."""
     id_ = "soap-subscribers/interop"
     client = _client(judge, id_, soap.subscribers)
     if client is None or soap.subscribers is None:

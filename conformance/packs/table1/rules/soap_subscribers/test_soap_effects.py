@@ -1,4 +1,4 @@
-"""What a SOAP message does beside being answered: seen in the robot's list of deliveries, and in the goal it shows."""
+"""Effects of SOAP messages, seen over REST: in the list of deliveries, and in the active goal."""
 
 from collections.abc import Callable
 from functools import partial
@@ -34,7 +34,7 @@ _LISTED_S = 1.0
 
 
 def _listed(rest: HttpClient, depot_x: float) -> int | None:
-    """Return how many deliveries with that depot the robot lists; None where it lists none at all."""
+    """Return how many listed deliveries have this depot; None where the robot has no list."""
     deliveries, problem = read_as(rest.send("GET", DELIVERIES_PATH).response, DELIVERIES)
     if problem:
         return None
@@ -46,7 +46,7 @@ def _listed(rest: HttpClient, depot_x: float) -> int | None:
 @pytest.mark.motion
 @pytest.mark.requirement("soap-basic-profile/R1025", "soap-basic-profile/R1028")
 def test_misunderstood_has_no_effect(interfaces: Interfaces, judge: Judge, effort: Effort) -> None:
-    """A delivery that is answered MustUnderstand is not in the robot's list of deliveries, where there is one."""
+    """Send a delivery that gets a MustUnderstand fault: it must not appear in the list of deliveries."""
     service, api = interfaces.soap.publishers, interfaces.rest
     if service is None or api is None or _listed(api.client, 0.0) is None:
         # That the robot answers nothing but the fault is judged elsewhere.
@@ -79,7 +79,7 @@ def test_misunderstood_has_no_effect(interfaces: Interfaces, judge: Judge, effor
 @pytest.mark.needs("subscribers")
 @pytest.mark.requirement("soap-subscribers/goal")
 def test_goal_is_shown(interfaces: Interfaces, judge: Judge) -> None:
-    """While a goal that came over REST is active, GetGoal shows it."""
+    """PUT a goal over REST: GetGoal must show it while it is active."""
     service, api = interfaces.soap.subscribers, interfaces.rest
     if service is None or api is None or not api.run.allow_motion or Interface.REST in api.run.unreachable:
         # Then whatever goal the robot has is judged as it comes.
@@ -117,5 +117,5 @@ def _goal_id(service: SoapService) -> str | None:
 
 
 def _until(condition: Callable[[], object], patience: Patience) -> bool:
-    """Return whether the condition holds before the time is over."""
+    """Return whether the condition holds before the deadline."""
     return any(condition() for _ in poll(WALL_CLOCK, _STEP_S, lambda: patience.over))

@@ -1,4 +1,4 @@
-"""GetPlan of RoAAS's own contract: from the robot to the asked pose, in the asked frame; or a fault."""
+"""GetPlan: a path from the robot to the requested pose in the requested frame, or a fault."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class _Path:
 
 
 def _path(wrapper: etree._Element, expected: Element) -> tuple[_Path | None, str]:
-    """Return the path that an answer holds, and what is wrong with it."""
+    """Return the path in a response wrapper, and what is wrong with it."""
     returned = content.content_of(wrapper, expected)
     if returned is None:
         return None, "an empty response"
@@ -61,7 +61,7 @@ def _path(wrapper: etree._Element, expected: Element) -> tuple[_Path | None, str
 
 
 def _here(soap: SoapServices, service: SoapService) -> Pose | None:
-    """Return where the robot is in the frame of plans."""
+    """Return the robot's position in the frame of plans."""
     position = soap_services.position(service)
     if position is None:
         return None
@@ -69,7 +69,7 @@ def _here(soap: SoapServices, service: SoapService) -> Pose | None:
 
 
 def _targets(soap: SoapServices, here: Pose) -> Iterator[Pose]:
-    """Yield poses near the robot that it may reach; the last one is where it is."""
+    """Yield poses near the robot that it may reach; the last is its own position."""
     for goal in said_of(soap.run).motion.goals:
         yield Pose(*goal)
     for reach in (1.0, 0.5):
@@ -80,7 +80,7 @@ def _targets(soap: SoapServices, here: Pose) -> Iterator[Pose]:
 
 @pytest.mark.requirement(_PLAN, "soap-subscribers/response-valid")
 def test_plan(soap: SoapServices, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
-    """A path starts at the robot, ends at the asked position within the tolerance, and is in the asked frame."""
+    """Check that the path starts at the robot, ends at the target within the tolerance, and is in the frame."""
     expected = soap_services.declared_return(subscribers, "GetPlan")
     frame = said_of(soap.run).motion.frame
     wanted = effort.cases(10)
@@ -112,13 +112,13 @@ def test_plan(soap: SoapServices, subscribers: SoapService, judge: Judge, effort
 
 
 def _told(answer: SoapResponse, expected: Element) -> tuple[_Path | None, str]:
-    """Return the path that an answer without a fault tells, and what is wrong with it."""
+    """Return the path in a response without a fault, and what is wrong with it."""
     wrapper = answer.first if answer.accepted else None
     return (None, answer.describe()) if wrapper is None else _path(wrapper, expected)
 
 
 def _after_refusals(subscribers: SoapService, judge: Judge, expected: Element, request: Node) -> None:
-    """Judge what is answered right after a request that was refused, where the same is answered by a path else."""
+    """Judge that a valid request right after a rejected one gets a path, where it gets one otherwise."""
     none = 0
     for _ in range(_REFUSALS):
         call(subscribers, Node(clark(delivery_messages.NAMESPACE, "GetNothing")))
@@ -148,7 +148,7 @@ def _problem(path: _Path, before: Pose, after: Pose, target: Pose, frame: str) -
 
 @pytest.mark.requirement("soap-subscribers/plan-none")
 def test_no_plan(soap: SoapServices, subscribers: SoapService, judge: Judge) -> None:
-    """Where there can be no plan, the answer is a fault: far outside any map, and in a frame that nobody knows."""
+    """Request plans far outside any map and in an unknown frame: the response must be a fault."""
     expected = soap_services.declared_return(subscribers, "GetPlan")
     # Where the robot is, so that nothing but the frame can be the reason.
     here = _here(soap, subscribers) or Pose(0.0, 0.0, 0.0)

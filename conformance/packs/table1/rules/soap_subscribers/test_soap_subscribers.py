@@ -1,4 +1,4 @@
-"""The subscribers service of RoAAS's own contract: the read side of Table 1 over SOAP."""
+"""The subscribers service: the readable resources of the paper's Table 1 over SOAP."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _IDS = dict(
 
 
 def _wrapper(judge: Judge, service: SoapService, operation: str, answer: SoapResponse) -> etree._Element | None:
-    """Return the response wrapper of an answer without a fault, judged by its name and by the description."""
+    """Return the response wrapper of a response without a fault, and judge its name and its schema."""
     expected = clark(delivery_messages.NAMESPACE, f"{operation}Response")
     first = answer.first if answer.fault is None else None
     if first is None or first.tag != expected:
@@ -54,7 +54,7 @@ def _wrapper(judge: Judge, service: SoapService, operation: str, answer: SoapRes
 
 
 def _complete(judge: Judge, id_: str, service: SoapService, operation: str) -> etree._Element | None:
-    """Ask an operation without arguments, and judge that it returns all that the contract says; return it."""
+    """Call an operation without arguments, judge that it returns all that the contract says, and return it."""
     answer = call_valid(service, Node(clark(delivery_messages.NAMESPACE, operation)))
     judge_answer(judge, id_, answer.accepted, answer, f"{operation}Response")
     return _content(judge, id_, service, operation, answer) if answer.succeeded else None
@@ -63,7 +63,7 @@ def _complete(judge: Judge, id_: str, service: SoapService, operation: str) -> e
 def _content(
     judge: Judge, id_: str, service: SoapService, operation: str, answer: SoapResponse
 ) -> etree._Element | None:
-    """Judge that an answer returns all that the contract says; return it."""
+    """Judge that a response has all that the contract says, and return its content."""
     wrapper = _wrapper(judge, service, operation, answer)
     expected = declared_return(service, operation)
     returned = content.content_of(wrapper, expected) if wrapper is not None else None
@@ -82,7 +82,7 @@ def _named(expected: Element) -> str:
 
 @pytest.mark.requirement("soap-subscribers/pose", "soap-subscribers/velocity", _VALID)
 def test_pose_and_velocity(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
-    """GetPose gives a complete Odometry, GetVelocity a complete Twist, every time."""
+    """Call GetPose and GetVelocity repeatedly: each response must be a complete Odometry or Twist."""
     for _ in range(effort.cases(60)):
         pose = _complete(judge, "soap-subscribers/pose", subscribers, "GetPose")
         if pose is not None:
@@ -99,14 +99,14 @@ def test_pose_and_velocity(subscribers: SoapService, judge: Judge, effort: Effor
 
 @pytest.mark.requirement("soap-subscribers/sensors", "soap-subscribers/services", _VALID)
 def test_lists(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
-    """GetSensors and GetNavigationServices list complete items, with full type names, and none twice."""
+    """Call GetSensors and GetNavigationServices: complete items, full type names, no duplicates."""
     for _ in range(effort.cases(40)):
         for operation in _LISTS:
             _list(judge, subscribers, operation)
 
 
 def _list(judge: Judge, subscribers: SoapService, operation: str) -> None:
-    """Ask for a list, and judge what comes."""
+    """Call a list operation and judge its response."""
     id_ = _IDS[operation]
     answer = call_valid(subscribers, Node(clark(delivery_messages.NAMESPACE, operation)))
     judge_answer(judge, id_, answer.accepted, answer, f"{operation}Response")
@@ -115,7 +115,7 @@ def _list(judge: Judge, subscribers: SoapService, operation: str) -> None:
 
 
 def _items(judge: Judge, id_: str, service: SoapService, operation: str, answer: SoapResponse) -> None:
-    """Judge that an answer lists complete items."""
+    """Judge that a response lists complete items."""
     wrapper = _wrapper(judge, service, operation, answer)
     if wrapper is not None:
         problem = _list_problem(wrapper, declared_return(service, operation))
@@ -124,7 +124,7 @@ def _items(judge: Judge, id_: str, service: SoapService, operation: str, answer:
 
 @pytest.mark.requirement(*_IDS.values(), "soap-subscribers/goal", _VALID)
 def test_after_a_refusal(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
-    """What comes right after a request that was refused is answered as ever."""
+    """Send a valid request right after a rejected one: the response must be as usual."""
     for _ in range(effort.cases(10)):
         for operation in (*_IDS, "GetGoal"):
             call(subscribers, Node(clark(delivery_messages.NAMESPACE, "GetNothing")))
@@ -137,7 +137,7 @@ def test_after_a_refusal(subscribers: SoapService, judge: Judge, effort: Effort)
 
 
 def _list_problem(wrapper: etree._Element, expected: Element) -> str:
-    """Return what is wrong with a list; empty when nothing is. An empty list is a list."""
+    """Return what is wrong with a list, or an empty text; an empty list is valid."""
     seen: set[tuple[str | None, ...]] = set()
     names = [local(child.tag) for child in expected.children]
     for item in content.items(wrapper, expected):
@@ -156,13 +156,13 @@ def _list_problem(wrapper: etree._Element, expected: Element) -> str:
 
 @pytest.mark.requirement("soap-subscribers/goal", _VALID)
 def test_goal(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
-    """GetGoal gives a complete goal; without one an empty response, or a fault."""
+    """Call GetGoal: a complete goal, or without a goal an empty response or a fault."""
     for _ in range(effort.cases(30)):
         _goal(judge, subscribers)
 
 
 def _goal(judge: Judge, subscribers: SoapService) -> None:
-    """Ask for the goal, and judge what comes."""
+    """Call GetGoal and judge the response."""
     expected = declared_return(subscribers, "GetGoal")
     answer = call_valid(subscribers, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
     if answer.fault is not None:
@@ -182,7 +182,7 @@ def _goal(judge: Judge, subscribers: SoapService) -> None:
 
 @pytest.mark.requirement("soap-subscribers/size")
 def test_64_kib(subscribers: SoapService, judge: Judge) -> None:
-    """A valid question of 64 KiB is answered."""
+    """Send a valid request of 64 KiB: the robot must respond to it."""
     for operation in _READ:
         question = envelope((Node(clark(delivery_messages.NAMESPACE, operation)),)).written()
         answer = send(subscribers, require_valid_document(subscribers, padded(question, TAKEN_OCTETS)))
@@ -192,7 +192,7 @@ def test_64_kib(subscribers: SoapService, judge: Judge) -> None:
 
 @pytest.mark.requirement(_OWN, _VALID)
 def test_answers_do_not_cross(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
-    """Clients that ask for different states at one moment are each told the one that they asked for, and all of it."""
+    """Call different operations at the same moment from several clients: each must get its own complete response."""
     asked = [_READ[client % len(_READ)] for client in range(MOST_CLIENTS)]
     questions = [outgoing(subscribers, Node(clark(delivery_messages.NAMESPACE, name))) for name in asked]
     alone = {operation: _strings(judge, subscribers, operation) for operation in _ONE}
@@ -210,7 +210,7 @@ def test_answers_do_not_cross(subscribers: SoapService, judge: Judge, effort: Ef
 
 
 def _strings(judge: Judge, service: SoapService, operation: str) -> list[tuple[str, str]]:
-    """Return the strings of a state, such as the names of its frames; none where it is not told."""
+    """Return the strings of a state, such as the names of its frames; empty where the response has none."""
     answer = call_valid(service, Node(clark(delivery_messages.NAMESPACE, operation)))
     returned = _content(judge, _OWN, service, operation, answer) if answer.succeeded else None
     return [] if returned is None else list(content.strings(returned, declared_return(service, operation)))
@@ -219,7 +219,7 @@ def _strings(judge: Judge, service: SoapService, operation: str) -> list[tuple[s
 def _judge_strings(
     judge: Judge, service: SoapService, operation: str, answer: SoapResponse, alone: list[tuple[str, str]]
 ) -> None:
-    """Judge that an answer is complete, and names the same frames as when nobody else asked."""
+    """Judge that a response is complete and names the same frames as without other clients."""
     returned = _content(judge, _OWN, service, operation, answer)
     if returned is not None and alone:
         found = list(content.strings(returned, declared_return(service, operation)))

@@ -1,4 +1,4 @@
-"""What the contract does not allow changes nothing: neither the velocity, nor the goal, nor what the robot delivers."""
+"""Rejected requests must change nothing: neither the velocity, nor the goal, nor the deliveries."""
 
 from collections.abc import Callable
 from functools import partial
@@ -44,7 +44,7 @@ _BAD_PARTS: Final = (
 
 
 def _invalid_bodies(api: RestInterface, path: str, valid: dict[str, Any], number: str) -> list[tuple[str, str, bytes]]:
-    """Each would move the robot if it were taken: what is wrong with it, media type, body."""
+    """Return bodies that would move the robot if it accepted them: what is wrong, media type, body."""
     put = next(item for item in operations_of(api.run.contract) if (item.method, item.template) == ("PUT", path))
     made = near_misses(valid, put.bodies[JSON].schema, tuple(number.split(".")))
     return [*((item.what, JSON, item.made) for item in made), ("text/plain", "text/plain", body_of(valid))]
@@ -99,7 +99,7 @@ def _judge_still(drive: Drive, judge: Judge, sent: list[tuple[str, Exchange]]) -
 @pytest.mark.phase("motion")
 @pytest.mark.requirement("strict-input/goal-refused")
 def test_an_invalid_goal_is_not_followed(api: RestInterface, robot: Robot, judge: Judge, effort: Effort) -> None:
-    """Neither where there is no goal, nor in place of one."""
+    """Send invalid goals without a goal and during one: the robot must not follow them."""
     frame = robot.statement.motion.frame
     near, other = choose_goals(robot, 1.5, 2)
     number = "goal.target_pose.pose.position.x"
@@ -146,7 +146,7 @@ def test_an_invalid_goal_is_not_followed(api: RestInterface, robot: Robot, judge
 
 
 def _ends(robot: Robot, active: dict[str, Any], act: Callable[[], object]) -> bool:
-    """Return whether this act ends the goal: without the act, the goal lasts for twice the time."""
+    """Return whether an action ends the goal, by comparing with a goal of the same kind without the action."""
     put_goal(robot, active)
     began = robot.clock.now()
     act()
@@ -172,9 +172,9 @@ def _invalid_goals(near: Any, frame: str) -> list[tuple[str, dict[str, Any]]]:
 def test_an_invalid_delivery_reaches_nobody(
     api: RestInterface, soap: SoapServices, probe: RosProbe, judge: Judge
 ) -> None:
-    """All are refused, and of a batch with a valid one at its end, only that one arrives.
+    """Send invalid deliveries and a valid one after them: the robot must reject the former and deliver only the last.
 
-    Among them are deliveries that are valid but for their method: crawlers and previews of links send GET.
+    The invalid ones include valid paths with other methods: crawlers and link previews send GET.
     """
     rest = api.client
     observer: DeliveryObserver | None = None
@@ -235,7 +235,7 @@ def test_an_invalid_delivery_reaches_nobody(
 
 
 def _judge_unwanted(judge: Judge, answer: Exchange, *, came: bool) -> None:
-    """A delivery whose answer the client would have in no format is made or refused, and not both."""
+    """Judge a delivery whose Accept excludes all formats: the robot must reject it or deliver it, not both."""
     if answer.response.status == HTTPStatus.NOT_ACCEPTABLE:
         judge.check(_UNDONE, not came, answer, "no message for a delivery that is answered 406")
     elif answer.response.ok:
@@ -243,13 +243,13 @@ def _judge_unwanted(judge: Judge, answer: Exchange, *, came: bool) -> None:
 
 
 def _is_of_ours(delivery: Delivery) -> bool:
-    """Return whether a delivery was made of an invalid one, of which one value was wrong."""
+    """Return whether a delivery may come from one of the invalid requests, of which one value was wrong."""
     same = sum(value == float(sent) for value, sent in zip(delivery[1:], _CORRECT[1:], strict=True))
     return same >= len(_CORRECT) // 2
 
 
 def _invalid_soap(publishers: SoapService) -> list[Exchange]:
-    """Return messages with a bad code, a value that is not finite, a missing and a second element."""
+    """Send messages with a bad code, a non-finite value, a missing and a doubled element; return the exchanges."""
     values = dict(zip(Delivery._fields, _CORRECT, strict=True))
     changes: list[dict[str, str | None]] = [
         {"message_code": "5"},
