@@ -97,9 +97,7 @@ class ProbeNode:
             )
 
     def _quality(self, topic: str) -> QoSProfile:
-        """Return a reliable QoS, or best effort where a publisher is best effort and a reliable subscriber gets
-        nothing.
-        """
+        """Return a reliable QoS, or best effort where a publisher is, as a reliable subscriber hears none."""
         publishers = self._node.get_publishers_info_by_topic(topic)
         best_effort = any(one.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for one in publishers)
         reliability = ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE
