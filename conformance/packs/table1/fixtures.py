@@ -8,6 +8,7 @@ import pytest
 from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.plugin import Device
 from conformance.packs.table1.robot.clock import Clock
+from conformance.packs.table1.robot.delivery_sender import DeliverySender
 from conformance.packs.table1.robot.probe.client import RosProbe
 from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.robot.standstill import Standstill
@@ -32,6 +33,12 @@ def probe(run: Run) -> Iterator[RosProbe]:
     started.start()
     yield started
     started.close()
+
+
+@pytest.fixture(scope="session")
+def senders() -> list[DeliverySender]:
+    """Return the senders of the run's deliveries: later scenarios record what arrives after their batches."""
+    return []
 
 
 @pytest.fixture(scope="session")

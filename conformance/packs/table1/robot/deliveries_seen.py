@@ -1,12 +1,12 @@
 """What shows the deliveries that arrived: a ROS probe beside the robot, or the robot's own list."""
 
-from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
 from conformance.api.rest.interface import RestInterface
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.observe.polling import Patience, poll, poll_for
 from conformance.packs.table1.robot.delivery import Delivery
+from conformance.packs.table1.robot.delivery_trace import Seen
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
 from conformance.packs.table1.robot.message_shapes import read_as
 from conformance.packs.table1.robot.probe.client import Probe, ProbeError, RosProbe
@@ -18,19 +18,6 @@ from conformance.transport.client import Connection, HttpClient
 _ARRIVES_S: Final = 2.0
 QUIET_S: Final = 0.15
 _STEP_S: Final = 0.02
-
-
-@dataclass(frozen=True)
-class Seen:
-    """A delivery that arrived.
-
-    Attributes:
-        delivery: its values.
-        interface: "rest" or "soap", where that can be seen, else empty.
-    """
-
-    delivery: Delivery
-    interface: str = ""
 
 
 class DeliveryObserver(Protocol):

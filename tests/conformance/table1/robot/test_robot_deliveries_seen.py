@@ -11,19 +11,19 @@ from lxml import etree
 from conformance.contract.classes import CauseKind
 from conformance.documents.wsdl import read_file
 from conformance.packs.table1.files import CONTRACT_DIR
-from conformance.packs.table1.robot.batch import Batch, Order
-from conformance.packs.table1.robot.deliveries_seen import QUIET_S, ProbeObserver, Seen
+from conformance.packs.table1.robot.deliveries_seen import QUIET_S, ProbeObserver
 from conformance.packs.table1.robot.delivery import Delivery, deliveries, doubles, path_of, written
+from conformance.packs.table1.robot.delivery_sender import DeliverySender, Order
+from conformance.packs.table1.robot.delivery_trace import Seen
+from conformance.packs.table1.rules.equivalence import test_equivalence_delivery as rules
+from conformance.scenarios.rule import Rule, record
 from conformance.transport.client import Connection
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.evidence import Judge
 
 # The contract's fine print: [+-]?(digits[.digits]|.digits)[e[+-]digits]
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d+)?|\.\d+)(e[+-]\d+)?")
-_IDS = {
-    f"equivalence/{name}"
-    for name in ("delivery-rest", "delivery-soap", "coffee-soap", "delivery-same", "delivery-order", "delivery-only")
-}
+_RULES = [value for value in vars(rules).values() if isinstance(value, Rule)]
 
 
 def bits(value: float) -> bytes:
@@ -93,12 +93,18 @@ def order(number, how) -> Order:
     return Order(how, delivery, ("3", *map(repr, delivery[1:])))
 
 
+def judged(sender, first=0) -> Judge:
+    judge = Judge([rule.requirement for rule in _RULES])
+    for rule in _RULES:
+        record(judge, rule.requirement, rule.outcomes(sender.trace(first), {}))
+    return judge
+
+
 def found(fault) -> set[str]:
-    robot, judge = Robot(fault), Judge(_IDS)
-    orders = [order(number, how) for number, how in enumerate(("rest", "soap", "coffee", "same") * 3)]
-    well = Batch(robot, robot, robot, judge).run(orders)
-    assert well is not bool(judge.refuted())
-    return {id_.split("/")[1] for id_ in judge.refuted()}
+    robot = Robot(fault)
+    sender = DeliverySender(robot, robot, robot)
+    sender.send([order(number, how) for number, how in enumerate(("rest", "soap", "coffee", "same") * 3)])
+    return {id_.split("/")[1] for id_ in judged(sender).refuted()}
 
 
 def narrowed(seen: Seen) -> Seen:
@@ -143,20 +149,31 @@ def test_a_second_message_is_found_whenever_it_comes(late):
         first.append(seen)
         return [seen, first[0]] if number == late else [seen]
 
-    robot, judge = Robot(again), Judge(_IDS)
-    batch = Batch(robot, robot, robot, judge)
-    assert batch.run([order(number, "rest") for number in range(2)])
+    robot = Robot(again)
+    sender = DeliverySender(robot, robot, robot)
+    sender.send([order(number, "rest") for number in range(2)])
+    assert not judged(sender).refuted()
     for turn in (1, 2):
-        batch.run([order(number, "soap") for number in (2 * turn, 2 * turn + 1)])
-    batch.finish(0.0)
-    assert set(judge.refuted()) == {"equivalence/delivery-rest", "equivalence/delivery-only"}
+        sender.send([order(number, "soap") for number in (2 * turn, 2 * turn + 1)])
+    sender.watch(0.0)
+    assert set(judged(sender, 1).refuted()) == {"equivalence/delivery-rest", "equivalence/delivery-only"}
+
+
+@pytest.mark.parametrize(("batches", "requirements"), [(1, set()), (2, {"delivery-only"})])
+def test_messages_that_the_suite_did_not_cause_fail_only_when_they_come_repeatedly(batches, requirements):
+    robot = Robot(lambda number, seen: [seen, Seen(order(900 + number, "rest").delivery)])
+    sender = DeliverySender(robot, robot, robot)
+    for number in range(batches):
+        sender.send([order(number, "rest")])
+    assert {id_.split("/")[1] for id_ in judged(sender).refuted()} == requirements
 
 
 @pytest.mark.parametrize(("status", "arrives", "found"), [(500, True, True), (500, False, False), (504, True, False)])
 def test_a_delivery_that_is_not_accepted_and_arrives_is_told_as_that(status, arrives, found):
-    robot, judge = Robot(lambda _, seen: [seen] if arrives else [], status), Judge(_IDS)
-    Batch(robot, robot, robot, judge).run([order(1, "rest"), order(2, "rest")])
-    findings = judge.evidence["equivalence/delivery-only"].findings
+    robot = Robot(lambda _, seen: [seen] if arrives else [], status)
+    sender = DeliverySender(robot, robot, robot)
+    sender.send([order(1, "rest"), order(2, "rest")])
+    findings = judged(sender).evidence["equivalence/delivery-only"].findings
     assert len(findings) == found
     for finding in findings.values():
         assert finding.observed.startswith("500: the message of a request that was not accepted: ")

@@ -1,148 +1,162 @@
-"""Every accepted delivery must become exactly one identical message, over REST and over SOAP."""
+"""Rules on deliveries: each accepted request becomes exactly one identical ROS message, over REST and over SOAP."""
 
+from collections import Counter
+from collections.abc import Iterator
+from itertools import chain
 from typing import Final
 
-import pytest
-from hypothesis import strategies as st
+from conformance.packs.table1.robot.delivery import Delivery
+from conformance.packs.table1.robot.delivery_trace import Batch, Deliveries, Sent
+from conformance.packs.table1.scenarios.deliveries import deliveries, deliveries_last, deliveries_later
+from conformance.scenarios.rule import Case, Outcome, rule
 
-from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.validity import require_valid
-from conformance.api.soap.service import SoapService
-from conformance.api.soap.xml_style import TEXTS
-from conformance.packs.table1.delivery import COFFEE, COURIER
-from conformance.packs.table1.robot.batch import Batch, Order
-from conformance.packs.table1.robot.deliveries_seen import NoObserverError, observer_of
-from conformance.packs.table1.robot.delivery import Delivery, lexical_deliveries, path_of
-from conformance.packs.table1.robot.probe.client import ProbeError, RosProbe
-from conformance.verdict.evidence import Judge
-from conformance.verdict.explorer import Explorer
-
-pytestmark = [pytest.mark.needs("rest", "publishers"), pytest.mark.motion]
-_IDS: Final = (
-    "equivalence/delivery-rest",
-    "equivalence/delivery-soap",
-    "equivalence/coffee-soap",
-    "equivalence/delivery-same",
-    "equivalence/delivery-order",
-    "equivalence/delivery-repeated",
-    "equivalence/delivery-concurrent",
-    "equivalence/delivery-only",
-)
-# A robot's list holds at least the last fifty: no batch makes more messages than half of that.
-_ORDERS = 12
-_ENOUGH = 3
-_KINDS = ("same", "rest", "soap", "coffee")
-# Where a double or an integer ends; by their places the values stay different from each other.
-_CORNERS = (
-    ("twice", (3, 0.5, -0.0, 1.0, 5e-324, -5e-324, 2.2250738585072009e-308)),
-    ("rest", (3, -0.0, -5e-324, 2.2250738585072014e-308, 1.7976931348623157e308, -1.7976931348623157e308, 0.1)),
-    ("soap", (4, 5e-324, -0.0, -2.2250738585072009e-308, 1e23, 9007199254740993.0, -0.1)),
-    ("same", (4, 0.30000000000000004, 123456789.123456789, -0.0, 1e-300, 1e300, 5e-324)),
-)
-_CLIENTS = 8
-# So many rounds of clients at once make no more messages than a robot's list holds for certain.
-_ROUNDS = 3
-# The ways of writing a number in XML come first among the styles of a batch.
-_STYLES = len(TEXTS)
-# How long what comes too late is waited for, s: at any effort, and at quick.
-_LATER_S = (2.0, 0.45)
+# How a delivery was sent that must make two messages, and their interfaces.
+_TWO: Final = {"same": ["rest", "soap"], "twice": ["rest", "rest"]}
+# The robot may have other clients: messages that the suite did not cause are a failure only in so many batches.
+_OFTEN: Final = 2
+_ALWAYS: Final = (deliveries, deliveries_later, deliveries_last)
 
 
-@pytest.fixture(scope="session")
-def watched() -> list[Batch]:
-    """Return the deliveries that were sent, of which more may come."""
-    return []
+@rule("equivalence/delivery-rest", on=_ALWAYS)
+def delivery_rest(trace: Deliveries) -> Iterator[Outcome]:
+    """Judge that a delivery accepted over REST arrives once, with identical values."""
+    return _arrives_once(trace, "rest")
 
 
-@pytest.mark.phase("arrival")
-@pytest.mark.requirement(*_IDS)
-def test_deliveries_arrive(
-    api: RestInterface, publishers: SoapService, probe: RosProbe, judge: Judge, explore: Explorer, watched: list[Batch]
-) -> None:
-    """Deliveries over REST and SOAP, of any values, arrive once, unchanged and in order; also those of many clients."""
-    try:
-        batch = Batch(api.client, publishers, observer_of(api, probe), judge)
-        watched.append(batch)
-        failed: list[list[Order]] = []
-
-        def try_batch(orders: list[Order]) -> None:
-            # A failure is not made smaller: each message has a case of its own already. A few tell the kinds apart.
-            for order in orders:
-                require_valid(api.run.contract, "PUT", path_of(*order.written))
-            if len(failed) < _ENOUGH and not batch.run(orders):
-                failed.append(orders)
-
-        # Whatever is read of these digits is a number, so that who reads a part of them takes another delivery.
-        digits = [
-            Delivery(COURIER, *(1234.5678 + 100 * style + place for place in range(6))) for style in range(_STYLES)
-        ]
-        try_batch([_order("soap", delivery) for delivery in digits])
-        try_batch([_order(how, Delivery(*values)) for how, values in _CORNERS])
-        explore(_batches(), try_batch, cases=12)
-        for turn in range(api.run.effort.cases(8)):
-            if len(failed) < _ENOUGH and not batch.run_together(_crowd(turn)):
-                failed.append([])
-    except (NoObserverError, ProbeError) as nobody:
-        pytest.skip(str(nobody))
+@rule("equivalence/delivery-soap", on=_ALWAYS)
+def delivery_soap(trace: Deliveries) -> Iterator[Outcome]:
+    """Judge that a delivery accepted over SOAP arrives once, with identical values."""
+    return _arrives_once(trace, "soap")
 
 
-@pytest.mark.phase("late")
-@pytest.mark.requirement(*_IDS)
-def test_nothing_follows(api: RestInterface, watched: list[Batch]) -> None:
-    """No delivery is one more message later: meanwhile descriptions were read, and nobody sent another one."""
-    try:
-        for batch in watched:
-            batch.finish(_LATER_S[api.run.effort.name == "quick"])
-    except (NoObserverError, ProbeError) as nobody:
-        pytest.skip(str(nobody))
+@rule("equivalence/coffee-soap", on=_ALWAYS)
+def coffee_soap(trace: Deliveries) -> Iterator[Outcome]:
+    """Judge that a coffee request accepted over SOAP arrives once, with identical values and code 4."""
+    return _arrives_once(trace, "coffee")
 
 
-@pytest.mark.phase("last")
-@pytest.mark.requirement(*_IDS)
-def test_nothing_follows_much_later(watched: list[Batch]) -> None:
-    """Nor is it one more message when all else has been tried."""
-    try:
-        for batch in watched:
-            batch.look_again()
-    except (NoObserverError, ProbeError) as nobody:
-        pytest.skip(str(nobody))
+@rule("equivalence/delivery-same", on=_ALWAYS)
+def delivery_same(trace: Deliveries) -> Iterator[Outcome]:
+    """Judge that the same delivery over REST and over SOAP makes two identical messages."""
+    return _arrives_once(trace, "same")
 
 
-def _order(how: str, delivery: Delivery) -> Order:
-    return Order(how, delivery, (str(delivery.message_code), *map(repr, delivery[1:])))
+@rule("equivalence/delivery-repeated", on=_ALWAYS)
+def delivery_repeated(trace: Deliveries) -> Iterator[Outcome]:
+    """Judge that a repeated PUT makes another message."""
+    return _arrives_once(trace, "twice")
 
 
-def _crowd(turn: int) -> list[list[tuple[str, Delivery]]]:
-    """Rounds of deliveries that clients send at one moment; each number in each of them is that client's alone."""
-    return [
-        [
-            (
-                ("rest", "soap", "rest", "coffee")[client % 4],
-                Delivery(
-                    COFFEE if client % 4 == 3 else COURIER,
-                    *(_number(turn, round_, client, place) for place in range(6)),
-                ),
-            )
-            for client in range(_CLIENTS)
-        ]
-        for round_ in range(_ROUNDS)
-    ]
+@rule("equivalence/delivery-concurrent", on=_ALWAYS)
+def delivery_concurrent(trace: Deliveries) -> Iterator[Outcome]:
+    """Judge that each of several deliveries accepted at once arrives once, with identical values."""
+    return _arrives_once(trace, "together")
 
 
-def _number(turn: int, round_: int, client: int, place: int) -> float:
-    return 1e6 * turn + 1e4 * round_ + 100 * client + place + 0.5
+@rule("equivalence/delivery-order", on=(deliveries,))
+def delivery_order(trace: Deliveries) -> Iterator[Outcome]:
+    """Judge that deliveries over one interface arrive in order; each interface may have its own ROS publisher."""
+    for batch, _ in trace.judged():
+        for interface in ("rest", "soap"):
+            # A delivery with two messages has no single place in the order, and one sent with others has none.
+            ordered = [one for one in _accepted(batch) if one.interface == interface and one.how not in _TWO]
+            ordered = [one for one in ordered if one.how != "together"]
+            wanted = [trace.key(one.delivery) for one in ordered]
+            found = list(dict.fromkeys(key for key in _keys(trace, batch) if key in wanted))
+            arrived = [key for key in wanted if key in found]
+            if len(arrived) > 1:
+                expected = f"deliveries over {interface} in the order in which they were sent"
+                yield Case(found == arrived, ordered[-1].exchange, expected, "another order")
 
 
-def _batches() -> st.SearchStrategy[list[Order]]:
-    """Orders of all kinds, in any order, no two of them alike."""
-    cases = st.lists(
-        lexical_deliveries(),
-        min_size=_ORDERS,
-        max_size=_ORDERS,
-        # The code does not tell them apart: a coffee's is another one than was drawn. Nor does the sign of a zero.
-        unique_by=lambda case: tuple(value + 0.0 for value in case[0][1:]),
+@rule("equivalence/delivery-only", on=(deliveries, deliveries_later))
+def delivery_only(trace: Deliveries) -> Iterator[Outcome]:
+    """Judge that no message arrives beside the one for each accepted request."""
+    for batch, before in trace.judged():
+        exchange = next((one.exchange for one in _accepted(batch)), None)
+        found, cause = "", ""
+        again, refused, unsent = _others(trace, batch, before)
+        if again:
+            one, exchange = again[0], again[0].exchange
+            found, cause = f"an earlier message once more: {one.delivery}", "later"
+        elif refused:
+            one, exchange = refused[0], refused[0].exchange
+            found, cause = f"the message of a request that was not accepted: {one.delivery}", "not accepted"
+        elif unsent and sum(bool(_others(trace, *earlier)[2]) for earlier in _all(trace, batch)) >= _OFTEN:
+            exchange, found, cause = None, f"a message that no client of the suite sent: {unsent[0]}", "not sent"
+        yield Case(not found, exchange, "no message beside the one for each accepted request", found, cause)
+
+
+def _arrives_once(trace: Deliveries, how: str) -> Iterator[Case]:
+    """Yield a case for each accepted delivery that was sent in this way, and for each of its messages that is late."""
+    for batch, before in trace.judged():
+        accepted = _accepted(batch)
+        arrived = Counter(_keys(trace, batch))
+        wanted = Counter(trace.key(one.delivery) for one in accepted)
+        others = [one.delivery for one in batch.seen if trace.key(one.delivery) not in wanted]
+        for one in accepted:
+            if one.how == how:
+                key = trace.key(one.delivery)
+                problem = _problem(arrived[key], wanted[key], others) or _wrong_interfaces(trace, batch, one)
+                yield _once(one, problem, problem.partition(",")[0])
+        for one in _others(trace, batch, before)[0]:
+            if one.how == how:
+                yield _once(one, "one more message, later", "later")
+
+
+def _once(one: Sent, problem: str, cause: str) -> Case:
+    expected = f"exactly one message for each accepted request, {one.delivery}"
+    return Case(not problem, one.exchange, expected, problem, f"{one.interface} {cause}")
+
+
+def _problem(count: int, due: int, others: list[Delivery]) -> str:
+    """Return how the messages of a delivery differ from those that are due, or an empty text."""
+    if count == due:
+        return ""
+    return f"{count} messages instead of {due}" if count or not others else f"another message, {others[0]}"
+
+
+def _wrong_interfaces(trace: Deliveries, batch: Batch, one: Sent) -> str:
+    """Return by which interfaces a delivery arrived, where that is seen and wrong, or an empty text."""
+    key = trace.key(one.delivery)
+    interfaces = sorted(seen.interface for seen in batch.seen if trace.key(seen.delivery) == key)
+    due = _TWO.get(one.how, [one.interface])[: len(interfaces)]
+    return f"{len(interfaces)} by {' and '.join(interfaces)}" if any(interfaces) and interfaces != due else ""
+
+
+def _others(
+    trace: Deliveries, batch: Batch, before: tuple[Batch, ...]
+) -> tuple[list[Sent], list[Sent], list[Delivery]]:
+    """Return what arrived beside the batch's accepted deliveries.
+
+    Returns:
+        The deliveries of earlier batches that arrived again, those that were not accepted, and those never sent.
+    """
+    known = {trace.key(one.delivery) for one in _accepted(batch)}
+    sent = list(chain.from_iterable(one.sent for one in (*before, batch)))
+    known |= {trace.key(one.delivery) for one in sent if one.may_arrive}
+    earlier = {trace.key(one.delivery): one for one in chain.from_iterable(map(_accepted, before))}
+    refused = {trace.key(one.delivery): one for one in sent if not one.accepted and not one.may_arrive}
+    others = [one.delivery for one in batch.seen if trace.key(one.delivery) not in known]
+    keys = [trace.key(delivery) for delivery in others]
+    return (
+        [earlier[key] for key in keys if key in earlier],
+        [refused[key] for key in keys if key in refused],
+        [delivery for delivery, key in zip(others, keys, strict=True) if key not in earlier and key not in refused],
     )
-    kinds = st.permutations(_KINDS * (_ORDERS // len(_KINDS)))
-    return st.builds(
-        lambda kinds, cases: [Order(kind, *case) for kind, case in zip(kinds, cases, strict=True)], kinds, cases
-    )
+
+
+def _all(trace: Deliveries, last: Batch) -> Iterator[tuple[Batch, tuple[Batch, ...]]]:
+    """Yield each batch of the trace up to ``last``, with the batches before it."""
+    for index, batch in enumerate(trace.batches):
+        yield batch, trace.batches[:index]
+        if batch is last:
+            return
+
+
+def _accepted(batch: Batch) -> list[Sent]:
+    return [one for one in batch.sent if one.accepted]
+
+
+def _keys(trace: Deliveries, batch: Batch) -> list[bytes]:
+    return [trace.key(one.delivery) for one in batch.seen]
