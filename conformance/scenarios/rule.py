@@ -42,13 +42,20 @@ class NotTested:
 
 
 @dataclass(frozen=True)
+class NotClaimed:
+    """Outcome of a rule: the requirement does not apply to this device; ``reason`` says why."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
 class Note:
     """Outcome of a rule: a remark that changes no verdict."""
 
     remark: str
 
 
-Outcome = Case | NotTested | Note
+Outcome = Case | NotTested | NotClaimed | Note
 
 
 @dataclass(frozen=True)
@@ -96,5 +103,7 @@ def record(judge: Judge, requirement: str, outcomes: Iterable[Outcome]) -> None:
                 )
             case NotTested():
                 judge.skip(requirement, one.reason)
+            case NotClaimed():
+                judge.unclaimed(requirement, one.reason)
             case Note():
                 judge.note(requirement, one.remark)

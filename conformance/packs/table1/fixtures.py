@@ -43,13 +43,13 @@ def senders() -> list[DeliverySender]:
 
 @pytest.fixture(scope="session")
 def _standstills() -> list[Standstill]:
-    """The one of the run, once it is known that the robot has a REST interface."""
+    """Return the Standstill of the run, once it is known that the robot has a REST interface."""
     return []
 
 
 @pytest.fixture
 def standstill(api: RestInterface, _standstills: list[Standstill]) -> Standstill:
-    """What was tried and has to leave the robot at rest."""
+    """Return the attempts of the run that must leave the robot at rest."""
     if not _standstills:
         _standstills.append(Standstill(api))
     return _standstills[0]
@@ -57,19 +57,19 @@ def standstill(api: RestInterface, _standstills: list[Standstill]) -> Standstill
 
 @pytest.fixture(autouse=True)
 def _looked_at(_standstills: list[Standstill]) -> Iterator[None]:
-    """Behind a check that only reads: the robot stays at rest, where it was tried to move it just before."""
+    """Look after each check whether an earlier attempt moves the robot."""
     yield
     for one in _standstills:
-        with suppress(NoAnswerError):  # whoever asks next finds that out as well, and judges it
+        with suppress(NoAnswerError):  # the next check meets that as well
             one.look()
 
 
 @pytest.fixture
 def robot(request: pytest.FixtureRequest, api: RestInterface, standstill: Standstill) -> Robot:
-    """The robot; at rest for a check that moves it."""
+    """Return the robot; for a check that moves the robot, at rest."""
     if not request.node.get_closest_marker("motion") or standstill.lasts:
         return Robot(api)
-    standstill.judge()
+    standstill.watch()
     reason = bring_to_rest(api)
     if reason:
         pytest.skip(reason)

@@ -1,14 +1,14 @@
-"""One watch for many actions that must leave a robot at rest.
+"""One watch for many requests that must leave a robot at rest.
 
-A request that the robot had to refuse may still move it a moment later, so the suite has to watch the robot for as long
-as it takes to settle. The suite does all actions first, one after another, and then watches once. Only if the robot
-moves, the suite repeats each action with a watch of its own, to learn which one moves it.
+A request that the robot had to refuse may still move the robot a moment later, so the suite has to watch the robot for
+as long as it takes to settle. The suite makes all attempts first, one after another, and then watches once. Only if the
+robot moves, the suite repeats each attempt with a watch of its own, to learn which one moves the robot.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from http import HTTPStatus
 
 from conformance.api.rest.interface import RestInterface
@@ -16,123 +16,136 @@ from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.observe.polling import poll
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import GOAL_PATH, STILL, Robot
+from conformance.packs.table1.robot.standstill_trace import Attempt, Rest, Standing
 from conformance.packs.table1.robot.stopping import bring_to_rest
-from conformance.transport.exchange import Exchange
 
-# Of the tolerance: by so much a robot at rest may be off.
+# How many times the tolerance a robot at rest may be off.
 _OFF = 2
 
 
 @dataclass(frozen=True)
-class Expectation:
-    """That a robot stays at rest after an action.
+class _Waiting:
+    """An attempt whose effect may still show.
 
     Attributes:
-        requirement: its id.
-        expected: what a finding says, as a noun phrase.
-        until: when an effect of the action would have shown, s of the run's clock.
-        goal: whether a goal that is active again is a failure as well.
-        again: repeats the action, watches, and judges.
+        attempt: the attempt.
+        until: when an effect would have shown, s of the run's clock.
+        goal: whether an active goal is an effect as well.
+        repeat: makes the attempt again, watches the robot, and returns the readings.
     """
 
-    requirement: str
-    expected: str
+    attempt: Attempt
     until: float
     goal: bool
-    again: Callable[[], None]
+    repeat: Callable[[], Iterable[Rest]]
 
 
 class Standstill:
-    """A robot that has to stay at rest.
+    """The attempts that must leave a robot at rest, and the watches after them.
 
     Args:
-        api: its REST interface.
-        clock: by which it is watched.
+        api: the robot's REST interface.
+        clock: by which the robot is watched.
+
+    Attributes:
+        watched: all watches so far.
     """
 
     def __init__(self, api: RestInterface, clock: Clock = WALL_CLOCK) -> None:
+        self.watched: tuple[Standing, ...] = ()
         self._api, self._clock = api, clock
-        self._expectations: list[Expectation] = []
+        self._waiting: list[_Waiting] = []
         # What moved while another check read the robot.
-        self._moved: _Seen | None = None
+        self._moved: Rest | None = None
 
-    def expect(
-        self, requirement: str, expected: str, again: Callable[[], None], *, seconds: float, goal: bool = False
+    def attempted(
+        self, requirement: str, after: str, repeat: Callable[[], Iterable[Rest]], *, seconds: float, goal: bool = False
     ) -> None:
-        """Expect that the robot stays at rest after an action just now.
+        """Note an attempt that was made just now.
 
-        The arguments are those of Expectation; an effect would show within so many ``seconds``.
+        Args:
+            requirement: id of the requirement that the robot must stay at rest.
+            after: the requests, as the end of a sentence "rest after …".
+            repeat: makes the attempt again, watches the robot, and returns the readings.
+            seconds: within so long an effect would show, s.
+            goal: whether an active goal is an effect as well.
         """
         until = self._clock.now() + seconds
-        self._expectations.append(Expectation(requirement, expected, until, goal, again))
+        self._waiting.append(_Waiting(Attempt(requirement, after), until, goal, repeat))
 
     @property
     def lasts(self) -> bool:
-        """Whether there is an expectation, and the robot is at rest without a goal, so that it need not be stopped.
+        """Return whether an effect may still show, and the robot need not be stopped: it is at rest without a goal.
 
-        A command of rest, or a cancel, might end the effect of an action before it shows.
+        A command of zero velocity, or a cancel, might end the effect of an attempt before it shows.
         """
-        if not self._expectations:
+        if not self._waiting:
             return False
         robot = Robot(self._api, self._clock)
         none = robot.get(GOAL_PATH).response.status == HTTPStatus.NOT_FOUND
         return none and _stays(Drive(robot)) is not False
 
     def look(self) -> None:
-        """Look once, if an effect might still show: a check that reads the robot meanwhile calls this."""
-        if self._moved is None and self._expectations and self._clock.now() < self._until:
+        """Read the robot once if an effect may still show: checks that only read the robot call this."""
+        if self._moved is None and self._waiting and self._clock.now() < self._until:
             self._moved = self._look(Drive(Robot(self._api, self._clock)))
 
-    def judge(self) -> None:
-        """Watch until the last effect would have shown, and judge all expectations."""
-        expectations = self._expectations
-        if not expectations:
+    def watch(self) -> None:
+        """Watch until the last effect would have shown; if the robot moves, repeat each attempt alone."""
+        waiting = self._waiting
+        if not waiting:
             return
         try:
-            seen = self._moved or self._watch()
+            rest = self._moved or self._watch()
         finally:
-            self._expectations, self._moved = [], None
-        judge = self._api.run.judge
-        if seen.found:
-            before = judge.refuted()
-            for one in expectations:
+            self._waiting, self._moved = [], None
+        attempts = [one.attempt for one in waiting]
+        if rest.found:
+            for index, one in enumerate(waiting):
                 bring_to_rest(self._api)
-                one.again()
-            if any(judge.refuted().get(one.requirement, 0) > before.get(one.requirement, 0) for one in expectations):
-                return
-        # No action moved the robot when it was repeated: any of them may have done so before.
-        for one in expectations:
-            judge.check(one.requirement, not seen.found, seen.exchange, one.expected, found=seen.found, cause="moves")
+                attempts[index] = replace(one.attempt, alone=tuple(one.repeat()))
+            bring_to_rest(self._api)
+        self.watched += (Standing(rest, tuple(attempts)),)
 
     @property
     def _until(self) -> float:
-        """When the last effect would have shown, s of the run's clock."""
-        return max(one.until for one in self._expectations)
+        """Return when the last effect would have shown, s of the run's clock."""
+        return max(one.until for one in self._waiting)
 
-    def _watch(self) -> _Seen:
+    def _watch(self) -> Rest:
         drive = Drive(Robot(self._api, self._clock))
         for _ in poll(self._clock, 0.0, lambda: self._clock.now() > self._until):
             moved = self._look(drive)
             if moved is not None:
                 return moved
-        return _Seen(drive.trace.turns[-1].velocity_exchange, "")
+        return Rest("", drive.trace.turns[-1].velocity_exchange, "")
 
-    def _look(self, drive: Drive) -> _Seen | None:
-        """Return what moves, or is about to; None where nothing does."""
-        if _stays(drive) is False:
-            turn = drive.trace.turns[-1]
-            return _Seen(turn.velocity_exchange, f"the velocity ({turn.velocity})")
-        if any(one.goal for one in self._expectations):
-            active, shown = drive.robot.goal()
-            if active is not None:
-                return _Seen(shown, "an active goal")
-        return None
+    def _look(self, drive: Drive) -> Rest | None:
+        """Return readings that show motion or a goal; None if there is neither."""
+        rest = read_rest(drive, "", goal=any(one.goal for one in self._waiting))
+        return rest if rest.found else None
 
 
-@dataclass(frozen=True)
-class _Seen:
-    exchange: Exchange
-    found: str
+def read_rest(drive: Drive, after: str, *, goal: bool = False) -> Rest:
+    """Read whether the robot is at rest, and with ``goal`` also whether it has a goal."""
+    still, seen = drive.sees(STILL, _OFF)
+    exchange = drive.trace.turns[-1].velocity_exchange
+    if still is False:
+        return Rest(after, exchange, f"the velocity ({seen})")
+    active, shown = drive.robot.goal() if goal else (None, exchange)
+    return Rest(after, shown, "" if active is None else "an active goal")
+
+
+def watch_rest(drive: Drive, after: str, seconds: float, *, goal: bool = False) -> Rest:
+    """Read for so many seconds whether the robot stays at rest; return the first reading that shows motion or a goal.
+
+    If there is none, return the last reading.
+    """
+    until = drive.clock.now() + seconds
+    while True:
+        rest = read_rest(drive, after, goal=goal)
+        if rest.found or drive.clock.now() > until:
+            return rest
 
 
 def _stays(drive: Drive) -> bool | None:

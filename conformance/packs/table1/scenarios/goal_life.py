@@ -21,7 +21,8 @@ from conformance.packs.table1.robot.goal import (
 from conformance.packs.table1.robot.goal_trace import Cancelled, GoalLife, NoGoal, Put
 from conformance.packs.table1.robot.goals import choose_goals, meanwhile
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
-from conformance.packs.table1.robot.standstill import Standstill
+from conformance.packs.table1.robot.standstill import Standstill, watch_rest
+from conformance.packs.table1.robot.standstill_trace import Rest
 from conformance.scenarios.scenario import PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 
@@ -33,6 +34,7 @@ _LOOK_S: Final = 0.1
 _STAYS_S: Final = 1.3
 _STEP_S: Final = 0.02
 _TIMES: Final = 3
+_AFTER: Final = "the goal was cancelled"
 
 
 @scenario(needs={Need.REST, Need.MOTION}, leaves=Leaves.AT_REST, stage=Stage.STANDSTILL)
@@ -84,10 +86,10 @@ class _Player:
         await_motion(robot)
         if not self._cancel(back):
             meanwhile(robot, ID, lambda _, pose, __: self._cancel(pose))
-        standstill.expect(
+        standstill.attempted(
             "safety/cancel-stays",
-            "rest, and no goal, after the goal was cancelled",
-            lambda: _cancel_again(robot, second),
+            _AFTER,
+            lambda: [_cancel_again(robot, second)],
             seconds=_STAYS_S * robot.watchfulness,
             goal=True,
         )
@@ -177,30 +179,13 @@ def cancel(robot: Robot) -> Cancelled:
     return Cancelled(exchange, read, gone, drive.trace)
 
 
-def _cancel_again(robot: Robot, body: dict[str, Any]) -> None:
-    """Command a velocity, put a goal in its place, cancel it, and watch what follows."""
+def _cancel_again(robot: Robot, body: dict[str, Any]) -> Rest:
+    """Command a velocity, put a goal in its place, cancel it, and watch whether motion or a goal comes back."""
     robot.put_velocity(slow_turn(robot))
     put_goal(robot, body)
     await_motion(robot)
     cancel(robot)
-    _judge_rest(robot)
-
-
-def _judge_rest(robot: Robot) -> None:
-    """Judge that no motion and no goal come back."""
-    drive = Drive(robot)
-    for _ in poll_for(robot.clock, 0.0, _STAYS_S * robot.watchfulness):
-        stays, seen = drive.sees(STILL, 2)
-        goal, shown = robot.goal()
-        moves = stays is False
-        robot.judge.check(
-            "safety/cancel-stays",
-            not moves and goal is None,
-            drive.trace.turns[-1].velocity_exchange if moves else shown,
-            "rest, and no goal, after the goal was cancelled",
-            found=f"the velocity ({seen})" if moves else "an active goal",
-            cause="does not stay",
-        )
+    return watch_rest(Drive(robot), _AFTER, _STAYS_S * robot.watchfulness, goal=True)
 
 
 def slow_turn(robot: Robot) -> Velocity:

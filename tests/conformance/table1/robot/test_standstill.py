@@ -6,8 +6,10 @@ from toy_body import serving
 
 from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.limits import DeclaredLimits
+from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import Robot
-from conformance.packs.table1.robot.standstill import Standstill
+from conformance.packs.table1.robot.standstill import Standstill, watch_rest
+from conformance.packs.table1.robot.standstill_trace import Rest, stays
 from conformance.packs.table1.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.verdict.run import Run
@@ -64,26 +66,28 @@ def _serving(body: Body):
 
 
 class Trial:
-    """Something to be tried, which a check may try again."""
+    """An attempt that must leave the robot at rest; it can be repeated."""
 
     def __init__(self, api: RestInterface, requirement: str, act=lambda: None) -> None:
         self.api, self.requirement, self.act = api, requirement, act
-        self.again_at: list[float] = []
+        self.repeated_at: list[float] = []
 
-    def tried(self, standstill: Standstill, *, goal: bool = False) -> None:
+    def attempt(self, standstill: Standstill, *, goal: bool = False) -> None:
         self.act()
-        standstill.expect(self.requirement, "rest", self.again, seconds=_WATCH_S, goal=goal)
+        standstill.attempted(self.requirement, "a trial", self.repeat, seconds=_WATCH_S, goal=goal)
 
-    def again(self) -> None:
-        self.again_at.append(time.monotonic())
+    def repeat(self) -> list[Rest]:
+        self.repeated_at.append(time.monotonic())
         self.act()
-        time.sleep(2 * _LATER_S)
-        velocity, exchange = Robot(self.api).velocity()
-        self.api.run.judge.check(self.requirement, velocity.linear_x == 0, exchange, "rest", cause="moves")
+        return [watch_rest(Drive(Robot(self.api)), "a trial", 2 * _LATER_S)]
 
 
-def _failures(api: RestInterface) -> dict[str, int]:
-    return api.run.judge.refuted()
+def _counts(standstill: Standstill) -> dict[str, int]:
+    return {id_: len(list(stays(standstill.watched, id_))) for id_ in (_CANCEL, _REFUSED)}
+
+
+def _failures(standstill: Standstill) -> set[str]:
+    return {id_ for id_ in (_CANCEL, _REFUSED) if not all(case.holds for case in stays(standstill.watched, id_))}
 
 
 def test_nothing_is_judged_where_nothing_was_tried():
@@ -91,8 +95,8 @@ def test_nothing_is_judged_where_nothing_was_tried():
     with _serving(body) as api:
         standstill = Standstill(api)
         assert not standstill.lasts
-        standstill.judge()
-        assert api.run.judge.counts([_CANCEL, _REFUSED]) == {_CANCEL: 0, _REFUSED: 0}
+        standstill.watch()
+        assert _counts(standstill) == {_CANCEL: 0, _REFUSED: 0}
     assert body.told == []
 
 
@@ -102,16 +106,16 @@ def test_a_robot_that_stays_is_watched_as_long_as_the_last_trial_needs():
         standstill = Standstill(api)
         trials = [Trial(api, _CANCEL), Trial(api, _REFUSED)]
         for trial in trials:
-            trial.tried(standstill, goal=True)
+            trial.attempt(standstill, goal=True)
         begun = time.monotonic()
         assert standstill.lasts
-        standstill.judge()
+        standstill.watch()
         assert time.monotonic() - begun > 0.9 * _WATCH_S
-        assert api.run.judge.counts([_CANCEL, _REFUSED]) == {_CANCEL: 1, _REFUSED: 1}
-        assert _failures(api) == {}
-        assert [trial.again_at for trial in trials] == [[], []]
-        standstill.judge()
-        assert api.run.judge.counts([_CANCEL]) == {_CANCEL: 1}
+        assert _counts(standstill) == {_CANCEL: 1, _REFUSED: 1}
+        assert _failures(standstill) == set()
+        assert [trial.repeated_at for trial in trials] == [[], []]
+        standstill.watch()
+        assert _counts(standstill) == {_CANCEL: 1, _REFUSED: 1}
     # Neither a command nor a cancellation, which would hide what was tried.
     assert body.told == []
 
@@ -121,11 +125,11 @@ def test_of_what_was_tried_the_one_that_moves_the_robot_is_found():
     with _serving(body) as api:
         standstill = Standstill(api)
         innocent, guilty = Trial(api, _CANCEL), Trial(api, _REFUSED, body.drive)
-        innocent.tried(standstill)
-        guilty.tried(standstill)
-        standstill.judge()
-        assert set(_failures(api)) == {_REFUSED}
-        assert len(innocent.again_at) == len(guilty.again_at) == 1
+        innocent.attempt(standstill)
+        guilty.attempt(standstill)
+        standstill.watch()
+        assert _failures(standstill) == {_REFUSED}
+        assert len(innocent.repeated_at) == len(guilty.repeated_at) == 1
 
 
 def test_what_moves_the_robot_once_is_anybodys_fault():
@@ -134,11 +138,11 @@ def test_what_moves_the_robot_once_is_anybodys_fault():
         standstill = Standstill(api)
         trials = [Trial(api, _CANCEL), Trial(api, _REFUSED)]
         for trial in trials:
-            trial.tried(standstill)
+            trial.attempt(standstill)
         body.drive()
-        standstill.judge()
-        assert set(_failures(api)) == {_CANCEL, _REFUSED}
-        assert all(len(trial.again_at) == 1 for trial in trials)
+        standstill.watch()
+        assert _failures(standstill) == {_CANCEL, _REFUSED}
+        assert all(len(trial.repeated_at) == 1 for trial in trials)
 
 
 @pytest.mark.parametrize("counts", [True, False])
@@ -146,10 +150,10 @@ def test_a_goal_that_comes_back_counts_where_one_was_cancelled(counts):
     body = Body()
     with _serving(body) as api:
         standstill = Standstill(api)
-        Trial(api, _CANCEL).tried(standstill, goal=counts)
+        Trial(api, _CANCEL).attempt(standstill, goal=counts)
         body.goal_at = time.monotonic() + _LATER_S
-        standstill.judge()
-        assert set(_failures(api)) == ({_CANCEL} if counts else set())
+        standstill.watch()
+        assert _failures(standstill) == ({_CANCEL} if counts else set())
 
 
 @pytest.mark.parametrize("what", ["drives_at", "goal_at"])
@@ -157,7 +161,7 @@ def test_a_robot_that_moves_or_has_a_goal_is_not_left_as_it_is(what):
     body = Body()
     with _serving(body) as api:
         standstill = Standstill(api)
-        Trial(api, _CANCEL).tried(standstill)
+        Trial(api, _CANCEL).attempt(standstill)
         setattr(body, what, 0.0)
         assert not standstill.lasts
 
@@ -167,13 +171,13 @@ def test_what_moved_while_something_else_was_read_is_found():
     with _serving(body) as api:
         standstill = Standstill(api)
         trial = Trial(api, _REFUSED)
-        trial.tried(standstill)
+        trial.attempt(standstill)
         body.drives_at = 0.0
         standstill.look()
         body.drives_at = float("inf")
         standstill.look()
-        standstill.judge()
-        assert set(_failures(api)) == {_REFUSED}
+        standstill.watch()
+        assert _failures(standstill) == {_REFUSED}
 
 
 def test_nobody_looks_when_what_was_tried_would_have_shown():
@@ -181,7 +185,7 @@ def test_nobody_looks_when_what_was_tried_would_have_shown():
     with _serving(body) as api:
         standstill = Standstill(api)
         standstill.look()
-        standstill.expect(_REFUSED, "rest", lambda: None, seconds=0.0)
+        standstill.attempted(_REFUSED, "a trial", list, seconds=0.0)
         body.drives_at = 0.0
         standstill.look()
         assert api.client.connection.sent == 0

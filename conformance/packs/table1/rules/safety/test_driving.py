@@ -4,8 +4,10 @@ from collections.abc import Iterator
 
 from conformance.packs.table1.robot.drive_rules import outcomes
 from conformance.packs.table1.robot.goal_trace import GoalLife, GoalReached
+from conformance.packs.table1.robot.standstill_trace import Standing, stays
 from conformance.packs.table1.scenarios.goal_life import goal_life
 from conformance.packs.table1.scenarios.goal_reached import goal_reached
+from conformance.packs.table1.scenarios.standing import standing
 from conformance.packs.table1.scenarios.straight import straight
 from conformance.packs.table1.scenarios.trace import Driven
 from conformance.packs.table1.scenarios.turn import turn
@@ -116,3 +118,9 @@ def not_taken_up(trace: GoalReached, run: Run) -> Iterator[Outcome]:
     """Judge that the robot does not resume an old velocity when it has reached a goal."""
     if trace.turned is not None:
         yield from outcomes("safety/watchdog", trace.turned, said_of(run).limits)
+
+
+@rule("safety/cancel-stays", on=(standing,))
+def cancel_stays(trace: tuple[Standing, ...]) -> Iterator[Outcome]:
+    """Judge that neither motion nor a goal comes back after a goal was cancelled."""
+    return stays(trace, "safety/cancel-stays")

@@ -1,6 +1,6 @@
 """Rejected requests must change nothing: neither the velocity, nor the goal, nor the deliveries."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from http import HTTPStatus
 from typing import Any, Final
@@ -9,24 +9,24 @@ import pytest
 
 from conformance.api.rest.calls import JSON
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.json_mutations import near_misses
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.calls import call
 from conformance.api.soap.service import SoapService
-from conformance.documents.openapi import operations_of
 from conformance.observe.polling import poll_for
 from conformance.packs.table1.robot.deliveries_seen import DeliveryObserver, NoObserverError, observer_of
 from conformance.packs.table1.robot.delivery import Delivery, path_of, put_delivery
 from conformance.packs.table1.robot.delivery_messages import request
-from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.goal import arrived, await_goal, await_none, difference, goal_body, put_goal
 from conformance.packs.table1.robot.goals import choose_goals
+from conformance.packs.table1.robot.invalid_bodies import invalid_bodies, put_body
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.probe.client import ProbeError, RosProbe
-from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, STILL, VELOCITY, Robot
+from conformance.packs.table1.robot.robot import GOAL_PATH, Robot
 from conformance.packs.table1.robot.soap_services import send_delivery
-from conformance.packs.table1.robot.standstill import Standstill
-from conformance.packs.table1.robot.stopping import bring_to_rest
+from conformance.packs.table1.robot.standstill_trace import Rest, Standing, stays
+from conformance.packs.table1.scenarios.invalid_velocities import invalid_velocities
+from conformance.packs.table1.scenarios.standing import standing
+from conformance.scenarios.rule import Outcome, rule
 from conformance.transport.exchange import SAFE_METHODS, Exchange
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
@@ -43,57 +43,16 @@ _BAD_PARTS: Final = (
 )
 
 
-def _invalid_bodies(api: RestInterface, path: str, valid: dict[str, Any], number: str) -> list[tuple[str, str, bytes]]:
-    """Return bodies that would move the robot if it accepted them: what is wrong, media type, body."""
-    put = next(item for item in operations_of(api.run.contract) if (item.method, item.template) == ("PUT", path))
-    made = near_misses(valid, put.bodies[JSON].schema, tuple(number.split(".")))
-    return [*((item.what, JSON, item.made) for item in made), ("text/plain", "text/plain", body_of(valid))]
+@rule(_VELOCITY, on=(invalid_velocities,))
+def velocity_refused(trace: tuple[Rest, ...]) -> Iterator[Outcome]:
+    """Judge that the robot is at rest after each invalid velocity."""
+    return (rest.case for rest in trace)
 
 
-def _put(robot: Robot, path: str, media_type: str, body: bytes) -> Exchange:
-    return robot.rest.send("PUT", path, headers=(("Content-Type", media_type),), body=body)
-
-
-@pytest.mark.phase("standstill")
-@pytest.mark.requirement(_VELOCITY)
-def test_an_invalid_velocity_moves_nothing(api: RestInterface, robot: Robot, standstill: Standstill) -> None:
-    """A robot at rest stays there, whatever is wrong with what it is sent."""
-    _try_velocities(api, robot, 0.0)
-    again = partial(_try_velocities, api, robot, robot.limits.settle_s)
-    standstill.expect(_VELOCITY, "rest after invalid velocities", again, seconds=robot.limits.settle_s)
-
-
-def _try_velocities(api: RestInterface, robot: Robot, watched_s: float) -> None:
-    """Send what is no velocity, and watch what follows for so long."""
-    judge = robot.judge
-    fast = robot.share_of_limits(0.4, 0.4)
-    drive = Drive(robot)
-    sent: list[tuple[str, Exchange]] = []
-    for path, valid, number in ((VELOCITY, fast.twist, "linear.x"), (LINEAR, fast.linear, "x")):
-        for what, media_type, body in api.run.effort.subsample(_invalid_bodies(api, path, valid, number), 8):
-            sent.append((f"{path} with {what}", _put(robot, path, media_type, body)))
-            if not _judge_still(drive, judge, sent):
-                bring_to_rest(api)
-                sent.clear()
-    # In the settle time a robot that took the last of them after all would move.
-    drive.keep(watched_s)
-    _judge_still(drive, judge, sent)
-
-
-def _judge_still(drive: Drive, judge: Judge, sent: list[tuple[str, Exchange]]) -> bool:
-    """Judge that the robot is at rest, by a sample or by several; what moved it is the last that was not refused."""
-    if not sent:
-        return True
-    velocity, _ = drive.robot.velocity()
-    still: bool | None = velocity is None or drive.robot.near(velocity, STILL, 2)
-    found = ""
-    if not still:
-        still, found = drive.sees(STILL, 2)
-    taken = [one for one in sent if one[1].response.status < 400]
-    what, exchange = (taken or sent)[-1]
-    return judge.check(
-        _VELOCITY, still is not False, exchange, f"rest after PUT {what}", found=f"the velocity ({found})", cause=what
-    )
+@rule(_VELOCITY, on=(standing,))
+def velocity_refused_later(trace: tuple[Standing, ...]) -> Iterator[Outcome]:
+    """Judge that the robot stays at rest after all invalid velocities."""
+    return stays(trace, _VELOCITY)
 
 
 @pytest.mark.phase("motion")
@@ -103,11 +62,11 @@ def test_an_invalid_goal_is_not_followed(api: RestInterface, robot: Robot, judge
     frame = robot.statement.motion.frame
     near, other = choose_goals(robot, 1.5, 2)
     number = "goal.target_pose.pose.position.x"
-    bodies = _invalid_bodies(api, GOAL_PATH, goal_body(near, frame, "not to be followed"), number)
+    bodies = invalid_bodies(api, GOAL_PATH, goal_body(near, frame, "not to be followed"), number)
     bodies += [(what, JSON, body_of(body)) for what, body in _invalid_goals(near, frame)]
     bodies = effort.subsample(bodies, 8)
     for what, media_type, body in bodies:
-        exchange = _put(robot, GOAL_PATH, media_type, body)
+        exchange = put_body(robot, GOAL_PATH, media_type, body)
         goal, _ = robot.goal()
         if not judge.check(
             "strict-input/goal-refused",
@@ -124,10 +83,10 @@ def test_an_invalid_goal_is_not_followed(api: RestInterface, robot: Robot, judge
     if await_goal(robot, active)[1]:
         return  # that a valid goal is followed is for others to judge
     for what, media_type, body in bodies:
-        exchange = _put(robot, GOAL_PATH, media_type, body)
+        exchange = put_body(robot, GOAL_PATH, media_type, body)
         goal, _ = robot.goal()
         if goal is None and (
-            arrived(robot, other) or not _ends(robot, active, partial(_put, robot, GOAL_PATH, media_type, body))
+            arrived(robot, other) or not _ends(robot, active, partial(put_body, robot, GOAL_PATH, media_type, body))
         ):
             break  # it has arrived, or the robot gave it up by itself
         problem = "none" if goal is None else difference(goal, active)

@@ -1,0 +1,74 @@
+"""Records of a robot that must stay at rest, as data that rules can judge without a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from conformance.scenarios.rule import Case
+from conformance.transport.exchange import Exchange
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Readings of a robot after requests that must leave the robot at rest.
+
+    Attributes:
+        after: the requests, as the end of a sentence "rest after …".
+        exchange: the reading that shows motion or a goal, the request that caused them, or the last reading.
+        found: the velocity or the goal that the robot shows; empty: it is at rest without a goal.
+        cause: as in Case.
+    """
+
+    after: str
+    exchange: Exchange
+    found: str
+    cause: str = "moves"
+
+    @property
+    def case(self) -> Case:
+        """Return the readings as a judged case."""
+        return Case(not self.found, self.exchange, f"rest after {self.after}", self.found, self.cause)
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """Requests that must leave the robot at rest.
+
+    Attributes:
+        requirement: id of the requirement that says so.
+        after: as in Rest.
+        alone: readings after the same requests were repeated with a watch of their own; empty: not repeated.
+    """
+
+    requirement: str
+    after: str
+    alone: tuple[Rest, ...] = ()
+
+
+@dataclass(frozen=True)
+class Standing:
+    """One watch after several attempts.
+
+    Attributes:
+        rest: the readings of the watch.
+        attempts: all attempts before the watch. If the robot moved in the watch, each was repeated alone.
+    """
+
+    rest: Rest
+    attempts: tuple[Attempt, ...]
+
+
+def stays(trace: tuple[Standing, ...], requirement: str) -> Iterator[Case]:
+    """Yield the cases of a requirement: the robot stays at rest after the attempts for that requirement.
+
+    Where the robot moved in the common watch, and no attempt moved it when repeated, any of the attempts may have
+    caused the motion: all of them fail.
+    """
+    for one in trace:
+        mine = [attempt for attempt in one.attempts if attempt.requirement == requirement]
+        for attempt in mine:
+            yield from (rest.case for rest in attempt.alone)
+        if not any(rest.found for attempt in one.attempts for rest in attempt.alone):
+            rest = one.rest
+            yield from (Rest(attempt.after, rest.exchange, rest.found).case for attempt in mine)

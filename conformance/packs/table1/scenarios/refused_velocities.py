@@ -1,0 +1,155 @@
+"""Velocities that the robot must reject: beyond its limits, or in components that it does not actuate."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+from conformance.observe.polling import poll_for
+from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.robot import LINEAR, STILL, VELOCITY, Robot, Velocity
+from conformance.packs.table1.robot.standstill import Standstill, read_rest, watch_rest
+from conformance.packs.table1.robot.standstill_trace import Rest
+from conformance.packs.table1.scenarios.plans import is_refused
+from conformance.scenarios.scenario import PartialTraceError, scenario
+from conformance.scenarios.stage import Need, Stage
+from conformance.transport.exchange import Exchange
+from conformance.verdict.effort import Effort
+
+# No robot of this contract is as fast, even if its statement declares no limit: m/s and rad/s.
+_BEYOND_ANY: Final = 1e3
+_FARTHER: Final = (1e6, 1e308)
+_REACHED: Final = 0.1
+_AFTER: Final = "refused velocities"
+
+
+@dataclass(frozen=True)
+class Unactuated:
+    """A PUT of a velocity in a component that the robot's statement does not list as actuated.
+
+    Attributes:
+        path: the resource.
+        velocity: the velocity.
+        exchange: request and response.
+        reached: whether the robot then reached the velocity, and so actuates the component after all.
+    """
+
+    path: str
+    velocity: Velocity
+    exchange: Exchange
+    reached: bool
+
+
+@dataclass(frozen=True)
+class RefusedVelocities:
+    """All velocities that were sent.
+
+    Attributes:
+        beyond: velocities beyond the limits, each with the exchange of its PUT.
+        rests: readings after each velocity beyond the limits.
+        settled: readings for the settle time, where the statement declares no limits; else None.
+        all_actuated: whether the statement says that the robot actuates all components.
+        unactuated: velocities in other components.
+    """
+
+    beyond: tuple[tuple[Velocity, Exchange], ...] = ()
+    rests: tuple[Rest, ...] = ()
+    settled: Rest | None = None
+    all_actuated: bool = False
+    unactuated: tuple[Unactuated, ...] = ()
+
+
+@scenario(needs={Need.REST, Need.MOTION}, stage=Stage.STANDSTILL)
+def refused_velocities(robot: Robot, effort: Effort, standstill: Standstill) -> RefusedVelocities:
+    """Send velocities beyond the limits and in components that are not actuated, on both resources, at rest."""
+    player = _Player(robot, effort)
+    try:
+        player.play()
+    except Exception as error:
+        raise PartialTraceError(player.trace) from error
+    repeat = partial(_repeat, robot, effort)
+    standstill.attempted("safety/refused-keeps", _AFTER, repeat, seconds=robot.limits.settle_s)
+    return player.trace
+
+
+def _repeat(robot: Robot, effort: Effort) -> list[Rest]:
+    """Send the same velocities again, and watch the robot for the settle time."""
+    player = _Player(robot, effort)
+    player.play()
+    return [*player.trace.rests, watch_rest(Drive(robot), _AFTER, robot.limits.settle_s)]
+
+
+@dataclass
+class _Player:
+    """One play of the scenario."""
+
+    robot: Robot
+    effort: Effort
+    trace: RefusedVelocities = RefusedVelocities()
+
+    def play(self) -> None:
+        robot = self.robot
+        for velocity in self.effort.subsample(list(_beyond(robot)), 8):
+            self._send(velocity)
+        if not robot.limits_declared:
+            self.trace = replace(self.trace, settled=watch_rest(Drive(robot), _AFTER, robot.limits.settle_s))
+        components = [component for component in range(6) if not robot.actuated(component)]
+        self.trace = replace(self.trace, all_actuated=not components)
+        for component in components:
+            self._actuate(component)
+
+    def _send(self, velocity: Velocity) -> None:
+        """PUT a velocity beyond the limits, and read the robot.
+
+        A robot that accepts such a velocity commands it at once: one reading is enough, and several if it shows motion.
+        """
+        robot = self.robot
+        for put in (robot.put_velocity, robot.put_linear) if any(velocity[:3]) else (robot.put_velocity,):
+            exchange = put(velocity)
+            self.trace = replace(self.trace, beyond=(*self.trace.beyond, (velocity, exchange)))
+            if not is_refused(exchange):
+                robot.put_velocity(STILL)
+        seen, read = robot.velocity()
+        after = f"a refused velocity, {velocity}"
+        rest = Rest(after, read, "") if seen is None or robot.near(seen, STILL, 2) else read_rest(Drive(robot), after)
+        self.trace = replace(self.trace, rests=(*self.trace.rests, rest))
+
+    def _actuate(self, component: int) -> None:
+        """PUT velocities in a component, until the robot reaches one."""
+        robot = self.robot
+        for value in (_REACHED, -_REACHED, 1e-3, _BEYOND_ANY):
+            velocity = _only(component, value)
+            sent = [(VELOCITY, robot.put_velocity(velocity))]
+            if any(velocity[:3]):
+                sent.append((LINEAR, robot.put_linear(velocity)))
+            for path, exchange in sent:
+                reached = not is_refused(exchange) and abs(value) == _REACHED and _reaches(robot, velocity)
+                one = Unactuated(path, velocity, exchange, reached)
+                self.trace = replace(self.trace, unactuated=(*self.trace.unactuated, one))
+                if reached:
+                    return
+
+
+def _only(component: int, value: float) -> Velocity:
+    return Velocity(*(value if index == component else 0.0 for index in range(6)))
+
+
+def _beyond(robot: Robot) -> Iterator[Velocity]:
+    """Yield velocities with one component just beyond its limit, far beyond it, and absurd, in both directions."""
+    for component in range(6):
+        if not robot.actuated(component):
+            continue
+        limit = robot.limit_of(component)
+        sizes = [1.001 * limit, 1.5 * limit, _BEYOND_ANY] if robot.limit_declared(component) else [_BEYOND_ANY]
+        for size in (*sizes, *_FARTHER):
+            yield from (_only(component, size), _only(component, -size))
+
+
+def _reaches(robot: Robot, wanted: Velocity) -> bool:
+    """Return whether the robot reaches an accepted velocity; stop it then."""
+    for _ in poll_for(robot.clock, 0.02, robot.settle_s):
+        velocity, _ = robot.velocity()
+        if velocity is not None and not robot.near(velocity, STILL, 2) and robot.near(velocity, wanted):
+            robot.put_velocity(STILL)
+            return True
+    return False
