@@ -2,8 +2,8 @@
 
 Its standard input contains the name of the file into which it writes the result's path, and the settings as JSON.
 
-It is a process of its own because importing Locust makes gevent replace the sockets, locks and sleeps of the whole
-process: front door, reports and tests keep the real ones.
+The load test has its own process because importing Locust makes gevent replace the sockets, locks and sleeps of the
+whole process: the command line, the reports and the tests keep the real ones.
 """
 
 import signal
@@ -33,7 +33,7 @@ def main() -> int:
 
 
 def _raise_file_limit() -> None:
-    """Raise the limit on open files as far as the system allows: each connection is one."""
+    """Raise the limit on open files as far as the system allows, because each connection counts as an open file."""
     if sys.platform == "win32":
         return
     import resource  # noqa: PLC0415 -- there is none on Windows

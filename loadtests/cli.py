@@ -35,9 +35,10 @@ _DESCRIPTIONS = ("publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "
 
 
 def _run_load(settings: Settings, written: Path) -> CommandResult:
-    """Carry out a run in a process of its own, which writes the path of its result into the file `written`.
+    """Run a load test in its own process, which writes the path of its result into the file `written`.
 
-    The process has its own session, so that Ctrl-C reaches it through this process, once: it then writes what it has.
+    The process has its own session, so that Ctrl-C reaches it only through this process: it then writes a partial
+    result.
     """
     child = subprocess.Popen(
         [sys.executable, "-m", "loadtests"],
@@ -65,7 +66,7 @@ def _run_load(settings: Settings, written: Path) -> CommandResult:
 
 
 def _parsed(read: Callable[[str], Any], expected: str) -> Callable[[click.Context, click.Parameter, str | None], Any]:
-    """Return a callback that reads an option's text, and names what it expected where it cannot."""
+    """Return a callback that parses an option's text with `read`, or raises a usage error with `expected`."""
 
     def callback(_: click.Context, __: click.Parameter, value: str | None) -> Any:
         try:
@@ -87,10 +88,10 @@ _SHARE = _parsed(lambda text: float(text.removesuffix("%")) / 100, "a percentage
 
 
 def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
-    """Return what the options say of the robot to compare with; without a statement it shares this robot's credentials.
+    """Return the statement of the robot to compare with; without a file, one with this robot's credentials.
 
     Raises:
-        TomlFileError: its statement cannot be used.
+        TomlFileError: the other robot's statement cannot be used.
     """
     where = given.pop("against")
     described = {name: given.pop(f"against_{name}") for name in _DESCRIPTIONS}
@@ -213,7 +214,7 @@ def load(statement: Path | None, **options: Any) -> CommandResult:
 
 @dataclass(frozen=True)
 class _Baselines:
-    """The stored results that concern a run: the folder to store its result in, and the result to compare it with."""
+    """The stored results that a run needs: the folder to store its result in, and the result to compare it with."""
 
     store_in: Path | None
     old: Path | None

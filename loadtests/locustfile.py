@@ -97,7 +97,7 @@ def settings_of(options: Any) -> Settings:
 
 
 def workload_of(options: Any) -> Workload:
-    """Return what all users share: requests built beforehand, WSDLs parsed.
+    """Return the data that all users share: requests built beforehand, parsed WSDLs.
 
     Raises:
         StopTest: the options do not make a run; the message says why.
@@ -112,7 +112,7 @@ def workload_of(options: Any) -> Workload:
 
 
 class RobotUser(User):
-    """A user of one interface through one client; it calls something once a second."""
+    """A user of one interface through one client, who calls an operation once a second."""
 
     abstract = True
     wait_time = constant_throughput(1)

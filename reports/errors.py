@@ -1,7 +1,7 @@
-"""What can be wrong with a file that a report is made from: one exception for each kind.
+"""Exceptions for faults in a file from which a report is made, one for each kind of fault.
 
-Every message names the file, the place in it and the wrong value. A command that raises one of these prints the message
-and ends with exit code 2.
+Every message names the file, the place in the file and the wrong value. A command that raises one of these prints the
+message and ends with exit code 2.
 """
 
 from click import ClickException
@@ -34,7 +34,7 @@ class ResultInvalidError(ReportError):
 
 
 class ResultsIncompatibleError(ReportError):
-    """Both files are valid, and nothing in them can be compared."""
+    """Two valid files have nothing in common that could be compared."""
 
 
 class KeyUnusableError(ReportError):

@@ -75,7 +75,7 @@ def findings(requirements: Sequence[Mapping[str, Any]], result: Mapping[str, Any
 
 
 def by_requirement(found: Sequence[Finding]) -> Iterator[tuple[Mapping[str, Any], list[Finding]]]:
-    """Yield each requirement with those of its findings that follow one another."""
+    """Group findings: yield each requirement with those of its findings that follow one another."""
     for _, group in groupby(found, key=lambda finding: finding.requirement["id"]):
         own = list(group)
         yield own[0].requirement, own

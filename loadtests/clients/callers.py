@@ -1,4 +1,4 @@
-"""One simulated user: its connections and clients; it sends requests and records their outcome."""
+"""One simulated user, with its connections and clients, that sends requests and records their outcome."""
 
 import re
 from typing import Any
@@ -17,7 +17,7 @@ _DURATION = re.compile(rb"([\w-]+)\s*;[^,]*?dur\s*=\s*\"?([0-9.]+)")
 
 
 def server_ns(timing: bytes | None) -> int:
-    """Return the time that a robot says it spent (Server-Timing, W3C), in ns; -1 where it does not say.
+    """Return the time that a robot reports for its own work (Server-Timing, W3C), in ns; -1 without such a header.
 
     The metric called `total` counts if there is one, else the longest: metrics may overlap, so they are not added.
     """
@@ -30,12 +30,12 @@ def server_ns(timing: bytes | None) -> int:
 
 
 class Workload:
-    """What all users of a process share: requests built beforehand, values, parsed WSDLs.
+    """The data that all users of a process share: requests built beforehand, values, parsed WSDLs.
 
     Args:
         operations: names, in the order in which arrivals number them.
         documents: parsed WSDLs by operation, for zeep.
-        sent: counts what the library clients put on the wire.
+        sent: counts the requests that the library clients send.
     """
 
     def __init__(

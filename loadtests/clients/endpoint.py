@@ -16,7 +16,7 @@ _FORBIDDEN = re.compile(r"[\x00-\x20\x7f]")  # RFC 3986 section 2: neither space
 
 
 class EndpointError(ValueError):
-    """A URL that no request can be sent to; the message contains it."""
+    """Raised for a URL to which no request can be sent; the message contains the URL."""
 
 
 @dataclass(frozen=True)

@@ -50,10 +50,10 @@ def connect_error(error: OSError, where: str) -> CallError:
 
 
 def require_good(status: int, location: str | None, body: bytes, expects: bytes = b"") -> None:
-    """Accept a 2xx response whose body contains `expects`.
+    """Raise an error unless a response is 2xx and its body contains `expects`.
 
     Raises:
-        CallError: any other response; the message says what is wrong with it.
+        CallError: any other response; the message says what is wrong with the response.
     """
     if not (_OK <= status < _MULTIPLE_CHOICES and expects in body):
         raise _error(status, location, body, expects)

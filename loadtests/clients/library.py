@@ -1,8 +1,8 @@
-"""The library clients: what a user's program would use, and what it costs.
+"""The library clients, zeep and requests: the latency that a user's own program would see.
 
 SOAP goes through zeep: one Document (the parsed WSDL) for each process, because it takes milliseconds to build, and one
-transport for each user. REST goes through `requests`. Both use a urllib3 adapter that counts the requests on the wire:
-two requests for one call are a silent retry, which makes a run invalid.
+transport for each user. REST goes through `requests`. Both use a urllib3 adapter that counts the requests sent: two
+requests for one call are a silent retry, which makes a run invalid.
 """
 
 from dataclasses import dataclass
@@ -74,7 +74,7 @@ def _counting(base: Any, sent: Sent) -> Any:
 
 
 class _Staying(requests.Session):
-    """A session that follows no redirect: a redirected request would measure another server."""
+    """A requests session that follows no redirect: a redirected request would measure another server."""
 
     def get_redirect_target(self, resp: requests.Response) -> str | None:
         """Return None: there is no redirect to follow."""
@@ -102,7 +102,7 @@ def new_session(robot: Robot, sent: Sent | None = None, *, staying: bool = False
 
 
 def request_error(error: requests.RequestException, where: str, timeout_s: float) -> CallError:
-    """Return the error of `requests` as one of our kinds."""
+    """Return a CallError, with one of its kinds, for an exception of `requests`."""
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, OSError) and not isinstance(cause, requests.RequestException):
@@ -125,7 +125,7 @@ def request_error(error: requests.RequestException, where: str, timeout_s: float
 
 
 class _TimedTransport(Transport):
-    """zeep's transport; notes when a message leaves it and when the response is back."""
+    """zeep's transport, with the times at which a message is sent and its response received."""
 
     def __init__(self, robot: Robot, sent: Sent) -> None:
         super().__init__(  # type: ignore[no-untyped-call]  # zeep annotates the class, not its constructor
@@ -196,7 +196,7 @@ class LibrarySoap:
 
 
 def _binding(document: Document) -> str:
-    """Return the name of the contract's binding, whatever the robot calls its ports."""
+    """Return the name of the contract's binding in a WSDL; the robot may name its ports as it likes."""
     for name in document.bindings:
         if name.startswith(f"{{{NAMESPACE}}}"):
             return str(name)

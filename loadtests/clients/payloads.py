@@ -1,7 +1,7 @@
-"""What is sent: the same calls as bytes for REST and for SOAP, built before the measurement.
+"""The requests of a load test: the same calls as bytes for REST and for SOAP, built before the measurement.
 
 Delivery is the paper's example (section on the delivery application) with random coordinates. There are 64 variants, so
-that no cache on the way responds for the robot.
+that no cache between client and robot can respond in the robot's place.
 """
 
 from collections.abc import Callable

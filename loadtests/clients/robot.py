@@ -1,4 +1,4 @@
-"""The robot under load, as the generator knows it: addresses, credentials, deadline."""
+"""The robot under load: addresses, credentials, deadline."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -37,14 +37,14 @@ class Robot:
 
     @cached_property
     def tls(self) -> Any:
-        """Return the TLS context, where an address needs one."""
+        """Return the TLS context, or None if no address needs one."""
         addresses = (self.rest, self.publishers, self.subscribers, self.rosbridge)
         if not any(address and address.startswith(("https:", "wss:")) for address in addresses):
             return None
         return tls_context(Path(self.ca_file) if self.ca_file else None)
 
     def address(self, interface: str, operation: str) -> str | None:
-        """Return where an operation is called over an interface; None where the interface does not have it."""
+        """Return the address of an operation over an interface; None if the interface lacks the operation."""
         if interface == "rest":
             return self.rest
         if interface == "rosbridge":

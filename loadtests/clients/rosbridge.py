@@ -46,10 +46,10 @@ Key = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class BridgeRequest(Request):
-    """A request over rosbridge: the JSON message to send, and which ROS message answers it.
+    """A request over rosbridge: the JSON message to send, and the ROS message that counts as its response.
 
     Attributes:
-        topic: on which its answer arrives.
+        topic: the topic on which the response arrives.
         echo: the values of a delivery in the order of the ROS message; empty for a read.
     """
 
@@ -58,7 +58,7 @@ class BridgeRequest(Request):
 
 
 def bridge_requests(values: list[dict[str, float]], topic: str) -> list[BridgeRequest]:
-    """Return the requests for deliveries to a topic; one without values reads the pose."""
+    """Return the requests that publish deliveries to a topic; empty values become a request that reads the pose."""
     return [_publish(each, topic) if each else _READ for each in values]
 
 
@@ -101,7 +101,7 @@ class Bridge:
         self._numbers = 0
 
     def call(self, request: Request) -> Answer:
-        """Send a request and wait for what answers it.
+        """Send a request and wait for the ROS message that counts as its response.
 
         Raises:
             CallError: of any kind; the request was sent at most once.
@@ -143,7 +143,7 @@ class Bridge:
         return answer
 
     def _match(self) -> None:
-        """Before the first delivery, become publisher and subscriber, and wait until they are likely to match."""
+        """Before the first delivery, become publisher and subscriber, and wait until DDS has probably matched both."""
         if self._matched_ns is None:
             about = {"topic": self._delivery_topic, "type": _DELIVERY_TYPE}
             self._say({"op": "advertise", "id": "delivery", **about})
@@ -188,7 +188,7 @@ class Bridge:
             self._flush()
 
     def _flush(self) -> None:
-        """Send what the protocol has to send."""
+        """Send the bytes that the WebSocket protocol object has queued."""
         try:
             for data in self._protocol.data_to_send():
                 if data:
@@ -242,7 +242,7 @@ class Bridge:
             self._fail(CallError("fault", f"rosbridge: {shown(str(message.get('msg')).encode())}"))
 
     def _echoed(self, values: Any, answer: Answer) -> None:
-        """Hand a delivery that came back to the request with these values; ignore other publishers' deliveries."""
+        """Give a delivery that came back to the request with the same values; ignore other publishers' deliveries."""
         try:
             key = tuple(float(values[name]) for name in MESSAGE_FIELDS)
         except (KeyError, TypeError, ValueError):

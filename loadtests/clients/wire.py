@@ -33,7 +33,7 @@ now_ns = time.monotonic_ns  # CLOCK_MONOTONIC, the clock of timerfd
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request as bytes, and what the body of a good response contains."""
+    """A request as bytes, and the bytes that the body of a good response contains."""
 
     octets: bytes
     expects: bytes = b""
@@ -182,7 +182,7 @@ class Connection:
             raise CallError("closed", f"the robot closed the connection while the request was sent: {error}") from None
 
     def _readable(self) -> None:
-        """Read what is there. Runs in the hub: must not wait, and must not raise."""
+        """Read the bytes that have arrived. Runs in gevent's hub: must neither wait nor raise."""
         failure: CallError | None = None
         try:
             failure = self._take_in()
@@ -200,7 +200,7 @@ class Connection:
             waiter.switch(failure)
 
     def _take_in(self) -> CallError | None:
-        """Feed the parser; returns what is wrong with the response, if anything."""
+        """Feed received bytes to the parser; return the error if the response is malformed."""
         while True:
             data = self._socket.recv(_CHUNK)
             self._received = now_ns()
@@ -237,7 +237,7 @@ class Connection:
         self._body.append(body)
 
     def on_message_complete(self) -> None:
-        """Note the end of an answer, or of an interim one (1xx), which is passed over."""
+        """Note the end of a response; an interim response (1xx) is skipped."""
         if self._parser.get_status_code() < _FINAL:
             self._headers = {}
             return

@@ -105,7 +105,7 @@ def _reachable(url: str, location: str) -> str:
 
 
 def _is_own(host: str | None) -> bool:
-    """Return whether a host can only mean the machine that uses it: loopback, or any address."""
+    """Return whether a host name means the machine that uses it: a loopback address, or 0.0.0.0 or `::`."""
     if host is None or host == "localhost":
         return host is not None
     try:

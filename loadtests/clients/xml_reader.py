@@ -1,4 +1,4 @@
-"""The XML parser of the load tests: it refuses a DOCTYPE, expands no entity and fetches nothing."""
+"""The XML parser of the load tests: refuses a DOCTYPE, expands no entity and fetches nothing."""
 
 from lxml import etree
 from lxml.etree import _Element

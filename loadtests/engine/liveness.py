@@ -18,7 +18,7 @@ class Liveness:
         self._alive = (0.0, 0)  # when something had last succeeded, and how much in all
 
     def is_due(self, elapsed_s: float) -> bool:
-        """Return whether it is time to count again; counting costs the generator time."""
+        """Return whether the next count is due; counting costs the load generator time."""
         return elapsed_s - self._looked_s >= _LOOK_S
 
     def dead_since(self, elapsed_s: float, succeeded: int, failed: int) -> float | None:

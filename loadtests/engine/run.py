@@ -61,7 +61,7 @@ class Run:
         self._parent = os.getppid()
 
     def interrupt(self) -> None:
-        """End the run on Ctrl-C and keep what was measured; a second Ctrl-C ends at once."""
+        """End the run on Ctrl-C and keep what was measured; a second Ctrl-C ends the process at once."""
         if self.outcome.interrupted:
             os._exit(ExitCode.INTERRUPTED)  # the second Ctrl-C: do not wait for the result
         self.outcome.interrupted = True
@@ -115,10 +115,10 @@ class Run:
     # The measurement.
 
     def measure(self) -> None:
-        """Start the users, warm up, and carry out the duel and whatever else was asked for.
+        """Start the users, warm up, compare the two sides, and carry out the other measurements of the settings.
 
         Raises:
-            RunAborted: the generator cannot work.
+            RunAborted: the load generator cannot work.
         """
         plan, settings, generator = self.plan, self.settings, self.settings.generator
         with ExitStack() as stack:
@@ -154,7 +154,7 @@ class Run:
                 self._load_more(plan, executor)
 
     def _load_more(self, plan: Plan, executor: Executor) -> None:
-        """Carry out what follows the duel: steps, searches for the knee, more and more connections."""
+        """Carry out the load steps, the searches for the knee, and the steps with more connections."""
         outcome = self.outcome
         load = RisingLoad(plan, executor, self.settings, lambda: outcome.interrupted, self._number, tell)
         outcome.steps += load.steps()
@@ -167,7 +167,7 @@ class Run:
         return self.outcome.interrupted or self.outcome.dead_at is not None
 
     def _repeat(self, plan: Plan, executor: Executor) -> Plan:
-        """Carry the duel out as often as asked for; returns the last plan."""
+        """Carry out the comparison as often as the settings say; return the last plan."""
         repeats = self.settings.repeats
         for number in range(repeats.number):
             if number:
@@ -181,7 +181,7 @@ class Run:
         return plan
 
     def _start_anew(self, command: str | None, plan: Plan) -> None:
-        """Restart the robot, where there is a command for it, and wait until it responds."""
+        """Restart the robot with a command, if there is one, and wait until the robot responds."""
         if command is None:
             return
         names, seed = plan.series_names(), self.settings.load.seed
@@ -191,7 +191,7 @@ class Run:
             raise RunAborted(ExitCode.UNREACHABLE, str(error)) from None
 
     def _follow_deliveries(self) -> None:
-        """Measure the time from request to application, where that was asked for."""
+        """Measure the time from a delivery request to the message in the application, if the settings say so."""
         wanted, outcome = self.settings.end_to_end, self.outcome
         if wanted is None or self._over:
             return
@@ -249,7 +249,7 @@ class Run:
         return self.outcome.interrupted or self.outcome.dead_at is not None
 
     def _number(self, plan: Plan) -> None:
-        """Tell the metrics which series a plan's segments belong to."""
+        """Register the series of a plan's segments in the metrics."""
         if self.collector is not None:
             self.collector.series_of.update(plan.series_of())
 

@@ -1,9 +1,9 @@
-"""Workers' clocks compared with the master's, by messages over the channel that they already have.
+"""Compare workers' clocks with the master's, by messages over the channel between them.
 
-An exchange gives the offset as in NTP (RFC 5905, section 8), with one moment of the worker's instead of two, because it
-answers at once: the worker's clock less the middle between sending and receiving. Of several exchanges the one with the
-shortest round trip counts, because it waited least in queues; its error is at most half its round trip. Clocks are
-CLOCK_MONOTONIC, in ns, which no administrator sets.
+An exchange gives the offset as in NTP (RFC 5905, section 8), with one time of the worker instead of two, because the
+worker responds at once: the worker's clock minus the middle between sending and receiving. Of several exchanges the one
+with the shortest round trip counts, because it waited least in queues; its error is at most half its round trip. Clocks
+are CLOCK_MONOTONIC, in ns, which no administrator sets.
 """
 
 import time
@@ -40,7 +40,7 @@ class Reading(NamedTuple):
 
     @classmethod
     def of(cls, sent_ns: int, worker_ns: int, received_ns: int) -> Self:
-        """Return the reading from when the master sent, the worker answered and the master received."""
+        """Return the reading from the times at which the master sent, the worker responded and the master received."""
         return cls(worker_ns - (sent_ns + received_ns) // 2, received_ns - sent_ns)
 
 
@@ -79,7 +79,7 @@ class WorkerClock:
         return self.last.round_trip_ns // 2 if self.last is not None else 0
 
     def figures(self) -> dict[str, Any] | None:
-        """Return the `clock` of a worker in latency.json; None where it never answered."""
+        """Return the `clock` of a worker in latency.json; None if the worker never responded."""
         if self.first is None or self.last is None:
             return None
         return {
@@ -100,7 +100,7 @@ class Clocks:
         runner.register_message(_MESSAGE, self._on_answer)
 
     def read(self, clients: Iterable[str]) -> dict[str, Reading]:
-        """Exchange messages with all clients in parallel; the result lacks those that did not answer in time."""
+        """Exchange messages with all clients in parallel; the result lacks those that did not respond in time."""
         self._asked = {client: [] for client in clients}
         for client in self._asked:
             self._ask(client)

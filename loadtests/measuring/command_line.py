@@ -1,4 +1,4 @@
-"""Command lines as a result may show them."""
+"""Remove secrets and folders from command lines before a result shows them."""
 
 import re
 

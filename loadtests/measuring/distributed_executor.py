@@ -43,11 +43,11 @@ class _Master(MasterRunner):
 
 
 class DistributedExecutor:
-    """Workers led by a Locust master.
+    """Carries plans out with workers that a Locust master leads.
 
     Args:
         generator: where the master listens; how many workers to start here, and how many to wait for in all.
-        folder: where workers of this machine leave what they recorded if the master dies.
+        folder: where workers of this machine store their records if the master dies.
         tell: writes progress to the terminal.
         stopped: returns whether to stop waiting for workers.
     """
@@ -138,7 +138,7 @@ class DistributedExecutor:
         return node is not None and node.state != STATE_MISSING
 
     def _on_listening(self, environment: Any, msg: Any) -> None:
-        """Note a worker that is expected; send away one that comes after the users were distributed."""
+        """Register an expected worker; dismiss a worker that connects after the users were distributed."""
         del environment
         if not self._dealt_out:
             self._listening.add(msg.node_id)
@@ -185,7 +185,7 @@ class DistributedExecutor:
             member.state, member.done, member.lost_at_s, member.share = "finished", True, None, None
 
     def run(self, plan: Plan, ceiling: float | None, watch: Callable[[float], bool]) -> None:
-        """Carry out a plan with the workers that are left; returns when they have reported."""
+        """Carry out a plan with the workers that are still connected; return when they have reported."""
         present = [(client, member) for client, member in self._by_client.items() if member.state != "lost"]
         if not present:
             return
@@ -207,7 +207,7 @@ class DistributedExecutor:
         self._read_clocks()
 
     def _read_clocks(self) -> None:
-        """Read the clocks of all workers that are there, while no requests are sent."""
+        """Read the clocks of all connected workers, while no requests are sent."""
         there = [client for client, member in self._by_client.items() if member.state != "lost"]
         for client, reading in self._clocks.read(filter(self._is_there, there)).items():
             clock = self._by_client[client].clock

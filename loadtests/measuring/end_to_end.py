@@ -1,8 +1,8 @@
-"""The time from a request to the message in the application: what an operator waits for is not the 204.
+"""Measure the time from a request to the message in the application, which an operator waits for, and not for the 204.
 
-Deliveries are sent one at a time over every way, in rounds in random order, and a probe in the application's place says
-when each arrived. The probe shares the generator's clock: both run on one machine, wherever the robot is. Publishing
-with rclpy, without any web service, is the floor.
+Deliveries are sent one at a time over every way, in rounds in random order, and a probe in the application's place
+reports when each arrived. The probe shares the generator's clock: both run on one machine, wherever the robot is. The
+baseline is publishing with rclpy, without any web service.
 """
 
 from collections.abc import Callable
@@ -35,12 +35,12 @@ _MOST_RATE = 50.0  # deliveries per second
 
 @dataclass
 class Journeys:
-    """The deliveries over one way, by round.
+    """The times of deliveries over one way, by round.
 
     Attributes:
-        to_application_ns: from the request's start to the message in the application; None where it never came.
-        answer_ns: from the request's start to its response; None where the way has none.
-        errors: of requests without a good response.
+        to_application_ns: from the request's start to the message in the application; None: the message never came.
+        answer_ns: from the request's start to its response; None: this way has no response.
+        errors: number of requests without a good response.
     """
 
     to_application_ns: list[int | None] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""Whether both interfaces carry the same, judged on bytes sent and received; nothing here talks to a robot."""
+"""Compare the bytes sent and received over both interfaces: both must carry the same values. Sends no request."""
 
 import json
 import struct
@@ -38,7 +38,7 @@ def request_difference(operation: str, rest: Request, soap: Request) -> str | No
 
 
 def requests_difference(operation: str, rest: Sequence[Request], soap: Sequence[Request]) -> str | None:
-    """Return the first variant in which the interfaces' requests differ; None where one interface has none."""
+    """Return the first variant in which the two interfaces' requests differ; None if none does."""
     if not rest or not soap:
         return None
     for number, (over_rest, over_soap) in enumerate(zip(rest, soap, strict=True)):
@@ -49,7 +49,10 @@ def requests_difference(operation: str, rest: Sequence[Request], soap: Sequence[
 
 
 def pose_difference(rest: bytes, soap: bytes) -> str | None:
-    """Return how two poses differ: both must be whole Odometry messages, or the shorter one would win the duel."""
+    """Return how two poses differ, or None if both are complete Odometry messages.
+
+    A shorter message would have an advantage in the comparison.
+    """
     try:
         over_rest = Counter(_json_leaves(json.loads(rest)))
         found = parse_xml(soap).find(f".//{{{NAMESPACE}}}GetPoseResponse")
@@ -65,7 +68,7 @@ def pose_difference(rest: bytes, soap: bytes) -> str | None:
 
 
 def deliveries_missing(listed: list[Any], operation: str, sent: Values) -> list[str]:
-    """Return what was sent and is missing from the robot's list of accepted requests."""
+    """Return the deliveries that were sent and are missing from the robot's list of accepted requests."""
     return [
         f"{operation}: the robot does not list the request that was sent over {interface}"
         for interface in ("rest", "soap")

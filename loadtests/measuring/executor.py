@@ -1,8 +1,8 @@
-"""What generates the load: this process, or workers that a Locust master leads.
+"""Generate the load: in this process, or with workers that a Locust master leads.
 
 Both carry out plans one after the other and end up with one recorder. Workers rebuild the plan from a message, take
-their share of its schedule, and report what they recorded once a second. When a worker is lost, what it had not
-reported is lost too, and the result says so.
+their share of its schedule, and report their records once a second. When a worker is lost, its unreported records are
+lost too, and the result says so.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,7 +33,7 @@ class RobotUser(User):
 
     @task
     def work(self) -> None:
-        """Work until killed."""
+        """Send the requests that the pacer hands out, until Locust kills this user."""
         self.environment.roaas_session.work()
 
 
@@ -44,7 +44,7 @@ class Member:
     Attributes:
         state: `finished`, `lost`, or `late`: joined after the schedule was distributed.
         accounted: arrivals of the current plan in its reports.
-        share: its arrivals in the plan in which it was lost; None unless it was, and in the closed model.
+        share: its arrivals in the plan in which it was lost; None: it was not lost, or the model is closed.
         clock: None in the master's own process.
     """
 

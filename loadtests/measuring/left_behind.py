@@ -20,7 +20,7 @@ FORMAT = "roaas-worker/1"
 
 
 class LeftBehind:
-    """Keeps what a worker has reported, in case the master dies."""
+    """The reports of a worker, kept so that the worker can write them to a file if the master dies."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -29,13 +29,13 @@ class LeftBehind:
         self._place = (0, 0)
 
     def begin(self, plan: Plan, worker: int) -> None:
-        """Note the plan that the next reports belong to; steps are not among the figures."""
+        """Set the plan to which the next reports belong; reports of load steps are not kept."""
         self._place = (worker, plan.workers)
         if plan.step_rate is None:
             self.plans.append(plan)
 
     def add(self, report: dict[str, Any]) -> None:
-        """Keep a report (see `Recorder.take`)."""
+        """Keep a report in the format of `Recorder.take`."""
         self.recorder.merge(Recorder.unpack(report))
 
     @property
@@ -44,7 +44,7 @@ class LeftBehind:
         return sum(cell.service.total + cell.errors for cell in self.recorder.cells.values())
 
     def write(self, why: str) -> Path | None:
-        """Write the file; returns None where there is nothing to write.
+        """Write the reports to a file and return its path; return None if there are no reports.
 
         Raises:
             OSError: the folder cannot be written to.

@@ -17,7 +17,7 @@ _STEADY = frozenset({"performance"})
 
 @dataclass(frozen=True)
 class Moment:
-    """The machine's counters at one time, in seconds since boot; `at_s` is the sum over all processors."""
+    """The machine's processor time counters at one time, in s since boot; `at_s` is the sum over all processors."""
 
     at_s: float
     steal_s: float

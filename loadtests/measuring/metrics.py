@@ -18,7 +18,7 @@ _LABELS = ("operation", "interface", "client", "phase")
 
 
 def buckets(histogram: Histogram) -> list[tuple[str, float]]:
-    """Cumulative counts at the bounds, in Prometheus' form: (bound in seconds, count)."""
+    """Return the cumulative counts of a histogram in Prometheus' form: pairs (upper bound in seconds, count)."""
     bins, counts = histogram.arrays()
     lower, width = edges_us(bins)
     within = np.searchsorted(lower + width - 1, BOUNDS_US, side="right")

@@ -1,8 +1,8 @@
-"""Cold and warm: what a request costs after a pause, and right behind another.
+"""Cold and warm: measure how long a request takes after a pause, and directly after another request.
 
 An idle robot loses its caches, and its processor its clock rate; a figure from an even stream of requests lies between
 cold and warm. Here one connection of one series at a time is idle for a tenth of a second, sends one request, and then
-sends others without a pause. Our own process idles as well: what that costs is in the cold figure of both interfaces.
+sends others without a pause. The load generator is idle as well: that cost is in the cold figure of both interfaces.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ _SHARE = 0.2
 
 @dataclass
 class Paused:
-    """A series' service times after a pause, and right behind one another.
+    """A series' service times after a pause, and directly after another request.
 
     Attributes:
         spacing_s: the least time between two requests, where the rate is limited.
@@ -75,7 +75,7 @@ def after_pauses(
 def _one_turn(
     robot: Robot, name: SeriesName, connection: Connection, turn: int, paused: Paused, *, first: bool
 ) -> None:
-    """Pause, then send requests right behind one another; the first turn only opens the connection."""
+    """Pause, then send several requests without a pause; the first turn only opens the connection."""
     requests = robot.requests(name[1], name[0], turn)
     gevent.sleep(max(PAUSE_S, paused.spacing_s))
     for number in range(_BEHIND + 1):

@@ -124,7 +124,7 @@ def _library_call(robot: Robot, operation: str, interface: str, seed: int) -> No
 
 
 def _listed_deliveries(robot: Robot) -> list[Any] | None:
-    """Return the robot's list of accepted requests, where it has one (GET /robot/app/delivery/, an extension)."""
+    """Return the robot's list of accepted deliveries (GET /robot/app/delivery/, an extension); None if it has none."""
     try:
         with new_session(robot) as session:
             answer = session.get(

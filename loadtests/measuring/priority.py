@@ -1,9 +1,9 @@
-"""Real-time priority for the generator while it sends requests, where the system allows it.
+"""Real-time priority for the load generator while it sends requests, where the system allows it.
 
-On a shared machine a woken process waits for the end of another's time slice, sometimes for milliseconds: the request
-starts late, and its response is read late. A process of the lowest real-time class does not wait (sched(7)). That needs
-CAP_SYS_NICE, and is used only where the generator needs a small part of one of several processors: it must not take the
-robot's.
+On a shared machine a woken process waits for the end of another process's time slice, sometimes for milliseconds: the
+request starts late, and its response is read late. A process of the lowest real-time class does not wait (sched(7)).
+That needs CAP_SYS_NICE, and is used only where the generator needs a small part of one of several processors: the
+generator must not take the robot's processor time.
 """
 
 import os
@@ -28,7 +28,7 @@ def leaves_the_robot_room(plan: Plan, processors: int) -> bool:
 
 @contextmanager
 def first_in_line(*, wanted: bool) -> Iterator[bool]:
-    """Run this thread before all ordinary ones while the context lasts; yields whether that was allowed.
+    """Give this thread real-time priority while the context lasts; yield whether the system allowed that.
 
     Child processes do not inherit the priority.
     """

@@ -51,7 +51,7 @@ def _run(command: str) -> None:
 
 
 def _until_ready(look: Callable[[], Findings], stopped: Callable[[], bool]) -> None:
-    """Call everything repeatedly, until all of it responds."""
+    """Repeat the calls before a run until all of them succeed, or `stopped` returns True."""
     deadline = time.monotonic() + _READY_S
     while True:
         findings = look()

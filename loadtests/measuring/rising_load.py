@@ -1,4 +1,4 @@
-"""Raises the rate until the robot breaks down, and the connections to see how latency grows with them."""
+"""Raise the rate until the robot breaks down, and the number of connections to see how latency grows with it."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -18,10 +18,10 @@ _MOST_S = 600.0  # for all searches together
 
 @dataclass
 class RisingLoad:
-    """Carries out short plans of one operation after the duel.
+    """Carries out short plans of one operation after the comparison.
 
     Args:
-        first: the duel's plan.
+        first: the comparison's plan.
         stopped: returns whether to end.
         announce: receives each plan before it begins.
         tell: writes progress to the terminal.
@@ -42,7 +42,7 @@ class RisingLoad:
         self._interfaces = [n for n in self.first.interfaces if self._operation in self.first.offered(n, "wire")]
 
     def _run(self, interfaces: Sequence[str], *, rate: float | None = None, users: int | None = None) -> list[Step]:
-        """Run one plan, interface after interface, at a rate or with some users; empty when the run has to end."""
+        """Run a plan at a rate or with a number of users, interface after interface; empty if the run was stopped."""
         if self.stopped():
             return []
         load = replace(self.first.load, rate=rate, users=users, duration_s=self.settings.steps.step_s, warmup_s=0.0)
@@ -92,7 +92,7 @@ class RisingLoad:
         )
 
     def knees(self) -> list[dict[str, Any]]:
-        """Search the knee of each interface, and of both together; empty where that was not asked for."""
+        """Search the knee of each interface, and of both together; empty if the settings ask for no search."""
         wanted = self.settings.steps
         if not wanted.knee_searches:
             return []

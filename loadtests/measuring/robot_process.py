@@ -36,7 +36,7 @@ class RobotProcess:
 
     @classmethod
     def find(cls, robot: Robot) -> Self | None:
-        """Find the process; None where the robot is on another machine, or we lack permission."""
+        """Find the robot's process; return None if the robot is on another machine, or permission is missing."""
         if not same_machine(robot):
             return None
         port = Endpoint.parse(_addresses(robot)[0]).port
@@ -51,7 +51,7 @@ class RobotProcess:
         return None
 
     def cpu_share(self) -> float | None:
-        """Return the share of one processor that it has used since it was found; None where it has ended."""
+        """Return the share of one processor that the process has used since it was found; None if it has ended."""
         try:
             if not self.process.is_running():
                 return None

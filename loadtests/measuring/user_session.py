@@ -152,7 +152,7 @@ class Session:
         self.recorder.drop(arrival.segment + self._first, arrival.operation, now_ns() - arrival.due_ns)
 
     def _between(self, index: int) -> None:
-        """Bin what was recorded and read the processor's time, in the gap before a segment."""
+        """In the gap before a segment, sort the recorded times into bins and read the processor time."""
         number = index + self._first
         now = self._look_at_processor(number)
         self.recorder.flush()
@@ -168,7 +168,7 @@ class Session:
             self.after_segment()
 
     def _look_at_processor(self, following: int | None) -> tuple[float, float]:
-        """Note the share of a core that the last segment took, before the `following` one, if any."""
+        """Record the share of a core that the last segment used, in the gap before segment `following`, if any."""
         now = (time.monotonic(), time.process_time())
         if self._block is not None and now[0] > self._block[1]:
             segment, began, spent = self._block

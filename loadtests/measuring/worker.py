@@ -1,7 +1,7 @@
 """A worker process: `python -m loadtests.measuring.worker HOST PORT`, with a JSON object on its standard input.
 
-The object contains the robots' bearer tokens, which do not travel over the network with the rest, and the folder for
-what the worker leaves when its master dies: `{"tokens": […], "folder": "…"}`.
+The object contains the robots' bearer tokens, which are not sent over the network, and the folder for the worker's
+records when its master dies: `{"tokens": […], "folder": "…"}`.
 """
 
 import json
@@ -40,13 +40,13 @@ def _say(message: str) -> None:
 
 
 def _leave(code: int, message: str) -> NoReturn:
-    """End at once: an ordinary exit would wait for messages to reach the master."""
+    """Exit the process at once: an ordinary exit would wait for messages to reach the master."""
     _say(message)
     os._exit(code)
 
 
 class Worker:
-    """Carries out what the master says."""
+    """A Locust worker that carries out the plans of its master."""
 
     def __init__(self, environment: Any, host: str, port: int, tokens: Sequence[str | None], folder: Path) -> None:
         locust.runners.WORKER_REPORT_INTERVAL = REPORT_S
@@ -117,7 +117,7 @@ class Worker:
         self._heard = time.monotonic()
 
     def follow(self, parent: int | None) -> None:
-        """End this process when the master is gone: silent for too long, or no longer the parent process."""
+        """End this process when the master sends nothing for too long, or is no longer the parent process."""
         while True:
             gevent.sleep(_LOOK_S)
             if parent is not None and os.getppid() != parent:
@@ -126,7 +126,7 @@ class Worker:
                 self._end(f"the master at {self.master} has been silent for {MASTER_SILENT_S:g} s")
 
     def _end(self, why: str) -> None:
-        """Stop sending, write what was recorded, and end."""
+        """Stop sending, write the records to a file, and end the process."""
         if self.session is not None:
             self.session.stop()
         self._idle.wait()  # requests under way have deadlines

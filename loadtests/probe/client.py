@@ -67,10 +67,10 @@ class Probe:
         return int(self.next(_ANSWER_S)["sent_ns"])
 
     def arrival_ns(self, values: tuple[float, ...], within_s: float) -> int | None:
-        """Return when a listener received a delivery with these values; None where it does not come in time.
+        """Return the time at which a listener received a delivery with these values; None if it does not come in time.
 
         Raises:
-            ProbeError: it has ended.
+            ProbeError: the probe's process has ended.
         """
         wanted = [float(value).hex() for value in values]
         with gevent.Timeout(within_s, exception=False):

@@ -69,7 +69,7 @@ class DeliveryNode:
         return began
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Remove the node from the ROS graph."""
         self._executor.shutdown()
         self._thread.join(2)
         self._node.destroy_node()

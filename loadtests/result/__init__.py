@@ -1,1 +1,1 @@
-"""latency.json and the files beside it, and the summary for the terminal."""
+"""Write latency.json and the files beside it, and the summary for the terminal."""

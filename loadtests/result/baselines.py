@@ -42,7 +42,7 @@ def newest(folder: Path) -> Path:
 
 
 def store(result: Path, folder: Path) -> Path | None:
-    """Store a result; returns None for an invalid one, which nothing may be compared with.
+    """Store a result as a baseline and return its path; return None for an invalid result, which cannot be a baseline.
 
     Raises:
         BaselineError: the folder cannot be written to.

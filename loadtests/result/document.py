@@ -41,9 +41,9 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     """Return the exit code and latency.json of a run.
 
     Args:
-        outcome: what became of the run.
-        plan: of the duel, for a run that carried out none.
-        aborted: why the run ended before it measured.
+        outcome: the results of the run.
+        plan: the plan of the comparison, for a run that was aborted before.
+        aborted: why the run ended before it measured, or None.
     """
     executor, settings = outcome.executor, outcome.settings
     recorder = executor.recorder if executor else Recorder()
@@ -113,7 +113,7 @@ def _generator(outcome: Outcome, measured: Measured) -> verdict.GeneratorFigures
 
 
 def _after_pause(paused: Paused | None) -> dict[str, Any] | None:
-    """Return what requests cost after a pause, and right behind one another; None where that was not measured."""
+    """Return the service times after a pause and without one, for latency.json; None if they were not measured."""
     if paused is None:
         return None
     found: dict[str, Any] = {
@@ -141,7 +141,7 @@ def _endings(outcome: Outcome, plan: Plan) -> list[str]:
 
 
 def _against(outcome: Outcome, measured: Measured, controls: list[AaControl]) -> Against | None:
-    """Return the comparison with another robot, where there is one."""
+    """Return the comparison with another robot, or None if the run had only one."""
     settings = outcome.settings.against
     if settings is None:
         return None

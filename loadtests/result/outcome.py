@@ -1,4 +1,4 @@
-"""What became of a run, collected while it runs; latency.json is made of it."""
+"""The results of a run, collected while it runs; latency.json is made from them."""
 
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -17,7 +17,7 @@ from loadtests.statistics.steps import Step
 
 
 class RunAborted(Exception):  # noqa: N818 -- an outcome, with its exit code
-    """A run that ends before it measures."""
+    """Raised when a run ends before it measures; holds the exit code and the reason."""
 
     def __init__(self, code: int, message: str) -> None:
         super().__init__(message)
@@ -26,7 +26,7 @@ class RunAborted(Exception):  # noqa: N818 -- an outcome, with its exit code
 
 @dataclass
 class Carried:
-    """A plan, and how much of it was carried out."""
+    """A plan, and how many seconds of it were carried out."""
 
     plan: Plan
     elapsed_s: float = 0.0
@@ -44,8 +44,8 @@ class Outcome:
         carried: each repeat's plan, and how many seconds of it were carried out.
         paused: what requests cost after a pause and right behind one another, by series.
         before: the machine when the run began.
-        robot_process: the process at the robot's address before the duel, where that is known.
-        cpu_share: the busiest worker's share of a core in the duel.
+        robot_process: the process at the robot's address before the comparison, where that is known.
+        cpu_share: the busiest worker's share of a core in the comparison.
         steps: results of the stepped load.
         knee_searches: results of the searches for the knee; over_connections: of more and more connections.
         journeys: deliveries from the request to the application, by way.

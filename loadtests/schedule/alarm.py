@@ -29,7 +29,7 @@ _TFD_FLAGS = os.O_NONBLOCK | os.O_CLOEXEC if hasattr(os, "O_CLOEXEC") else 0  # 
 
 
 class Alarm(Protocol):
-    """Calls back in the hub at a given time; setting it again replaces the earlier time."""
+    """Calls a function in gevent's hub at a given time; setting it again replaces the earlier time."""
 
     name: str
 

@@ -78,13 +78,13 @@ class Pacer:
         self._next_segment()
 
     def stop(self) -> None:
-        """End now; users that wait are left waiting (their runner ends them)."""
+        """End the schedule now; users that wait for a request keep waiting until their runner ends them."""
         self._schedule = None
         self._closes = 0
         self.done.set()
 
     def give_up(self) -> None:
-        """Drop the arrivals that no user has started yet."""
+        """Drop the arrivals that no user has started."""
         while self._backlog:
             self.on_drop(self._backlog.popleft())
 
@@ -144,7 +144,7 @@ class Pacer:
         self._arm(schedule)
 
     def _arm(self, schedule: Schedule) -> None:
-        """Set the alarm to what comes next: an arrival, or the end of the segment."""
+        """Set the alarm to the next event: an arrival, or the end of the segment."""
         if self._position < len(self._due):
             at = self._due[self._position][0]
         elif not self.open_model and self._closes == 0:
@@ -181,7 +181,7 @@ class Pacer:
         self._arm(schedule)
 
     def _open_gate(self, schedule: Schedule) -> None:
-        """Begin a segment of the closed model, or end it."""
+        """Begin a segment of the closed model, in which users send whenever they are free, or end the segment."""
         if self._closes:
             self._closes = 0
             self._next_segment()

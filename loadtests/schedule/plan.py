@@ -1,10 +1,12 @@
 """What a run does when: segments of one client on one interface, a schedule that the seed fixes.
 
-A fair duel: REST and SOAP take turns in short blocks, in quartets REST-SOAP-SOAP-REST or the reverse at random (ABBA).
+A fair comparison: REST and SOAP take turns in short blocks, in quartets REST-SOAP-SOAP-REST or the reverse at random
+(ABBA).
 The machine's speed drifts within a second: the sooner one follows the other, the more they share of it. But a block has
 to be long beside a response, because requests under way at its end overlap with the other interface. In two quartets of
 five, one interface meets itself under two names (the A/A control): the difference that this shows is noise. It gets as
-much time as the duel, so that it is known as exactly as the effect. The library clients have quartets of their own,
+much time as the comparison, so that it is known as exactly as the effect. The library clients have quartets of their
+own,
 because their CPU time would delay the wire client's starts.
 
 Three interfaces take turns in the same way, in sextets; two robots over one interface in each quartet.
@@ -50,7 +52,7 @@ class Segment:
 
     Attributes:
         start_ns, end_ns: offsets from the run's start.
-        phase: `warmup`, `duel`, `aa`, `against` (the duel's blocks of the other robot) or `step`.
+        phase: `warmup`, `duel`, `aa`, `against` (the comparison's blocks of the other robot) or `step`.
         label: in phase `aa` the name that the interface goes by, `a` or `b`.
         pair: neighbours that are compared with one another share a number.
         rate: arrivals per second over all workers; 0 in the closed model.
@@ -105,9 +107,9 @@ class Plan:
         offers: operation numbers by `interface/client`, where not all are offered.
         robots: 2 where two robots are compared instead of two interfaces.
         first_segment: number of its first segment; numbers go on from plan to plan.
-        step_rate: a step of the stepped load instead of a duel: arrivals per second; 0 in the closed model.
+        step_rate: a step of the stepped load instead of a comparison: arrivals per second; 0 in the closed model.
         connections: users started in total; in the closed model as many take part as the load says.
-        repeat: which repeat of the duel this is; repeats after the first begin with new connections.
+        repeat: which repeat of the comparison this is; repeats after the first begin with new connections.
         offset_s: when it starts, in seconds of load since the first one's start.
         least_block_s: BLOCK_S, or SHORT_BLOCK_S where the robot is known to be quick.
     """
@@ -154,17 +156,17 @@ class Plan:
 
     @property
     def open_model(self) -> bool:
-        """Return whether requests start on schedule, whether or not earlier ones have been answered."""
+        """Return whether requests start on schedule, also while earlier ones wait for their responses."""
         return self.load.users is None
 
     @cached_property
     def blocks(self) -> int:
-        """Return how many blocks the duel has: whole rounds, or half of one where there is no time for more."""
+        """Return how many blocks the comparison has: whole rounds, or half of one where there is no time for more."""
         return len(self._rounds)
 
     @cached_property
     def _rounds(self) -> list[Segment]:
-        """Return the duel's blocks in order, without their times."""
+        """Return the comparison's blocks in order, without their times."""
         arrivals = _ARRIVALS_PER_BLOCK * len(self.operations)
         least = max(self.least_block_s, self.load.duration_s / _MAX_BLOCKS, arrivals / (self.load.rate or math.inf))
         most = int(self.load.duration_s / least + 1e-9)

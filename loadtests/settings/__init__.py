@@ -1,1 +1,1 @@
-"""What a run is asked to do: options over statement over defaults, checked before anything is sent."""
+"""The settings of a run: from options, then the statement, then defaults, checked before any request is sent."""

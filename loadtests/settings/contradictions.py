@@ -12,7 +12,7 @@ _MOST_DURATION_S = 24 * 3600.0
 
 
 def contradiction(options: CliOptions) -> str | None:
-    """Return what is wrong with the options and what to change; None where nothing is."""
+    """Return what is wrong with the options and what to change; None if they are valid."""
     if options.rate is not None and options.users is not None:
         return "--rate (open model) and --users (closed model) exclude each other"
     if options.users is not None and (options.steps or options.step_rates or options.knee):

@@ -23,7 +23,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class Steps:
-    """The loads after the duel.
+    """The loads after the comparison.
 
     Attributes:
         rates: of the steps, in arrivals per second; empty for no steps.
@@ -41,13 +41,13 @@ class Steps:
 
     @property
     def asked(self) -> bool:
-        """Return whether there is anything to do after the duel."""
+        """Return whether there is anything to do after the comparison."""
         return bool(self.rates or self.knee_searches or self.connections)
 
 
 @dataclass(frozen=True)
 class Repeats:
-    """How often to run the duel, and the command that restarts the robot before each repeat but the first."""
+    """How often to run the comparison, and the command that restarts the robot before each repeat but the first."""
 
     number: int = 1
     restart_command: str | None = None
@@ -83,7 +83,7 @@ class Generator:
 
 @dataclass(frozen=True)
 class Output:
-    """The result's folder, and what the result repeats: command line, and the robot's name, vendor and version."""
+    """The folder for the result, and texts that the result repeats: command line, robot name, vendor and version."""
 
     folder: str
     command: str
@@ -109,7 +109,7 @@ class EndToEnd:
 
 @dataclass(frozen=True)
 class Against:
-    """The other robot, which the one under load is compared with, and by which share that one may be slower."""
+    """The robot to compare with, and the share by which the robot under load may be slower."""
 
     robot: Robot
     tolerance: float

@@ -83,7 +83,7 @@ def settle(options: CliOptions, statement: Statement) -> Settings:
 
 @dataclass(frozen=True)
 class _Allowed:
-    """The highest rate and the longest duration that a statement allows, and what says so; None without a limit."""
+    """The highest rate and longest duration that a statement allows (None: no limit), and the name of its field."""
 
     rate: float | None
     rate_by: str
@@ -107,7 +107,7 @@ class _Allowed:
         return cls(rate, rate_by, *duration)
 
     def check(self, rate: float | None, duration_s: float, repeats: int, whose: str = "") -> None:
-        """Refuse a load that exceeds the limits."""
+        """Raise an error for a load that exceeds the limits."""
         if rate is not None and self.rate is not None and rate > self.rate:
             raise SettingsError(f"--rate {rate:g} exceeds {self.rate:g} requests/s ({self.rate_by}{whose})")
         if self.duration_s is not None and duration_s * repeats > self.duration_s:
@@ -231,7 +231,7 @@ def _operations(options: CliOptions) -> tuple[str, ...]:
 
 
 def _steps(options: CliOptions, statement: Statement, operations: tuple[str, ...]) -> Steps:
-    """Return the loads after the duel, which are of reads where there are some."""
+    """Return the load steps after the comparison; they use a read operation if there is one."""
     reads = tuple(name for name in operations if name not in MOVES)
     ceiling = _Allowed.of(statement, reads or operations).rate
     searches = options.knee_searches if options.knee else 0

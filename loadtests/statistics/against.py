@@ -34,7 +34,7 @@ EXIT_CODES = {SLOWER: ExitCode.FAILED, NOT_SLOWER: ExitCode.PASSED, UNCLEAR: Exi
 
 
 class Change(Ratio, kw_only=True):
-    """This robot over the other one at one quantile, with the verdict where the quantile is judged."""
+    """The ratio of this robot's quantile to the other robot's, with the verdict if the quantile is judged."""
 
     interface: str
     verdict: str | None = None
@@ -90,9 +90,9 @@ def against(
     """Compare this robot with the other one.
 
     Args:
-        measured: what was recorded of both.
+        measured: the records of both.
         controls: this robot's A/A controls in the same run.
-        tolerance: by which share it may be slower.
+        tolerance: the share by which this robot may be slower.
         robot: the other robot's addresses.
     """
     names = measured.plan.series_names()
@@ -119,7 +119,7 @@ def _overall(changes: Sequence[Change]) -> str:
 
 
 def _series(measured: Measured, name: SeriesName) -> dict[str, Any]:
-    """Return the other robot's figures: fewer than `series` holds of this one."""
+    """Return the other robot's figures, which are fewer than this robot's in `series`."""
     whole = measured.total("against", name)
     units, seed = measured.units(name, "service", "against"), measured.plan.load.seed
     return named(name) | {

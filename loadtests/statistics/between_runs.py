@@ -36,7 +36,7 @@ def widened_ratio(ratio: float, interval: Interval, deviation: float) -> Interva
 
 
 def widened_difference(difference: float, interval: Interval, deviation_ms: float) -> Interval:
-    """Widen a difference's interval likewise, by a deviation in milliseconds."""
+    """Widen the interval of a difference by a standard deviation between runs, in milliseconds."""
     low, high = (bound - difference for bound in interval)
     reach = _REACH * deviation_ms
     return difference - math.hypot(min(low, 0.0), reach), difference + math.hypot(max(high, 0.0), reach)

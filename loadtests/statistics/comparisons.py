@@ -19,7 +19,7 @@ COMPARED = ("mean", "p50", "p90", "p99")
 
 
 class Ratio(msgspec.Struct, kw_only=True):
-    """Two sides at one quantile, as latency.json gives them: the second less the first, and over it.
+    """Two sides at one quantile, as in latency.json: the second minus the first, and the second divided by the first.
 
     Attributes:
         reason: why there is no ratio, or no interval.
@@ -43,7 +43,7 @@ class AaControl(Ratio, kw_only=True):
 
 
 class SoapOverRest(Ratio, kw_only=True):
-    """SOAP against REST, and what may be claimed: an entry of `comparisons`."""
+    """SOAP compared with REST at one quantile, with the claim that the data allow: an entry of `comparisons`."""
 
     difference_ms: float | None = msgspec.field(name="soap_minus_rest_ms")
     between_runs: float | None = None
@@ -158,7 +158,7 @@ def _enough(units: list[Unit], quantile: str, seed: int, *, stream: int = 0, dev
 
 
 def compared(measured: Measured, first: Side, second: Side, quantile: str, deviation: float = 0.0) -> dict[str, Any]:
-    """Compare two sides at one quantile; returns the fields of a `Ratio` but for its names."""
+    """Compare two sides at one quantile; return the fields of a `Ratio`, without the sides' names."""
     units = measured.paired(first, second)
     result = _enough(units, quantile, measured.plan.load.seed, deviation=deviation)
     reason = None

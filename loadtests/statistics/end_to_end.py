@@ -24,13 +24,13 @@ Journey = Sequence[int | None]
 def ways(
     arrivals: Mapping[str, Journey], answers: Mapping[str, Journey], errors: Mapping[str, int], waited_ns: int
 ) -> list[dict[str, Any]]:
-    """Return an entry for each way.
+    """Return an entry of latency.json for each way by which deliveries were sent.
 
     Args:
-        arrivals: nanoseconds from the request's start to the application, by round; None where it never came.
-        answers: nanoseconds to the response; None where the way has none.
-        errors: requests without a good response.
-        waited_ns: how long each delivery was waited for.
+        arrivals: nanoseconds from the request's start to the application, by round; None: never arrived.
+        answers: nanoseconds to the response; None: this way has no response.
+        errors: number of requests without a good response.
+        waited_ns: how long the probe waited for each delivery.
     """
     return [
         _way(way, times, answers[way], errors[way], waited_ns)

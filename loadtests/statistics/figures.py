@@ -19,7 +19,7 @@ Figures = dict[str, float | None]
 
 
 class Series(msgspec.Struct, kw_only=True):
-    """An entry of `series` in latency.json; its schema says what each field holds."""
+    """An entry of `series` in latency.json; the JSON Schema describes each field."""
 
     operation: str
     interface: str
@@ -49,7 +49,7 @@ class Series(msgspec.Struct, kw_only=True):
 
     @property
     def name(self) -> SeriesName:
-        """Return what names the series."""
+        """Return the name of the series: operation, client and interface."""
         return self.operation, self.interface, self.client
 
 
@@ -149,7 +149,7 @@ def _lower_bounds(found: Figures, whole: Cell) -> list[str]:
 
 
 def rounds_of(replicates: Replicates | None, pair_s: float) -> dict[str, Any] | None:
-    """Return what was resampled for an interval: how many rounds, how long, and how much they correlate."""
+    """Return how many resampled rounds an interval has, how long they are, and how much they correlate."""
     if replicates is None:
         return None
     rounds = replicates.rounds
@@ -163,7 +163,7 @@ def rounds_of(replicates: Replicates | None, pair_s: float) -> dict[str, Any] | 
 
 
 def _repeats(measured: Measured, name: SeriesName) -> list[dict[str, Any]]:
-    """Return the service time's figures of each repeat alone; empty where there was one run."""
+    """Return the service time's figures of each repeat alone; empty if the run had no repeats."""
     if len(measured.plans) == 1:
         return []
     found = []

@@ -1,6 +1,6 @@
-"""The one sentence of a run: effect, interval, A/A control and p99, or that the run is inconclusive.
+"""The sentence that sums up a run: effect, interval, A/A control and p99, or that the run is inconclusive.
 
-Terminal, page and Markdown show this sentence and no other.
+Terminal, page and Markdown all show this sentence.
 """
 
 from collections.abc import Sequence
@@ -26,14 +26,14 @@ _NOTHING = "No series has enough successful requests for a figure."
 
 @dataclass(frozen=True)
 class Found:
-    """What a run found, as far as the headline speaks of it.
+    """The results of a run from which the headline is made.
 
     Attributes:
-        plan: what was measured, and how.
+        plan: the plan of the run.
         most_rate: the limit on the rate, which caps the closed model.
         outcomes: of the thresholds.
         worthless: why the figures say nothing about the robot.
-        undecided: why they leave nothing to compare; thresholds are judged all the same.
+        undecided: why the run has nothing to compare; thresholds are judged all the same.
     """
 
     plan: Plan
@@ -59,7 +59,7 @@ def headline(found: Found) -> dict[str, str]:
 
 
 def _thresholds(outcomes: Sequence[str]) -> str | None:
-    """Return what became of the thresholds; None where there are none."""
+    """Return a text on the thresholds that were met and missed; None if there are no thresholds."""
     number = f"{len(outcomes)} threshold{'' if len(outcomes) == 1 else 's'}"
     for outcome, word in (("missed", "missed"), ("inconclusive", "undecided")):
         if outcome in outcomes:
@@ -70,7 +70,7 @@ def _thresholds(outcomes: Sequence[str]) -> str | None:
 
 
 def _measured(found: Found) -> tuple[str, str]:
-    """Return words and sentence on what was measured."""
+    """Return two forms of the result, a few words and a sentence, for a run without thresholds or errors."""
     if found.against is not None:
         return _AGAINST[found.against.verdict], _other_robot(found, found.against)
     medians = [entry for entry in found.comparisons if entry.quantile == DECIDING]
@@ -119,7 +119,7 @@ def _between(bounds: Sequence[float] | None, least: int = 2) -> str:
 
 
 def _said(entry: SoapOverRest) -> tuple[str, str]:
-    """Return words and sentence on a median, as far as it was judged."""
+    """Return two forms of the comparison of a median, a few words and a sentence."""
     sure = f"95 % interval {_between(entry.ci95)}"
     control = f"A/A control {_between(entry.noise_ci95)}"
     if entry.judgement == "differs":
@@ -140,7 +140,7 @@ def _least(entry: SoapOverRest) -> str:
 
 
 def _tail(entry: SoapOverRest) -> str:
-    """Return what may be said of the p99, to continue a sentence."""
+    """Return the second half of a sentence: the comparison of the p99."""
     if entry.judgement == "differs":
         return f", and {entry.ratio:.2f} times at the 99th percentile ({_between(entry.ci95)})"
     if entry.judgement == "bounded":
@@ -178,7 +178,7 @@ def _figure(entry: AaControl | Change) -> tuple[str, str, str, str]:
 
 
 def _alone(entry: Series, found: Found) -> tuple[str, str]:
-    """Return what can be said of one series, where there is nothing to compare it with."""
+    """Return two forms of a single series' result, which has no other series to be compared with."""
     words = f"Half of the {entry.operation} requests over {entry.interface.upper()} take {_at_most(entry, DECIDING)}"
     tail = (
         "; they are too few for a 99th percentile"
@@ -189,7 +189,7 @@ def _alone(entry: Series, found: Found) -> tuple[str, str]:
 
 
 def _at_most(entry: Series, quantile: str) -> str:
-    """Return a quantile as a bound: a lower one where it stands for requests without a response."""
+    """Return a quantile as text: as a lower bound if it falls among requests without a response."""
     side = "at least" if quantile in entry.at_least else "at most"
     return f"{side} {_ms(entry.service_ms[quantile])} ms"
 

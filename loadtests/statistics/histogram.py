@@ -99,7 +99,7 @@ class Histogram:
             self._settle()
 
     def _settle(self) -> None:
-        """Sum up what waits in arrays."""
+        """Add the arrays of values that have not been counted yet to the bins."""
         parts = [(self._bins, self._counts), *self._pending]
         bins, counts = (np.concatenate([part[side] for part in parts]) for side in (0, 1))
         summed = np.bincount(bins, weights=counts)  # as floats: exact up to 2**53
@@ -120,7 +120,7 @@ class Histogram:
         return self._bins, self._counts
 
     def at_least(self, floor_ns: int) -> "Histogram":
-        """Return the values, each below `floor_ns` raised to it; the sum is exact to a bin's width."""
+        """Return the histogram with each value below `floor_ns` raised to it; the sum is exact to a bin's width."""
         made = Histogram()
         if not self.total:
             return made

@@ -50,9 +50,9 @@ class Replicates:
     Attributes:
         estimates: of the whole, shape (sides,), milliseconds.
         values: shape (sides, resamples).
-        rounds: what was resampled.
-        degrees: of freedom, Student's.
-        widening: factor on the width that the replicates do not show.
+        rounds: the resampled rounds.
+        degrees: degrees of freedom of Student's t.
+        widening: factor by which the interval must be wider than the replicates show.
     """
 
     estimates: Floats
@@ -153,7 +153,7 @@ def birge_ratio(rounds: Rounds) -> float:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A figure's 95 % interval, or why there is none, and its replicates."""
+    """A figure's 95 % interval with its replicates, or the reason why there is no interval."""
 
     interval: Interval | None
     reason: str | None
@@ -161,9 +161,9 @@ class Estimate:
 
 
 def figure_interval_ms(units: Sequence[Unit], name: str, seed: int) -> Estimate:
-    """Return the 95 % interval of a mean or a quantile (p50, p99, ...) of one series.
+    """Return the 95 % interval of a mean or a quantile (p50, p99, ...) of one series, in ms.
 
-    By resampling rounds, or from the order of the samples where there are too few of these.
+    The interval comes from resampled rounds, or from the order of the samples if these are too few.
 
     Args:
         units: with one side each.
@@ -199,7 +199,7 @@ def order_interval_ms(histogram: Histogram, quantile: float) -> Interval | None:
 
 @dataclass(frozen=True)
 class Compared:
-    """Two sides' figures: the second less the first, and over it."""
+    """The difference and the ratio of two sides' figures: the second minus, and divided by, the first."""
 
     difference_ms: float
     ratio: float

@@ -1,8 +1,8 @@
-"""What a comparison may claim, decided by its interval and by the A/A control, one interface against itself.
+"""Decide which claim a comparison supports, by its interval and by the A/A control (an interface against itself).
 
-The A/A control is measured in the same blocks and for as long as the duel. Where its own interval does not contain 1,
-the method is biased in this run, by up to that much. Where the effect lies inside its interval, an interface differs as
-much from itself. Neither is called a difference.
+The A/A control is measured in the same blocks and for as long as the comparison. Where its own interval does not
+contain 1, the method is biased in this run, by up to that much. Where the effect lies inside its interval, an interface
+differs as much from itself. Neither is called a difference.
 """
 
 import math
@@ -18,7 +18,7 @@ _SHARP = 2.0
 
 @dataclass(frozen=True)
 class Judgement:
-    """What may be claimed.
+    """The claim that a comparison supports.
 
     Attributes:
         verdict: `differs`: the ratio is significant; `bounded`: it is at least beyond `bound`; `noise`: it is not

@@ -64,7 +64,7 @@ class Search:
 
 
 def knee_search(interface: str, criterion: str, searches: list[Search]) -> dict[str, Any]:
-    """Return what one interface's searches found together."""
+    """Return the combined result of all searches for the knee of one interface."""
     found = [(search, estimate) for search in searches if (estimate := search.estimate()) is not None]
     estimates = [estimate for _, estimate in found]
     trials = [trial for search in searches for trial in search.trials.values()]

@@ -35,13 +35,13 @@ class Side(NamedTuple):
 
 
 class Block(NamedTuple):
-    """What was recorded of one operation in one segment.
+    """The records of one operation in one segment.
 
     Attributes:
         plan: the repeat's plan.
         number: of the segment, over all plans.
         segment: when, and over which interface.
-        cell: what was recorded.
+        cell: the recorded times and errors.
     """
 
     plan: Plan
@@ -51,7 +51,7 @@ class Block(NamedTuple):
 
     @property
     def pair(self) -> tuple[int, int]:
-        """Return repeat and pair: blocks that are compared with one another share them."""
+        """Return the repeat and the pair's number: blocks that are compared with one another have the same."""
         return self.plan.repeat, self.segment.pair
 
     @property
@@ -61,11 +61,11 @@ class Block(NamedTuple):
 
 
 class Measured:
-    """The cells of one run, or of several repeats of it, by series.
+    """The cells of one run, or of several repeats of the run, by series.
 
     Args:
         plans: the plan of each repeat, in order.
-        recorder: what was recorded.
+        recorder: the records.
     """
 
     def __init__(self, plans: Sequence[Plan], recorder: Recorder) -> None:
@@ -122,7 +122,7 @@ class Measured:
         return [Unit(pair[0], (one[pair], other[pair])) for pair in sorted(set(one) & set(other))]
 
     def pair_s(self, phase: str, name: SeriesName) -> float:
-        """Return how many seconds of the run lie between one pair of a series' blocks and the next."""
+        """Return the time between one pair of a series' blocks and the next, in seconds of the run."""
         pairs = len({block.pair for block in self.blocks(name, phase)})
         return sum(plan.load.duration_s for plan in self.plans) / max(1, pairs)
 

@@ -1,8 +1,8 @@
-"""Whether a series has two modes, which quantiles and intervals hide: half the requests may take ten times as long.
+"""Detect two modes in a series, which quantiles and intervals hide: half of the requests may take ten times as long.
 
 The test is Hartigan's dip (The dip test of unimodality, Annals of Statistics 13, 1985; by the `diptest` package) on the
 logarithm of the service times, read from the histogram at evenly spaced quantiles. In thousands of samples it finds
-insignificant bumps too: two modes are reported only where there is a valley between them, with enough on both sides.
+insignificant bumps too: two modes are reported only if there is a valley between them, with enough on both sides.
 """
 
 from typing import Any

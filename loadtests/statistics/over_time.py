@@ -1,4 +1,4 @@
-"""The run as it went: second by second, block by block, and what failed when."""
+"""The run over time: figures by second and by block, and errors with their times."""
 
 from collections import defaultdict
 from typing import Any
@@ -27,7 +27,7 @@ def time_series(measured: Measured) -> dict[str, Any]:
 
 
 def _point(at_s: float, cell: Cell) -> dict[str, Any]:
-    """Return one second of one series."""
+    """Return the figures of one second of a series, for latency.json."""
     response = counted(cell, "response")
     return {"t_s": at_s, "count": cell.service.total, "errors": cell.errors} | {
         f"{name}_ms": rounded(response.figure_ms(name)) for name in ("p50", "p99", "max")

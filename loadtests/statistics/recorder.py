@@ -180,15 +180,15 @@ class Recorder:
         cell.failed_response.record(age)
 
     def was_busy(self, segment: int, share: float) -> None:
-        """Record a generator process's share of a core during a segment; the highest one is kept."""
+        """Record the share of a core that a generator process used during a segment; the highest share is kept."""
         self.busy[segment] = max(share, self.busy.get(segment, 0.0))
 
     def count(self, name: str, number: int = 1) -> None:
-        """Count something that belongs to no series."""
+        """Add to a counter that belongs to no series."""
         self.counters[name] += number
 
     def flush(self) -> None:
-        """Bin what is buffered."""
+        """Add the buffered times to the histograms."""
         if not self._buffer:
             return
         rows = np.frombuffer(self._buffer, dtype=np.int64).reshape(-1, _FIELDS).copy()
@@ -220,7 +220,7 @@ class Recorder:
         spans.lag.record(np.maximum((start - due)[~queued.astype(bool)], 0))
 
     def merge(self, other: Self) -> None:
-        """Add what another recorder holds."""
+        """Add all records of another recorder."""
         for key, cell in other.cells.items():
             self.cells[key].merge(cell)
         for series, spans in other.spans.items():

@@ -155,7 +155,7 @@ def lag_correlation(values: Floats, repeats: Ints) -> float | None:
 
 
 def in_rounds(sample: Sample, name: str) -> Rounds:
-    """Put units together until a round's influence on a figure says nothing about the next one's."""
+    """Combine units into rounds, until a round's influence on a figure does not correlate with the next one's."""
     influence = sample.influence(name)
     alone = lag_correlation(influence, sample.repeats)
     chosen = Rounds(sample, 1, alone, alone, influence)
@@ -173,7 +173,7 @@ def in_rounds(sample: Sample, name: str) -> Rounds:
 
 
 def _first_of_each(repeats: Ints, length: int) -> Ints:
-    """Return the first unit of each round; what is left at a repeat's end goes to its last round."""
+    """Return the index of the first unit of each round; remaining units at a repeat's end join its last round."""
     first: list[int] = []
     for repeat in np.unique(repeats).tolist():
         members = np.flatnonzero(repeats == repeat)

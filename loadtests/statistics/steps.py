@@ -42,7 +42,7 @@ class Criterion:
         return cls(limits)
 
     def of_interface(self, interface: str) -> list[tuple[str, str, float]]:
-        """Return the limits of an interface, or a default where no threshold concerns it."""
+        """Return the limits for an interface, or a default if no threshold is on that interface."""
         return self.limits.get(interface) or [("response", "p99", _MOST_P99_MS)]
 
     def words(self, interface: str) -> str:

@@ -1,4 +1,4 @@
-"""Whether the robot met its thresholds."""
+"""Judge whether the robot met its thresholds."""
 
 from collections.abc import Iterable
 from typing import Any

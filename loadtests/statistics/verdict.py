@@ -1,4 +1,4 @@
-"""Whether a run is worth anything: conditions on the generator, and on what the duel can show."""
+"""Judge whether a run is valid: conditions on the load generator, and whether the comparison can show a difference."""
 
 from collections.abc import Sequence
 
@@ -24,7 +24,7 @@ MOST_ERRORS = 0.01
 
 
 class GeneratorFigures(msgspec.Struct, kw_only=True):
-    """What the load generator did: the `generator` of latency.json; its schema says what each field holds."""
+    """Figures on the load generator: the `generator` of latency.json, whose JSON Schema describes each field."""
 
     cpu_share: float | None
     lag_ms: Figures
@@ -45,10 +45,10 @@ class GeneratorFigures(msgspec.Struct, kw_only=True):
 
 
 def generator_figures(measured: Measured, asked: int, active_s: float, cpu_share: float | None) -> GeneratorFigures:
-    """Return what the load generator did, over all measured phases.
+    """Return figures on the load generator, over all measured phases.
 
     Args:
-        measured: what was recorded.
+        measured: the records.
         asked: how many arrivals should have started so far.
         active_s: for how long blocks were open, together.
         cpu_share: the busiest worker's share of a core.
@@ -100,12 +100,12 @@ def _lag_limits(service: Histogram) -> Figures:
 def invalid_because(
     figures: GeneratorFigures, plan: Plan, pacing: str, spoilt: Sequence[str]
 ) -> tuple[list[str], list[str]]:
-    """Return the reasons why the figures say nothing about the robot, and notes on what is merely worth knowing.
+    """Return the reasons why the figures say nothing about the robot, and notes.
 
     Args:
-        figures: what the generator did.
-        plan: what it should have done.
-        pacing: the clock that it was paced by.
+        figures: on the load generator.
+        plan: the plan that the generator had to carry out.
+        pacing: the clock that started the requests.
         spoilt: remarks on the generator's machine, which may have made requests late.
     """
     reasons: list[str] = []
@@ -160,7 +160,7 @@ def failures(figures: GeneratorFigures) -> list[str]:
 
 
 def says_nothing(comparisons: Sequence[SoapOverRest]) -> list[str]:
-    """Return why a duel shows nothing at all; empty where it shows something, or where there was no duel."""
+    """Return the reasons why no comparison supports a claim; empty if one does, or if there was no comparison."""
     medians = [entry for entry in comparisons if entry.quantile == "p50"]
     if not medians or any(entry.judgement != "none" for entry in medians):
         return []

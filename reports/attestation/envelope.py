@@ -1,8 +1,10 @@
-"""The envelope around a signed statement, as a file: DSSE v1 (Dead Simple Signing Envelope) with one signature.
+"""Read and check the file around a signed statement: a DSSE v1 envelope with one signature.
 
-This module checks what securesystemslib does not: the payload's type is in-toto's, there is exactly one signature, the
-base64 is canonical, and the envelope has no other members. A key inside it, for example, is refused, because only the
-relying party decides whom to trust. `signature` verifies the signature.
+DSSE is Dead Simple Signing Envelope. This module checks what securesystemslib does not: the payload's type is
+in-toto's,
+there is exactly one signature, the base64 is canonical, and the envelope has no other members. An envelope with a key
+in it, for example, is refused, because only the relying party decides which keys to trust. `signature` verifies the
+signature.
 """
 
 import base64

@@ -1,4 +1,4 @@
-"""The policy: what a relying party requires of a certificate besides its signature, one point a line in TOML."""
+"""The policy: what a relying party requires of a certificate besides its signature, as TOML."""
 
 import datetime as dt
 import tomllib

@@ -18,10 +18,10 @@ def seal(statement: Statement, signer: Signer) -> str:
 
 
 def unseal(octets: bytes, key: Key) -> Statement:
-    """Verify an envelope by a trusted key, and return the signed statement.
+    """Verify an envelope with a trusted key, and return the signed statement.
 
     Raises:
-        EnvelopeRefusedError: it is not signed by that key, or is not as `seal` writes it.
+        EnvelopeRefusedError: the envelope is not signed with that key, or is not as `seal` writes it.
     """
     opened = open_envelope(octets)
     if opened.keyid != key.keyid:

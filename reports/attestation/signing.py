@@ -11,7 +11,7 @@ from reports.errors import ResultInvalidError
 
 
 class Notary:
-    """Signs results with one key.
+    """A key that signs results.
 
     Attributes:
         key: the key's fingerprint.
@@ -33,7 +33,7 @@ class Notary:
 
 
 def _agree(path: Path, result: Mapping[str, Any]) -> None:
-    """Refuse a verdict that contradicts the classes, and a class that contradicts its requirements."""
+    """Raise an error for a verdict that contradicts the classes, or a class that contradicts its requirements."""
     passed = {name for name, verdict in result["classes"].items() if verdict == "pass"}
     claimed = {name for name, verdict in result["classes"].items() if verdict != "not-claimed"}
     for item in result["requirements"]:

@@ -48,7 +48,7 @@ class Robot(msgspec.Struct, frozen=True):
 
 
 class Suite(msgspec.Struct, frozen=True):
-    """The suite, and the contract by which it judged."""
+    """The suite's version, and the contract by which the suite judged."""
 
     version: str
     digest: str

@@ -1,4 +1,4 @@
-"""Verification: the signature, the policy, the files beside it, and what that proves."""
+"""Verify a certificate: its signature, the policy, and whether the files beside it are the ones that were signed."""
 
 import datetime as dt
 from collections.abc import Iterator
@@ -50,7 +50,7 @@ def verify(
 
 
 def _files(statement: Statement, directory: Path) -> Iterator[Point]:
-    """Yield for result.json, and for each page that exists, whether it is the file that was signed."""
+    """Yield, for result.json and each page that exists, whether the file is the one that was signed."""
     for name in (RESULT_SUBJECT, *PAGE_SUBJECTS):
         path = directory / name
         if name in PAGE_SUBJECTS and not path.exists():

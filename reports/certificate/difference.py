@@ -45,7 +45,7 @@ MEANINGS = {
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One requirement in both results; None if a result does not have it."""
+    """A requirement in an old and a new result; None for a result without that requirement."""
 
     id: str
     kind: Kind

@@ -19,7 +19,7 @@ _HEADINGS = {"fail": "What failed", "warn": "Warnings"}
 
 
 class _Part(NamedTuple):
-    """Requirements of one verdict: those shown in full, and the rest."""
+    """The requirements with one verdict: those shown in full, and the others."""
 
     heading: str
     in_full: Sequence[str]

@@ -168,11 +168,11 @@ class Certificate:
 
     @property
     def subject(self) -> str:
-        """Return what a conforming robot conforms to."""
+        """Return the name and version of the contract to which a conforming robot conforms."""
         return str(self.result.get("pack", {}).get("title", "RoAAS"))
 
     def findings(self, verdict: str) -> list[Finding]:
-        """Return the findings of requirements with that verdict, the one to look at first first."""
+        """Return the findings of requirements with a verdict, in the order in which a vendor should look at them."""
         return findings(self.with_verdict(verdict), self.result)
 
     def with_verdict(self, verdict: str) -> tuple[Mapping[str, Any], ...]:

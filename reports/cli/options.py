@@ -19,13 +19,16 @@ CONTRACT = click.option(
 
 
 class FrontDoor(Protocol):
-    """The context's object, through which a command asks another room."""
+    """The object in the command's context, through which a command calls packages that it does not import."""
 
     def known(self, pack: str | None) -> dict[str, object]:
-        """Return what the installed suite knows of a contract pack, with the keys of `policy.Known`."""
+        """Return the versions and requirements of a contract pack that the installed suite knows.
+
+        The keys are those of `policy.Known`.
+        """
 
 
 def policy_of(door: FrontDoor, path: Path | None, pack: str | None) -> tuple[Policy, Known]:
-    """Return the policy in a file, or the default policy, and what the installed suite knows of a contract pack."""
+    """Return the policy in a file, or the default policy, and what `FrontDoor.known` returns for a contract pack."""
     known = msgspec.convert(door.known(pack), Known)
     return read_policy(path, known) if path else Policy(), known

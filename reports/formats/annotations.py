@@ -31,7 +31,7 @@ def _command(result: Mapping[str, Any], case: Case) -> str:
 
 
 def _data(text: str) -> str:
-    """Escape what could end a command, so that a robot's text cannot start another one."""
+    """Escape the characters that end a workflow command, so that a text from a robot cannot start another command."""
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 

@@ -1,4 +1,4 @@
-"""CTRF, the Common Test Report Format: one JSON for the many tools that show test results.
+"""Write CTRF, the Common Test Report Format: a JSON document for tools that show test results.
 
 | outcome | becomes |
 |---|---|

@@ -26,7 +26,7 @@ class Place:
 
 
 def places_of(result: Mapping[str, Any], case: Case) -> list[Place]:
-    """Return where the vendor claims it and where the contract requires it; at least one of the two."""
+    """Return the file and line where the vendor claims a requirement, and where the contract has it; at least one."""
     return list(_places(result, case))
 
 

@@ -12,7 +12,7 @@ TAGS = {"slower": ("bad", "✗"), "not slower": ("good", "✓"), "unclear": ("wa
 
 
 def tag(change: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Return tone and sign of a change's verdict; None if it was not judged."""
+    """Return the CSS tone and the sign for a change's verdict; None if the change was not judged."""
     return TAGS.get(change["verdict"])
 
 

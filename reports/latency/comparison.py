@@ -81,7 +81,7 @@ class Comparison:
 
     @property
     def valid(self) -> bool:
-        """Return whether both results are valid, and at least one quantile could be compared."""
+        """Return whether both results are valid and share a quantile that could be compared."""
         return bool(self.old["valid"] and self.new["valid"] and any(c.interval for c in self.changes))
 
     def with_verdict(self, verdict: str) -> list[Change]:
@@ -145,7 +145,7 @@ def _same_load(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str,
 
 
 def _same_cap(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, str]) -> None:
-    """Refuse two closed-model results with different caps, because times under a cap include waiting for the cap."""
+    """Raise an error for two closed-model results with different caps: their times include waiting for the cap."""
     caps = [(plan.get("limits") or {}).get("max_rate") for plan in (old, new)]
     if new["model"] == "closed" and caps[0] != caps[1]:
         limits = [f"a cap of {rate(cap)} requests/s" if cap is not None else "no cap" for cap in caps]
@@ -194,9 +194,9 @@ def _lag(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, float]:
 
 
 def noise_of(noise: Sequence[Mapping[str, Any]], series: Series, quantile: str) -> float:
-    """Return how far an interface's ratio to itself was from 1 (A/A control), as a share; 0 if it was not measured.
+    """Return how far an interface's ratio to itself (A/A control) was from 1, as a share; 0 if there was no control.
 
-    The noise of a quantile is at least that of the lower quantiles, also if its own was not measured.
+    The value for a quantile is at least that of the lower quantiles, also if its own was not measured.
     """
     lower = _ASCENDING[: _ASCENDING.index(quantile) + 1]
     operation, client, _ = series.key
@@ -232,8 +232,8 @@ def ratio_interval(
 def judge(interval: tuple[float, float], threshold: float, asked: float) -> str:
     """Return the verdict on an interval of new / old.
 
-    "slower" and "faster" need the whole interval beyond `threshold`, which includes the noise. "same" needs the whole
-    interval within `asked`, the threshold that was given.
+    "slower" and "faster" need the whole interval beyond `threshold`, which includes the A/A control's deviation. "same"
+    needs the whole interval within `asked`, the threshold that the user gave.
     """
     low, high = interval
     if low > 1 + threshold:

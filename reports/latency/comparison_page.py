@@ -38,7 +38,7 @@ def verdict(comparison: Comparison) -> Verdict:
 
 
 def sentence(of: Change) -> str:
-    """Return one change in words."""
+    """Return a sentence that describes a change of one quantile."""
     return (
         f"{of.series}: the {of.time} time at {QUANTILE_WORDS[of.quantile]} went from {ms(of.old_ms)} to "
         f"{ms(of.new_ms)} ms, {ratio(of.ratio)} times (95 % interval {interval(of.interval, of_ratio=True)}, "

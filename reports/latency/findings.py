@@ -96,7 +96,7 @@ def _further(result: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _followed(result: Mapping[str, Any]) -> Iterator[str]:
-    """Yield how long a delivery takes over each interface until the application has received it."""
+    """Yield a sentence for each interface: how long a delivery takes until the robot's application has received it."""
     ways = result.get("end_to_end", {}).get("ways", [])
     parts = [
         f"{ms(way['to_application_ms']['p50'])} ms over {way['interface'].upper()}"

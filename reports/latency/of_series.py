@@ -38,7 +38,7 @@ def cold(series: AllSeries) -> Iterator[str]:
 
 
 def _behind(spacing_s: float) -> str:
-    """Return how closely requests followed one another without a pause."""
+    """Return in words how closely the requests without a pause followed one another."""
     if not spacing_s:
         return "right behind another request"
     limit = f"the limit of {rate(1 / spacing_s)} requests/s allows no less"
@@ -46,7 +46,7 @@ def _behind(spacing_s: float) -> str:
 
 
 def repeated(series: AllSeries) -> Iterator[str]:
-    """Yield a remark for each series with repeats: how their medians differ, and whether their intervals cover it."""
+    """Yield a remark for each series with repeats: the range of the repeats' medians and the fit of their intervals."""
     for one in series.values():
         repeats = [repeat for repeat in one.data.get("repeats", []) if repeat["p50"] and repeat["ci95_ms"]["p50"]]
         whole = one.data["service_ms"]["p50"]

@@ -98,7 +98,7 @@ def _missing(series: AllSeries) -> list[str]:
 
 
 def _rounds(result: Mapping[str, Any]) -> list[str]:
-    """Return what the medians' intervals were resampled from, by operation and client."""
+    """Return a description of the blocks from which the medians' intervals were resampled, by operation and client."""
     lines = []
     for entry in result["comparisons"]:
         rounds = entry.get("rounds")

@@ -101,7 +101,7 @@ def _environment(*, html: bool) -> Environment:
 
 
 def _finalize(value: Any) -> Any:
-    """Make the text of every `{{ … }}` visible; our own markup stays as it is."""
+    """Make control characters visible in the text of every `{{ … }}`; markup of this package is unchanged."""
     if isinstance(value, str) and not isinstance(value, Markup):
         return visible(value)
     return value

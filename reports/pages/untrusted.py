@@ -62,7 +62,7 @@ class Excerpt:
 
     @property
     def cut(self) -> bool:
-        """Return whether something is not shown."""
+        """Return whether the excerpt leaves out a part of the text."""
         return self.omitted > 0
 
 

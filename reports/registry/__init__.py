@@ -1,1 +1,1 @@
-"""A static site from signed certificates: which robot passed which classes, signed by whom, and when."""
+"""Write a static site from signed certificates: which robot passed which classes, which key signed that, and when."""

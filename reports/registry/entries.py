@@ -1,6 +1,6 @@
-"""The envelopes of a registry: those that one of its keys signed, and those that are refused.
+"""Read the envelopes of a registry: accept those that one of its keys signed, and refuse the others.
 
-Nothing from a refused envelope is shown. The site identifies its file by digest and gives a reason in its own words.
+Nothing from a refused envelope is shown on the site, which identifies the file by its digest and gives a fixed reason.
 The person who builds the site sees the details.
 """
 
@@ -38,7 +38,7 @@ class Certificate:
 
     @property
     def run(self) -> Run:
-        """Return what it says about the run."""
+        """Return the signed facts about the run."""
         return self.statement.predicate.roaas
 
     @property

@@ -108,7 +108,7 @@ def _marks(standing: Standing) -> dict[str, Mark]:
 
 
 def _word(standing: Standing) -> tuple[str, str]:
-    """Return tone and words: the verdict of a certificate that counts, or else the first reason why it does not."""
+    """Return the CSS tone and words for a certificate: its verdict, or the first reason why it does not count."""
     if not standing.stands:
         return "quiet", standing.against[0]
     verdict = standing.certificate.run.verdict

@@ -49,12 +49,12 @@ class Standing:
 
     @property
     def stands(self) -> bool:
-        """Return whether it counts."""
+        """Return whether the certificate counts."""
         return not self.against
 
     @property
     def trusted(self) -> list[str]:
-        """Return the classes that it shows as passed."""
+        """Return the classes that the certificate shows as passed, or none if it does not count."""
         return passed(self.certificate.run) if self.stands else []
 
 
@@ -81,7 +81,7 @@ class History:
 
     @property
     def page(self) -> str:
-        """Return the file name of its page: the name for readers, and a digest that makes it unique."""
+        """Return the file name of the robot's page: a readable name, and a digest that makes it unique."""
         letters = re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-")[:40].rstrip("-")
         robot = self.current.certificate.run.robot
         digest = sha256(msgspec.json.encode((robot.vendor or "", robot.name or "")))[:12]

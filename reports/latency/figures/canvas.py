@@ -69,11 +69,11 @@ _STYLE: Any = {
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """One figure of a page: panels with a caption.
+    """A figure of a page: panels with a caption.
 
     Attributes:
-        name: unique on its page; it becomes the id.
-        caption: what it shows and how to read it.
+        name: unique on its page; becomes the element's id.
+        caption: what the figure shows and how to read it.
         panels: the drawings as SVG.
     """
 
