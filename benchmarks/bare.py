@@ -1,7 +1,7 @@
-"""The yardstick: a bare uvicorn ASGI application that answers fixed bytes.
+"""A bare uvicorn ASGI application that responds with fixed bytes, as the baseline for the robot's response times.
 
 ``python bare.py ANSWERS.json`` serves ``{"/path": {"status": …, "headers": [[name, value], …], "body": …}, …}`` and
-prints its port. With ``--count`` it prints in the end how many requests it answered.
+prints its port. With ``--count`` it prints at the end how many requests it has served.
 """
 
 import contextlib
@@ -15,7 +15,7 @@ import uvicorn
 
 
 def application(answers: dict[str, Any]) -> Any:
-    """Return the application: one lookup, two messages."""
+    """Return an ASGI application that looks up the path and sends the fixed response."""
     messages = {
         path: (
             {
@@ -43,7 +43,7 @@ class Counting:
         self.inner, self.count = inner, 0
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        """Count a request and answer it."""
+        """Count a request and respond to it."""
         self.count += 1
         await self.inner(scope, receive, send)
 

@@ -1,4 +1,4 @@
-"""How often `roaas load` claims a difference where there is none, and finds one where there is one.
+"""How often `roaas load` claims a difference where there is none, and how often it finds an existing difference.
 
 `python benchmarks/calibration.py` prints the table of docs/load.md, `--quick` a rougher one. Most runs are artificial:
 the schedule of a real plan goes through the real recorder and the real statistics, with service times that are
@@ -65,7 +65,7 @@ def judged(run: tuple[int, float, float, str]) -> tuple[str, bool, bool]:
 
 
 def real_run(seed: int, seconds: float, shift: float) -> str:
-    """Return the judgement of `roaas load` on a robot with artificial noise; print what it found to stderr."""
+    """Return the judgement of `roaas load` on a robot with artificial noise; print the run's figures to stderr."""
     with started(sys.executable, HERE / "noisy_robot.py", seed, shift) as (_, port):
         url = f"http://127.0.0.1:{port}"
         wsdl = ["--subscribers-wsdl", CONTRACT_DIR / "subscribers.wsdl", "--subscribers-endpoint", f"{url}/subscribers"]
@@ -111,9 +111,9 @@ def _few(number: int, runs: int) -> bool:
 
 
 def real_rows(same: int, planted: int) -> list[bool]:
-    """Print the rows of real runs, one for each processor at a time: robot and generator mostly sleep.
+    """Print the rows of real runs, one run for each processor at a time: robot and load generator mostly sleep.
 
-    So few runs show that the made ones are no fiction, and no more.
+    They are too few for a rate of their own; they show that the artificial runs are realistic.
     """
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         alike = list(pool.map(lambda seed: real_run(seed, REAL_SAME_S, 1.0), range(same)))

@@ -100,8 +100,8 @@ class Pair:
 
     Attributes:
         problems: what is wrong with the differences.
-        others: requirements that broke beside those that the mutant is made to break.
-        none: why it is no pair, so that nothing can be shown by it, or empty.
+        others: requirements that broke besides those that the mutant is made to break.
+        none: why the two results show nothing, or empty.
     """
 
     mutant: Mutant
@@ -111,7 +111,7 @@ class Pair:
 
     @property
     def told(self) -> str:
-        """Return the outcome as one line."""
+        """Return the outcome as a line of text."""
         if self.none:
             return f"no pair: {self.none}"
         others = f" (the fault breaks {', '.join(sorted(self.others))} as well)" if self.others else ""
@@ -119,7 +119,7 @@ class Pair:
 
 
 class _Pairs:
-    """Judges pairs; the good robot's result of a set of classes is kept for the next one that needs it."""
+    """Judges pairs; the good robot's result for a set of classes is kept for later pairs with the same classes."""
 
     def __init__(self, pool: RobotPool, folder: Path) -> None:
         self._pool, self._folder = pool, folder
@@ -127,7 +127,7 @@ class _Pairs:
         self._good_ones = threading.Lock()
 
     def judge(self, mutant: Mutant) -> Pair:
-        """Judge both robots, and compare them there and back."""
+        """Judge both robots, and compare their results in both directions."""
         robot, proxy = self._pool.take()
         try:
             for effort in ("quick", "standard"):  # as in the self-test: what a few cases missed is tried with more
@@ -174,7 +174,7 @@ def _compare(mutant: Mutant, good: Path, faulty: Path) -> Pair:
 
 
 def _wrong(answer: Answer, old: dict[str, str], new: dict[str, str]) -> list[str]:
-    """Return what an answer should say by the two files' verdicts, and does not."""
+    """Return the differences between the output of `roaas diff` and the verdicts in the two files."""
     wanted = {
         _FAILURES: {id_ for id_ in new if new[id_] == "fail" and old[id_] not in _BROKEN},
         _WARNINGS: {id_ for id_ in new if new[id_] == "warn" and old[id_] not in _BROKEN},

@@ -68,7 +68,7 @@ def fast_http_user(url: str, users: int, seconds: float) -> float:
 
 @contextmanager
 def awake() -> Iterator[bool]:
-    """Keep processors awake, if that is allowed; yields whether it is (PM QoS, as cyclictest does)."""
+    """Keep the processors out of sleep states, if that is allowed; yield whether it is (PM QoS, as cyclictest does)."""
     try:
         descriptor = os.open("/dev/cpu_dma_latency", os.O_WRONLY)
     except OSError:
@@ -107,7 +107,7 @@ def _beside_wrk(name: str, port: int, seconds: float, rounds: int) -> bool:
 
 
 def open_model(port: int, seconds: float, rounds: int) -> bool:
-    """Measure rate and lag of one worker, which sleeps between requests at low rates and hardly at high ones."""
+    """Measure rate and lag of one worker at low rates, where it sleeps between requests, and at high rates."""
     met = True
     for rate in (50, 200, 500, 4000, 6000):
         found = [wire(port, seconds, "--rate", rate) for _ in range(rounds)]
@@ -175,7 +175,7 @@ def _report(seed: int) -> dict[str, Any]:
 
 
 def merging(workers: int) -> bool:
-    """Measure the master's work on one report from each of so many workers."""
+    """Measure the time in which the master merges one report from each of so many workers."""
     reports = [_report(seed) for seed in range(min(workers, 20))]
     size = sum(
         len(part)

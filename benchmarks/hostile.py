@@ -51,7 +51,7 @@ def documents(number: int) -> list[str]:
 
 
 class Hostile:
-    """All kinds of hostile clients; ``done`` counts what they did, ``failed`` what should not have happened."""
+    """Hostile clients of all kinds; ``done`` counts their actions, ``failed`` the wrong reactions of the robot."""
 
     def __init__(self, rest: int, soap: int) -> None:
         self.rest, self.soap = rest, soap
@@ -59,7 +59,7 @@ class Hostile:
         self.failed: Counter[str] = Counter()
 
     def kinds(self) -> list[tuple[Callable[[], Coroutine[Any, Any, None]], int]]:
-        """Return each kind, and how many of it there are at once."""
+        """Return each kind of client, and how many clients of that kind run at once."""
         return [
             (self.slow_sender, 40),
             (self.line_ends_alone, 40),
@@ -72,7 +72,7 @@ class Hostile:
         ]
 
     async def slow_sender(self) -> None:
-        """Send an octet now and then, until the robot has had enough."""
+        """Send a byte now and then, until the robot closes the connection."""
         reader, writer = await self._connect(self.rest)
         octets = message(self.rest, "PUT", VELOCITY, "application/json", " " * 5000)
         for octet in octets:
@@ -112,7 +112,7 @@ class Hostile:
             writer.transport.abort()
 
     async def reconnects(self) -> None:
-        """Connect for one request."""
+        """Open a connection, send one request, and close the connection."""
         await self._asks(self.rest, head(self.rest, "GET", "/robot/pose/", "Connection: close"), {200, 503})
         await asyncio.sleep(0.05)
 
@@ -149,7 +149,7 @@ class Hostile:
             return await asyncio.open_connection("127.0.0.1", port)
 
     async def _asks(self, port: int, octets: bytes, expected: set[int]) -> None:
-        """Send a request; count it as failed if its answer, where there is one, has another status."""
+        """Send a request; count it as failed if there is a response with an unexpected status."""
         reader, writer = await self._connect(port)
         line = b""
         with contextlib.suppress(ConnectionError):

@@ -49,11 +49,11 @@ class Nobody:
         self.mission_reports: list[str] = []
 
     def delivery_is_served(self) -> bool:
-        """Say yes."""
+        """Return True: deliveries are accepted."""
         return True
 
     def publish_delivery(self, _request: Any) -> bool:
-        """Say yes."""
+        """Return True without publishing."""
         return True
 
 
@@ -61,13 +61,13 @@ class Wire:
     """Stands for a transport."""
 
     def write(self, _octets: bytes) -> None:
-        """Drop what is written."""
+        """Discard the data."""
 
     def get_extra_info(self, _name: str) -> None:
-        """Know nothing of a peer."""
+        """Return None: there is no peer."""
 
     def set_write_buffer_limits(self, _high: int) -> None:
-        """Buffer nothing."""
+        """Do nothing: this transport has no buffer."""
 
 
 class Callbacks:
@@ -128,7 +128,7 @@ async def main() -> None:
 
 
 def put_stages() -> dict[str, Callable[[], Any]]:
-    """Return the stages of a delivery PUT, none of which publishes."""
+    """Return functions by name, one for each stage of a delivery PUT; none publishes a message."""
     interface, _ = interfaces(Nobody())
     parser = HttpRequestParser(Callbacks())
     request = Request("PUT", DELIVERY.encode(), {b"host": b"robot"}, keep_alive=True)
@@ -141,7 +141,7 @@ def put_stages() -> dict[str, Callable[[], Any]]:
 
 
 def post_stages() -> dict[str, Callable[[], Any]]:
-    """Return the stages of ExecuteDeliveryRequest, none of which publishes."""
+    """Return functions by name, one for each stage of ExecuteDeliveryRequest; none publishes a message."""
     _, interface = interfaces(Nobody())
     body = ENVELOPE.encode()
     names = KnownNames()

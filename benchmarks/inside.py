@@ -1,9 +1,10 @@
-"""Which faults inside a robot the suite detects: faults in what it does, not in its messages on the way to a client.
+"""Which faults of a robot's behaviour the suite detects, as opposed to changes of its messages by a proxy.
 
 ``python benchmarks/inside.py`` certifies the independent robot ``baroque`` with each of its faulty bodies, and once
 without a fault. It prints a line for each and how many faults were detected; ``python benchmarks/inside.py 'goal-*'``
-takes some. No ROS is needed. ``python -m conformance.packs.table1.independent_robots baroque --fault deadband`` starts
-one to look at. The exit code is 1 when the robot without a fault does not pass, or no fault has such a name.
+takes the matching faults. No ROS is needed. ``python -m conformance.packs.table1.independent_robots baroque --fault
+deadband`` starts such a robot by hand. The exit code is 1 when the robot without a fault does not pass, or no fault has
+such a name.
 """
 
 import argparse
@@ -26,7 +27,7 @@ _TIMEOUT_S = 300.0
 
 
 def main() -> int:
-    """Certify, print, and return the exit code."""
+    """Certify the robots, print the results, and return the exit code."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("patterns", nargs="*", default=["*"], metavar="PATTERN", help="names of faults; default: all")

@@ -47,11 +47,11 @@ _OOPS = page(500, b"oops", "text/plain")
 
 
 class Sometimes:
-    """A change that happens at random, to one in so many of the requests that it concerns.
+    """A change to randomly chosen responses, one in so many of those that the change can affect.
 
     Attributes:
-        concerned: how many requests it might have changed.
-        strikes: how many it did.
+        concerned: number of requests whose response could have been changed.
+        strikes: number of changed responses.
     """
 
     def __init__(self, where: Where, make: Make, once_in: int, seed: str) -> None:
@@ -61,7 +61,7 @@ class Sometimes:
         self.concerned = self.strikes = 0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """Answer the request, changed or not."""
+        """Forward a request, and return the response, changed or not."""
         if not self._where(request):
             return forward(request)
         with self._lock:
@@ -72,7 +72,7 @@ class Sometimes:
 
 
 class _Stale:
-    """Answers a request with the response to the same request before it."""
+    """A change that returns the response to the previous identical request."""
 
     def __init__(self) -> None:
         self._answers: dict[tuple[str, str | None], Response] = {}
@@ -137,7 +137,7 @@ FAULTS: dict[str, tuple[Where, Make]] = {
 
 
 def main() -> int:
-    """Certify, print, and return the exit code."""
+    """Certify the robots, print the results, and return the exit code."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("patterns", nargs="*", default=["*"], metavar="PATTERN", help="names of faults; default: all")
@@ -176,7 +176,7 @@ def main() -> int:
 
 
 def _told(run: str, fault: Sometimes, outcome: Outcome, must: frozenset[str], broken: list[str]) -> bool:
-    """Print what came of one run; return whether its fault was caught."""
+    """Print the outcome of one run; return whether its fault was detected."""
     failed = sorted(must & set(outcome.fails)) or sorted(outcome.not_passed())
     said = f"killed by {', '.join(failed[:3])}" if failed else f"survived, exit code {outcome.exit_code}"
     if broken:  # it did not do what its name says

@@ -53,7 +53,7 @@ class Call:
 
 @dataclass(frozen=True)
 class Load:
-    """What a load measured: requests answered, failures among them, and the response time in µs."""
+    """The result of a load: requests with a response, failures among them, and the response times in µs."""
 
     requests: int
     seconds: float
@@ -63,18 +63,18 @@ class Load:
 
     @property
     def rate(self) -> float:
-        """Requests a second."""
+        """Return the number of requests per second."""
         return self.requests / self.seconds
 
 
 def load(call: Call, connections: int, seconds: float, cpus: set[int] | None = None) -> Load:
-    """Repeat a request on so many connections for so many seconds, from a second process.
+    """Repeat a request over several connections for a time, from a second process.
 
     Args:
-        call: The request.
-        connections: How many connections, each with one request under way.
-        seconds: How long.
-        cpus: Those that the loader may use; None for all.
+        call: the request.
+        connections: number of connections, each with one request under way.
+        seconds: the duration.
+        cpus: the processors that the loader may use; None for all.
     """
 
     def pin() -> None:
@@ -102,11 +102,11 @@ def _by_wrk(call: Call, connections: int, seconds: float, pin: Callable[[], None
 
 
 def alternately(calls: list[Call], rate: float, seconds: float) -> list[Load]:
-    """Send each request once in turn, so many turns a second, each when the answer before it is complete.
+    """Send each request once in turn, at a rate of so many turns per second, each after the response to the last.
 
-    What the machine does to one server it does to all, which waiting for minutes between them would not say. Whoever
-    comes first finds the processors asleep, and whoever comes second what the first has set going: so each turn
-    begins with the next of them.
+    Short turns expose all servers to the same disturbances of the machine. The first request of a turn finds the
+    processors
+    asleep, and the second finds them awake: each turn begins with the next request.
     """
     connections = [_Connection(call.host, call.port, call.octets()) for call in calls]
     seen: list[list[tuple[float, bool]]] = [[] for _ in calls]

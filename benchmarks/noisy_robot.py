@@ -47,7 +47,7 @@ _SOAP = (
 
 
 class Noise:
-    """The level of the noise, and when it was last read."""
+    """The level of the noise, and the time when it was last read."""
 
     def __init__(self, seed: int, shift: float) -> None:
         self._random = random.Random(seed)  # noqa: S311 -- noise, no secret
@@ -67,19 +67,19 @@ class Noise:
 
 
 class Answers(StreamRequestHandler):
-    """Answers the requests of one connection."""
+    """A request handler for the requests of one connection."""
 
     disable_nagle_algorithm = True
     noise: Noise
 
     def handle(self) -> None:
-        """Answer until the client disconnects."""
+        """Respond to requests until the client disconnects."""
         with first_in_line(wanted=True):
             while self._answered():
                 pass
 
     def _answered(self) -> bool:
-        """Answer a request; returns False at the end of the connection."""
+        """Read a request and respond to it; return False at the end of the connection."""
         lines = [self.rfile.readline()]
         while lines[-1] not in {b"\r\n", b""}:
             lines.append(self.rfile.readline())

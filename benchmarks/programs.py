@@ -1,4 +1,4 @@
-"""What the benchmarks start: programs, robots and `roaas load`; what a process uses; and the lines that they print."""
+"""Programs that the benchmarks start, measurements of a process, and the lines that the benchmarks print."""
 
 import json
 import os
@@ -86,13 +86,13 @@ def report(text: str, *, met: bool) -> bool:
 
 
 def machine() -> str:
-    """Return what else runs on the machine, for the beginning or the end of a result."""
+    """Return a text on the load of the machine, for the beginning or the end of a result."""
     return f"{os.cpu_count()} processors, load average {os.getloadavg()[0]:.1f}"
 
 
 @dataclass
 class Footprint:
-    """Resident megabytes (what processes share counts in each), descriptors, threads, seconds of processor so far."""
+    """A process's resident memory in MB (with shared pages), open descriptors, threads, and processor time in s."""
 
     megabytes: float
     descriptors: int
@@ -101,7 +101,7 @@ class Footprint:
 
     @classmethod
     def of(cls, pid: int) -> "Footprint":
-        """Return what a process uses, as Linux reports it."""
+        """Return the footprint of a process, as Linux reports it."""
         proc = Path(f"/proc/{pid}")
         pages = int((proc / "statm").read_text().split()[1])
         fields = (proc / "stat").read_text().rpartition(")")[2].split()

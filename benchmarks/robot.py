@@ -99,9 +99,10 @@ def beside(text: str) -> tuple[str, int, int]:
 
 
 def back_to_back(name: str, call: Call, yardsticks: dict[str, Call], most: float, seconds: float) -> bool:
-    """Measure robot and yardsticks in turn, as fast as each can; ratios are the median of the rounds'.
+    """Measure robot and baselines in turn, as fast as each can; print the ratios' medians over the rounds.
 
-    wrk counts a stall as all the requests that it kept from being sent, so that its p99 says what the machine did.
+    wrk counts a stall as all the requests that were not sent because of it, so its p99 shows the machine, not the
+    robot.
     """
     calls = {"robot": call} | yardsticks
     for each in calls.values():
@@ -146,7 +147,7 @@ def many_connections(robot: Robot, seconds: float) -> list[bool]:
 
 
 def idle(robot: Robot) -> list[bool]:
-    """Measure what the robot uses while nobody calls it, simulation and web services together."""
+    """Measure memory and processor time of simulation and web services together, while no client sends requests."""
     used, started = cpu_seconds(robot), time.monotonic()
     time.sleep(5)
     core = (cpu_seconds(robot) - used) / (time.monotonic() - started)
@@ -160,8 +161,9 @@ def idle(robot: Robot) -> list[bool]:
 def growth(robot: Robot, idle_megabytes: float) -> bool:
     """Measure how much memory the robot gains by 200,000 requests, and how much by as many more, three times.
 
-    The first fill what is bounded: DDS's histories and the reports on missions. What each 200,000 more add would never
-    end; what some of them add, once, is a history that had not been as full before.
+    The first 200,000 fill bounded buffers: DDS's histories and the reports on missions. Memory that each further
+    200,000
+    add would be a leak; memory that only some of them add is a history that had not been full.
     """
     filled, *later = [after_requests(robot) for _ in range(1 + MORE_TIMES)]
     grown = [now / before - 1 for before, now in pairwise([filled, *later])]
@@ -183,7 +185,7 @@ def after_requests(robot: Robot) -> float:
 
 @contextmanager
 def pinned(pid: int) -> Iterator[None]:
-    """Keep a process's main thread, which is its event loop's, on the servers' processor."""
+    """Pin a process's main thread, which runs its event loop, to the processor of the servers."""
     before = os.sched_getaffinity(pid)
     os.sched_setaffinity(pid, SERVER_CPUS or before)
     try:

@@ -28,7 +28,7 @@ _SERIES = {segment: 4 + 2 * (segment % 2) for segment in range(_SEGMENTS)}
 
 
 def record(book: Recorder, seed: int, first: int, requests: int) -> None:
-    """Record requests, numbered from `first`: one in 500 fails, one in 1,000 never starts."""
+    """Record numbered requests, starting at `first`: one in 500 fails, one in 1,000 never starts."""
     rng = np.random.default_rng([seed, first])
     service = rng.lognormal(np.log(150_000), 0.6, requests).astype(int).tolist()
     lag = rng.exponential(30_000, requests).astype(int).tolist()
@@ -61,7 +61,7 @@ def work(seed: int, first: int, requests: int, pipe: Any) -> None:
 
 
 def contents(book: Recorder) -> dict[str, Any]:
-    """Return everything in a recorder, in an order that does not depend on who reported first."""
+    """Return all records in an order that does not depend on which worker reported first."""
     return {name: sorted(map(repr, dict(part).items())) for name, part in _parts(book).items()}
 
 
@@ -116,7 +116,7 @@ def recorders(requests: int, workers: int, seed: int) -> bool:
 
 
 def run(seconds: float, workers: int, users: int) -> bool:
-    """Run `roaas load` over workers, and compare with what the server has counted."""
+    """Run `roaas load` with workers, and compare its counts with the server's count of requests."""
     with running_bare([POSE], "--count") as (port, server):
         options = ["--users", users, "--duration", f"{seconds:g}", "--warmup", "0", "--processes", workers]
         found = roaas_load("--rest", f"http://127.0.0.1:{port}", *options)

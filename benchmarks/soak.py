@@ -52,7 +52,7 @@ ASKED = (  # (operation, SOAP or REST, method, target, content); deliveries seld
 
 @dataclass
 class Good:
-    """What good clients saw: response times in ms by when they were due, in s since the start, and what went wrong."""
+    """The results of good clients: response times in ms, each with the time when it was due, and errors."""
 
     robot: list[tuple[float, float]] = field(default_factory=list)
     bare: list[tuple[float, float]] = field(default_factory=list)
@@ -67,7 +67,7 @@ class Client:
         self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=DEADLINE)
 
     def ask(self, method: str, target: str, body: str = "") -> tuple[int, bytes, float]:
-        """Return status and content, and how long it took, in ms."""
+        """Send a request; return status, body, and response time in ms."""
         fields = {"Content-Type": "text/xml"} if body else {}
         began = time.perf_counter()
         self._connection.request(method, target, body or None, fields)
@@ -81,7 +81,7 @@ class Client:
 
 
 class Soak:
-    """One run: a robot, its clients, and what they saw."""
+    """One run: a robot, its clients, and their results."""
 
     def __init__(self, domain_id: int, seconds: float, log: Path) -> None:
         self.seconds, self.log, self._domain = seconds, log, f"--domain-id={domain_id}"
@@ -92,7 +92,7 @@ class Soak:
         self.restarts = 0
 
     def run(self) -> None:
-        """Keep everything busy for the given time, and record what is left."""
+        """Run all clients for the given time, and record the resources that the robot still uses afterwards."""
         with contextlib.ExitStack() as stack:
             simulation = stack.enter_context(self._simulation())
             log = stack.enter_context(self.log.open("w", encoding="utf-8"))
@@ -159,7 +159,7 @@ class Soak:
 
     @contextlib.contextmanager
     def _simulation(self) -> Iterator[list[subprocess.Popen[str]]]:
-        """Run the simulation; yields the one that runs at the time."""
+        """Run the simulation; yield a list with the process that is running, which changes with each restart."""
         running = [self._start_simulation()]
         try:
             yield running
@@ -181,7 +181,7 @@ class Soak:
         client.close()
 
     def _settled(self, pid: int, before: Footprint) -> Footprint:
-        """Return what is left once idle connections are gone."""
+        """Return the robot's footprint after its idle connections have been closed."""
         print("waiting until idle connections are closed", flush=True)
         give_up = time.monotonic() + SETTLED
         while True:
@@ -192,7 +192,7 @@ class Soak:
 
 
 def p99(times: list[tuple[float, float]], start: float, end: float) -> float:
-    """Return the p99 of a window in ms: the median of those of its slices; NaN where nothing was answered."""
+    """Return the p99 of a time window in ms: the median over its slices; NaN if there was no response."""
     length = (end - start) / SLICES
     found = []
     for number in range(SLICES):

@@ -36,7 +36,7 @@ _NAMED = 5  # requirements of one reason; more are counted
 
 
 def main() -> int:
-    """Certify, print, and return the exit code."""
+    """Certify the robots, print the results, and return the exit code."""
     # What ends a CI job takes the robots with it, like Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     options = _parser().parse_args()
@@ -105,7 +105,7 @@ def _link(name: str) -> Variant | None:
 
 @contextlib.contextmanager
 def _busy(count: int) -> Iterator[None]:
-    """Keep so many processors busy."""
+    """Keep so many processors busy while the context lasts."""
     loops = [multiprocessing.get_context("spawn").Process(target=_spin, daemon=True) for _ in range(count)]
     for loop in loops:
         loop.start()
@@ -126,7 +126,7 @@ def _spin() -> None:
 
 
 def _word(result: ControlResult) -> str:
-    """Return the outcome of one run in a word."""
+    """Return the outcome of a run in a word."""
     if result.outcome is None:
         return "not tried"
     if result.false_positives or result.outcome.exit_code == _NOT_CONFORMANT:

@@ -1,7 +1,7 @@
-"""Faults in what a robot does: behind its web services, where no proxy between it and a client could put them.
+"""Faults in a robot's behaviour, which a proxy in front of the robot could not cause.
 
-Each is a class of bodies for the independent robot ``baroque``. A proxy changes what is said of a robot; these robots
-say what they do, and do something else than they were asked to.
+Each is a class of bodies for the independent robot ``baroque``. A mutant behind a proxy alters messages; these robots
+send consistent messages and behave otherwise.
 """
 
 from conformance.packs.table1.faulty_bodies.missions import MISSIONS

@@ -1,4 +1,4 @@
-"""Bodies that do otherwise than they were asked to with goals, plans and deliveries."""
+"""Bodies that handle goals, plans or deliveries wrongly."""
 
 import struct
 import threading
@@ -16,7 +16,7 @@ class _SameIdOtherPose(Body):
     """Takes another pose under the active goal's id for the same goal."""
 
     def send(self, id_: str | None, target: dict[str, Any], frame: str) -> tuple[Goal, bool]:
-        """See Body."""
+        """Accept another pose under the active goal's id as the same goal."""
         with self._lock:
             self._advance()
             if self.goal is not None and id_ == self.goal.id:
@@ -28,7 +28,7 @@ class _IdInLowerCase(Body):
     """Writes ids in lower case."""
 
     def send(self, id_: str | None, target: dict[str, Any], frame: str) -> tuple[Goal, bool]:
-        """See Body."""
+        """Accept a goal, and convert its id to lower case."""
         return super().send(id_.lower() if id_ else id_, target, frame)
 
 
@@ -40,7 +40,7 @@ class _IdUsedUp(Body):
         self._used: set[str] = set()
 
     def send(self, id_: str | None, target: dict[str, Any], frame: str) -> tuple[Goal, bool]:
-        """See Body."""
+        """Accept a goal; one whose id was used before does not count as new."""
         goal, new = super().send(id_, target, frame)
         new = new and goal.id not in self._used
         self._used.add(goal.id)
@@ -48,10 +48,10 @@ class _IdUsedUp(Body):
 
 
 class _OdometryTakenForMap(Body):
-    """Drives to a pose in the odometry's frame as if it were the map's."""
+    """A body that drives to a pose in the odometry's frame as if the pose were in the map's frame."""
 
     def send(self, id_: str | None, target: dict[str, Any], frame: str) -> tuple[Goal, bool]:
-        """See Body."""
+        """Accept a goal, and ignore its frame."""
         goal, new = super().send(id_, target, frame)
         goal.x, goal.y = target["position"]["x"], target["position"]["y"]
         goal.yaw = yaw_of(target["orientation"])
@@ -62,7 +62,7 @@ class _Coasts(Body):
     """Drives on for a while after its goal was cancelled."""
 
     def cancel(self) -> bool:
-        """See Body."""
+        """Cancel the goal, and keep driving for a while."""
         had = super().cancel()
         if had:
             self._command, self._until = (0.1, 0.0), self._tick + round(2.5 / TICK_S)
@@ -70,30 +70,30 @@ class _Coasts(Body):
 
 
 class _Resumes(Body):
-    """Takes up the goal that was displaced when the one in its place is cancelled."""
+    """A body that resumes the replaced goal when the goal in its place is cancelled."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._displaced: Goal | None = None
 
     def send(self, id_: str | None, target: dict[str, Any], frame: str) -> tuple[Goal, bool]:
-        """See Body."""
+        """Accept a goal, and remember the goal that it replaces."""
         if self.goal is not None and self.goal.id != id_:
             self._displaced = self.goal
         return super().send(id_, target, frame)
 
     def cancel(self) -> bool:
-        """See Body."""
+        """Cancel the goal, and resume the replaced goal."""
         had = super().cancel()
         self.goal, self._displaced = self._displaced, None
         return had
 
 
 class _ResumesOnArrival(_Resumes):
-    """Takes it up when the one in its place is reached."""
+    """A body that resumes the replaced goal when the goal in its place is reached."""
 
     def cancel(self) -> bool:
-        """See Body."""
+        """Cancel the goal, and forget the replaced goal."""
         self._displaced = None
         return super().cancel()
 
@@ -106,14 +106,14 @@ class _ResumesOnArrival(_Resumes):
 
 
 class _VelocityAfterGoal(Body):
-    """Takes the velocity from before a goal up again when it has arrived."""
+    """A body that resumes the velocity from before a goal when the goal is reached."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._before = (0.0, 0.0)
 
     def drive(self, v: float, w: float | None) -> float:
-        """See Body."""
+        """Command a velocity, and remember the command."""
         kept = super().drive(v, w)
         self._before = (v, kept)
         return kept
@@ -130,15 +130,15 @@ class _VelocityForgotten(Body):
     """Takes a velocity while a goal is active, and drives on to the goal."""
 
     def drive(self, v: float, w: float | None) -> float:
-        """See Body."""
+        """Command a velocity, unless a goal is active."""
         return (w or 0.0) if self.goal is not None else super().drive(v, w)
 
 
 class _StartForgotten(Body):
-    """Plans from where it is, wherever it was asked to."""
+    """A body whose plans always begin at the robot, whatever start the request has."""
 
     def path(self, start: tuple[float, float, float] | None, x: float, y: float, yaw: float) -> list[dict[str, Any]]:
-        """See Body."""
+        """Return a path that begins at the robot."""
         return super().path(start and None, x, y, yaw)
 
 
@@ -146,34 +146,34 @@ class _GapInPlan(Body):
     """Leaves out the middle of a long plan."""
 
     def path(self, start: tuple[float, float, float] | None, x: float, y: float, yaw: float) -> list[dict[str, Any]]:
-        """See Body."""
+        """Return a path with a gap."""
         poses = super().path(start, x, y, yaw)
         return poses[: len(poses) // 3] + poses[2 * len(poses) // 3 :] if len(poses) > _MANY else poses
 
 
 class _DeliveryLost(Body):
-    """Loses a delivery that comes close upon another one."""
+    """A body that loses a delivery that follows another one closely."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._last = 0.0
 
     def deliver(self, interface: str, **request: float) -> None:
-        """See Body."""
+        """Store a delivery, unless the one before was just stored."""
         lost, self._last = time.time() - self._last < _SOON_S, time.time()
         if not lost:
             super().deliver(interface, **request)
 
 
 class _DeliveryTwice(Body):
-    """Delivers one in ten once more, later."""
+    """A body that stores every tenth delivery a second time, later."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._delivered = 0
 
     def deliver(self, interface: str, **request: float) -> None:
-        """See Body."""
+        """Store a delivery, and every tenth one once more later."""
         super().deliver(interface, **request)
         self._delivered += 1
         if self._delivered % 10 == 0:
@@ -183,10 +183,10 @@ class _DeliveryTwice(Body):
 
 
 class _DeliverySinglePrecision(Body):
-    """Keeps four octets of a number."""
+    """A body that stores the coordinates of deliveries in single precision."""
 
     def deliver(self, interface: str, **request: float) -> None:
-        """See Body."""
+        """Store a delivery in single precision."""
         super().deliver(interface, **{name: _single(value) for name, value in request.items()})
 
 
@@ -201,10 +201,10 @@ def _single(value: float) -> float:
 
 
 class _CoffeeForCourier(Body):
-    """Takes the code of a delivery that came over SOAP for another one."""
+    """A body that stores deliveries that came over SOAP with another message code."""
 
     def deliver(self, interface: str, **request: float) -> None:
-        """See Body."""
+        """Store a delivery, with another code if it came over SOAP."""
         code = 3 if interface == "soap" and request["message_code"] == 4 else request["message_code"]  # noqa: PLR2004
         super().deliver(interface, **(request | {"message_code": code}))
 

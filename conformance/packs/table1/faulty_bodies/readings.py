@@ -1,4 +1,4 @@
-"""Bodies that say where they are, how fast, or when, otherwise than it is."""
+"""Bodies that report a wrong pose, velocity or time."""
 
 import time
 from collections import deque
@@ -11,7 +11,7 @@ _Message = dict[str, Any]
 
 
 def _saying(changed: Callable[[_Message, float], None]) -> type[Body]:
-    """A body whose odometry is changed, given how long it has run, s."""
+    """Return a class of bodies whose odometry ``changed`` alters, given the message and the run time in s."""
 
     class Saying(Body):
         def __post_init__(self) -> None:
@@ -19,7 +19,7 @@ def _saying(changed: Callable[[_Message, float], None]) -> type[Body]:
             self._born = time.time()
 
         def odometry(self) -> _Message:
-            """See Body."""
+            """Return the altered odometry."""
             message = super().odometry()
             changed(message, time.time() - self._born)
             return message
@@ -28,7 +28,7 @@ def _saying(changed: Callable[[_Message, float], None]) -> type[Body]:
 
 
 def _timed(off: Callable[[float, float], float]) -> type[Body]:
-    """A body whose stamps are off by so many seconds, given the time and how long it has run, s."""
+    """Return a class of bodies whose stamps are off by ``off`` seconds, given the time and the run time in s."""
 
     def changed(message: _Message, age: float) -> None:
         shown = message["header"]["stamp"]
@@ -56,7 +56,7 @@ class _Late:
         self._read: deque[tuple[float, _Message]] = deque()
 
     def of(self, message: _Message) -> _Message:
-        """The message of then, given that of now."""
+        """Store the current message, and return the one of some time ago."""
         now = time.time()
         self._read.append((now, message))
         while len(self._read) > 1 and self._read[1][0] < now - self._late_s:
@@ -65,34 +65,34 @@ class _Late:
 
 
 class _LateOdometry(Body):
-    """Says where it was 0.7 s ago."""
+    """A body that reports its pose of 0.7 s ago."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._late = _Late(0.7)
 
     def odometry(self) -> _Message:
-        """See Body."""
+        """Return the odometry of 0.7 s ago."""
         return self._late.of(super().odometry())
 
 
 class _LateVelocity(Body):
-    """Says how fast it was half a second ago."""
+    """A body that reports its velocity of half a second ago."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._late = _Late(0.5)
 
     def velocity(self) -> _Message:
-        """See Body."""
+        """Return the velocity of half a second ago."""
         return self._late.of(super().velocity())
 
 
 class _CommandedVelocity(Body):
-    """Says the velocity that it was asked for, not the one that it has."""
+    """A body that reports the commanded velocity instead of the measured one."""
 
     def velocity(self) -> _Message:
-        """See Body."""
+        """Return the commanded velocity."""
         with self._lock:
             self._advance()
             held = self._until > self._tick

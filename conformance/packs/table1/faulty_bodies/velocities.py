@@ -1,4 +1,4 @@
-"""Bodies that take a velocity and drive another one, or that one for another time."""
+"""Bodies that drive at another velocity than commanded, or for another time."""
 
 import math
 from collections.abc import Callable
@@ -10,11 +10,14 @@ _Driven = Callable[[float, float], tuple[float, float]]
 
 
 def _holding(factor: Callable[[float, float | None], float]) -> type[Body]:
-    """A body that holds a velocity so many times as long as it should; the angular part is None for a linear PUT."""
+    """Return a class of bodies that hold a velocity ``factor`` times as long as declared.
+
+    ``factor`` receives the linear and angular part; the angular part is None for a linear PUT.
+    """
 
     class Holding(Body):
         def drive(self, v: float, w: float | None) -> float:
-            """See Body."""
+            """Command a velocity, and change its hold time."""
             with self._lock:
                 kept = super().drive(v, w)
                 self._until = self._tick + round(factor(v, w) * self.build.hold_s / TICK_S)
@@ -24,10 +27,10 @@ def _holding(factor: Callable[[float, float | None], float]) -> type[Body]:
 
 
 class _RenewedByChange(Body):
-    """Takes the same velocity for the same command: it renews nothing."""
+    """A body in which repeating the same velocity does not renew it."""
 
     def drive(self, v: float, w: float | None) -> float:
-        """See Body."""
+        """Command a velocity, unless it is the current one."""
         with self._lock:
             self._advance()
             before, until = self._command, self._until
@@ -38,7 +41,7 @@ class _RenewedByChange(Body):
 
 
 def _driving(driven: _Driven) -> type[Body]:
-    """A body that drives another velocity than it was asked to, where no goal is active."""
+    """Return a class of bodies that drive at the velocity ``driven`` returns, while no goal is active."""
 
     class Driving(Body):
         def _aim(self) -> tuple[float, float]:
@@ -50,7 +53,7 @@ def _driving(driven: _Driven) -> type[Body]:
 
 
 class _SlowReversal(Body):
-    """Hardly brakes when it is asked to turn round."""
+    """A body that brakes very slowly when commanded to reverse."""
 
     def _aim(self) -> tuple[float, float]:
         commanded, now = self.goal is None, self._state.v

@@ -1,4 +1,4 @@
-"""Starts one of the independent robots: ``python -m conformance.packs.table1.independent_robots NAME``."""
+"""Start one of the independent robots: ``python -m conformance.packs.table1.independent_robots NAME``."""
 
 import argparse
 import signal

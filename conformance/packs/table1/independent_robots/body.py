@@ -1,4 +1,4 @@
-"""A differential-drive robot as arithmetic: its state is computed when somebody asks, from the time that has passed."""
+"""A differential-drive robot as arithmetic: each reading computes the state from the time that has passed."""
 
 import math
 import threading
@@ -17,10 +17,10 @@ _LATE = 2_000
 
 @dataclass(frozen=True)
 class Build:
-    """What one robot can do.
+    """The abilities of one robot.
 
     Attributes:
-        linear_m_s: greatest speed that it takes as a command, m/s; angular_rad_s likewise, rad/s.
+        linear_m_s: highest commanded speed that the robot accepts, m/s; angular_rad_s likewise, rad/s.
         cruise_m_s: speed on the way to a goal, m/s; turn_rad_s likewise, rad/s.
         acceleration: m/s^2; spin: rad/s^2.
         hold_s: how long a command holds, s.
@@ -57,7 +57,7 @@ class Goal:
 
 @dataclass
 class Delivery:
-    """One accepted request, with the moment and the interface it came by."""
+    """An accepted delivery, with the time and the interface of its request."""
 
     request: dict[str, float | int]
     accepted: float
@@ -82,16 +82,16 @@ class ConflictError(Exception):
 
 
 class NoPlanError(Exception):
-    """No path leads there; the message says why."""
+    """Raised when there is no path to a place; the message says why."""
 
 
 @dataclass
 class Body:
-    """A robot; every method may be called from any thread.
+    """The state of a robot; every method may be called from any thread.
 
     Args:
-        build: what it can do.
-        yields: whether a velocity ends the active goal (otherwise it is refused with BusyError).
+        build: the robot's abilities.
+        yields: whether a velocity ends the active goal (otherwise a velocity is rejected with BusyError).
     """
 
     build: Build
@@ -107,7 +107,7 @@ class Body:
         self._until = 0
 
     def odometry(self) -> dict[str, Any]:
-        """The state as nav_msgs/Odometry."""
+        """Return the pose and velocity as nav_msgs/Odometry."""
         with self._lock:
             self._advance()
             state = self._state
@@ -119,13 +119,13 @@ class Body:
             }
 
     def velocity(self) -> dict[str, Any]:
-        """The measured velocity as geometry_msgs/Twist."""
+        """Return the measured velocity as geometry_msgs/Twist."""
         with self._lock:
             self._advance()
             return twist(self._state.v, self._state.w)
 
     def drive(self, v: float, w: float | None) -> float:
-        """Command a velocity; without ``w`` the turning rate that was commanded last is kept. Returns ``w``.
+        """Command a velocity; without ``w`` the last commanded turning rate is kept. Return ``w``.
 
         Raises:
             BusyError: a goal is active, and this robot does not yield.
@@ -143,10 +143,10 @@ class Body:
             return w
 
     def send(self, id_: str | None, target: dict[str, Any], frame: str) -> tuple[Goal, bool]:
-        """Accept a goal. Returns it, and whether it is new.
+        """Accept a goal. Return the goal, and whether it is new.
 
         Raises:
-            ConflictError: see there.
+            ConflictError: another pose has the active goal's id.
         """
         with self._lock:
             self._advance()
@@ -162,13 +162,13 @@ class Body:
             return goal, True
 
     def current(self) -> Goal | None:
-        """The active goal."""
+        """Return the active goal, or None."""
         with self._lock:
             self._advance()
             return self.goal
 
     def cancel(self) -> bool:
-        """Give the active goal up. Returns whether there was one."""
+        """Cancel the active goal. Return whether there was one."""
         with self._lock:
             self._advance()
             had = self.goal is not None
@@ -176,25 +176,25 @@ class Body:
             return had
 
     def in_odom(self, x: float, y: float, yaw: float) -> tuple[float, float, float]:
-        """A place on the map, in the odometry's frame."""
+        """Return a pose of the map's frame in the odometry's frame, m and rad."""
         away_x, away_y, turned = self.build.odom
         x, y = x - away_x, y - away_y
         cos, sin = math.cos(turned), math.sin(turned)
         return cos * x + sin * y, cos * y - sin * x, wrapped(yaw - turned)
 
     def on_map(self, x: float, y: float, yaw: float) -> tuple[float, float, float]:
-        """A place in the odometry's frame, on the map."""
+        """Return a pose of the odometry's frame in the map's frame, m and rad."""
         away_x, away_y, turned = self.build.odom
         cos, sin = math.cos(turned), math.sin(turned)
         return away_x + cos * x - sin * y, away_y + sin * x + cos * y, wrapped(yaw + turned)
 
     def knows(self, x: float, y: float) -> bool:
-        """Whether a place is on the map."""
+        """Return whether a place is on the map."""
         low_x, low_y, high_x, high_y = self.build.bounds
         return low_x <= x <= high_x and low_y <= y <= high_y
 
     def path(self, start: tuple[float, float, float] | None, x: float, y: float, yaw: float) -> list[dict[str, Any]]:
-        """Poses (geometry_msgs/Pose) of a straight line, 0.1 m apart at most.
+        """Return the poses (geometry_msgs/Pose) of a straight line, at most 0.1 m apart.
 
         Raises:
             NoPlanError: a place is not on the map.
@@ -239,7 +239,7 @@ class Body:
             state.yaw = wrapped(state.yaw + state.w * TICK_S)
 
     def _aim(self) -> tuple[float, float]:
-        """The velocity that the robot wants to have now."""
+        """Return the linear and angular velocity that the robot accelerates to now, m/s and rad/s."""
         goal = self.goal
         if goal is None:
             return self._command if self._until > self._tick else (0.0, 0.0)
@@ -265,17 +265,17 @@ def _bounded(value: float, size: float) -> float:
 
 
 def wrapped(angle: float) -> float:
-    """An angle in [-pi, pi], rad."""
+    """Return an angle in [-pi, pi], rad."""
     return math.remainder(angle, math.tau)
 
 
 def yaw_of(q: dict[str, float]) -> float:
-    """The heading that a quaternion gives, rad."""
+    """Return the heading of a quaternion, rad."""
     return math.atan2(2 * (q["w"] * q["z"] + q["x"] * q["y"]), 1 - 2 * (q["y"] ** 2 + q["z"] ** 2))
 
 
 def pose(x: float, y: float, yaw: float) -> dict[str, Any]:
-    """A geometry_msgs/Pose on the ground."""
+    """Return a geometry_msgs/Pose on the ground."""
     return {
         "position": {"x": x, "y": y, "z": 0.0},
         "orientation": {"x": 0.0, "y": 0.0, "z": math.sin(yaw / 2), "w": math.cos(yaw / 2)},
@@ -283,12 +283,12 @@ def pose(x: float, y: float, yaw: float) -> dict[str, Any]:
 
 
 def stamp(seconds: float) -> dict[str, int]:
-    """A builtin_interfaces/Time."""
+    """Return a time in s as a builtin_interfaces/Time."""
     return {"sec": int(seconds), "nanosec": min(999_999_999, int(seconds % 1 * 1e9))}
 
 
 def twist(v: float, w: float) -> dict[str, Any]:
-    """A geometry_msgs/Twist of a robot on wheels."""
+    """Return the geometry_msgs/Twist of a robot on wheels."""
     return {"linear": {"x": v, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": w}}
 
 

@@ -16,14 +16,14 @@ _DESCRIPTIONS = {"/openapi.json", "/application.wadl"}
 
 
 def resources() -> dict[str, dict[str, Handler]]:
-    """Handlers of a new robot, by path (parameters in braces) and method."""
+    """Return the handlers of a new robot, by path (parameters in braces) and method."""
     rest = Rest(Body(BUILD))
     found = {path: methods for path, methods in rest.resources.items() if path not in _DESCRIPTIONS}
     return found | {DELIVERY: {"PUT": rest.deliver}}
 
 
 def message(fields: Iterable[tuple[str, str]]) -> Message:
-    """Header fields as handlers take them."""
+    """Return header fields as the message object that handlers expect."""
     headers = Message()
     for name, value in fields:
         headers.add_header(name, value)
@@ -31,7 +31,7 @@ def message(fields: Iterable[tuple[str, str]]) -> Message:
 
 
 def answered(handler: Handler, headers: Message, body: bytes, target: str) -> Answer:
-    """What a handler answers; what it refuses becomes a problem."""
+    """Call a handler and return its response; a RefusedError becomes a problem."""
     try:
         return handler(headers, body, target)
     except RefusedError as refused:
@@ -39,11 +39,11 @@ def answered(handler: Handler, headers: Message, body: bytes, target: str) -> An
 
 
 def problem(status: int, detail: str | None, headers: Message) -> Answer:
-    """A problem in place of a framework's own page."""
+    """Return a problem in place of a framework's own error page."""
     return refusal(RefusedError(status, detail or HTTPStatus(status).phrase), headers)
 
 
 def bound(port: int) -> tuple[socket.socket, str]:
-    """A socket that listens on loopback, and its URL."""
+    """Return a socket that listens on loopback, and its URL."""
     sock = socket.create_server(("127.0.0.1", port), backlog=128)
     return sock, f"http://127.0.0.1:{sock.getsockname()[1]}"

@@ -1,4 +1,4 @@
-"""A robot on aiohttp, whose parser answers methods that it does not know, and the like, by pages of its own."""
+"""A robot on aiohttp, whose parser responds to malformed requests with its own error pages."""
 
 import asyncio
 import threading
@@ -14,7 +14,7 @@ _View = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 def serve(rest_port: int, _soap_port: int) -> tuple[str, str, Callable[[], None]]:
-    """Start the robot. Returns REST's base URL, no WSDL and what stops it."""
+    """Start the robot. Return REST's base URL, an empty WSDL address, and a function that stops the robot."""
     sock, rest = bound(rest_port)
     runner = web.AppRunner(_application(), access_log=None)
     loop = asyncio.new_event_loop()
@@ -64,7 +64,7 @@ def _options(allowed: str) -> _View:
 
 @web.middleware
 async def _problems(request: web.Request, handler: _View) -> web.StreamResponse:
-    """Aiohttp's own errors as problems; and one Host field, which aiohttp does not look after (RFC 9112 3.2)."""
+    """Turn aiohttp's own errors into problems, and reject several Host fields, which aiohttp accepts (RFC 9112 3.2)."""
     headers = message(request.headers.items())
     if len(request.headers.getall("Host", [])) != 1:
         return _response(problem(400, "Host is not there once", headers))

@@ -39,10 +39,10 @@ BUILD = Build(
 
 
 def serve(rest_port: int, soap_port: int, kind: type[Body] = Body) -> tuple[str, str, Callable[[], None]]:
-    """Start the robot, of which another kind of body may have a fault.
+    """Start the robot; ``kind`` may be a body with a fault.
 
     Returns:
-        REST's base URL, the publishers' WSDL and what stops it.
+        REST's base URL, the publishers' WSDL, and a function that stops the robot.
     """
     body = kind(BUILD, yields=True)
     loop = Loop()

@@ -26,7 +26,7 @@ class NotTakenError(Exception):
 
 @cache
 def components() -> dict[str, Any]:
-    """The schemas of the contract."""
+    """Return the schemas of the contract."""
     found: dict[str, Any] = yaml.safe_load((CONTRACT_DIR / "openapi.yaml").read_text(encoding="utf-8"))["components"]
     return found
 
@@ -37,7 +37,7 @@ def _validator(name: str) -> Draft202012Validator:
 
 
 def from_json(body: bytes) -> Any:
-    """JSON, with what Python takes beyond it refused."""
+    """Return parsed JSON; reject texts that Python's parser accepts beyond JSON, such as NaN."""
 
     def pairs(items: list[tuple[str, Any]]) -> dict[str, Any]:
         if len({name for name, _ in items}) < len(items):
@@ -64,10 +64,10 @@ def from_json(body: bytes) -> Any:
 
 
 def judged(value: Any, schema: str) -> Any:
-    """A value that its schema takes.
+    """Return a value if it is valid by its schema.
 
     Raises:
-        NotTakenError: it does not take it.
+        NotTakenError: the value is not valid.
     """
     try:
         error = next(iter(sorted(_validator(schema).iter_errors(value), key=lambda one: -len(one.absolute_path))), None)
@@ -94,11 +94,11 @@ def _encodable(value: Any) -> None:
 
 
 def safe_xml(body: bytes) -> Any:
-    """The root of a document that declares nothing and exceeds nothing.
+    """Return the root element of an XML document without a DOCTYPE and within the limits on size and depth.
 
     Raises:
-        etree.XMLSyntaxError: it is no XML.
-        NotTakenError: it is not safe.
+        etree.XMLSyntaxError: the body is not XML.
+        NotTakenError: the document has a DOCTYPE or exceeds a limit.
     """
     parser = etree.XMLParser(
         resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, remove_comments=True
@@ -115,10 +115,10 @@ def safe_xml(body: bytes) -> Any:
 
 
 def from_xml(body: bytes, root: str, schema: str) -> Any:
-    """An XML body as the JSON that means the same.
+    """Return the JSON value that an XML body represents.
 
     Raises:
-        NotTakenError: it is none.
+        NotTakenError: the body does not represent a valid value.
     """
     try:
         top = safe_xml(body)
@@ -153,10 +153,10 @@ def _value(element: Any, schema: dict[str, Any], path: str) -> Any:
 
 
 def number(text: str, name: str, *, whole: bool = False) -> float | int:
-    """A number written as text.
+    """Return the number that a text represents.
 
     Raises:
-        NotTakenError: it is none.
+        NotTakenError: the text is not a number.
     """
     pattern = re.compile(r"[+-]?\d{1,99}", re.ASCII) if whole else _NUMBER
     if not pattern.fullmatch(text) or not math.isfinite(float(text)):

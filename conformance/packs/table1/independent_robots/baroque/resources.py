@@ -38,7 +38,7 @@ _ACTIVE_S = 0.5
 
 
 def goal_value(goal: Goal, *, plain: bool = False) -> dict[str, Any]:
-    """A MoveBaseActionGoal; not ``plain``: with fields of its own."""
+    """Return a goal as a MoveBaseActionGoal; unless ``plain``, with fields beyond the contract."""
     header = {"stamp": stamp(goal.stamp), "frame_id": goal.frame}
     code = 1 if time.time() - goal.stamp < 0.05 else 2  # noqa: PLR2004 - s
     status: dict[str, Any] = {"code": code, "text": "on my way"}
@@ -51,10 +51,10 @@ def goal_value(goal: Goal, *, plain: bool = False) -> dict[str, Any]:
 
 
 def plan_value(body: Body, given: dict[str, Any]) -> dict[str, Any]:
-    """A GetPlan response.
+    """Return a GetPlan response.
 
     Raises:
-        NotTakenError: it is asked for in an unknown frame, or there is none.
+        NotTakenError: the frame is unknown, or there is no plan.
     """
     frame = given.get("frame_id", "map")
     if frame not in FRAMES:
@@ -82,7 +82,7 @@ def plan_value(body: Body, given: dict[str, Any]) -> dict[str, Any]:
 
 
 def deliveries(body: Body) -> list[dict[str, Any]]:
-    """The requests accepted last, newest first."""
+    """Return the latest accepted deliveries, newest first."""
     return [
         {
             "request": one.request,
@@ -95,7 +95,7 @@ def deliveries(body: Body) -> list[dict[str, Any]]:
 
 
 def openapi() -> dict[str, Any]:
-    """A description in OpenAPI 3.0, with what the contract asks of it and no schemas."""
+    """Return an OpenAPI 3.0 description with the parts that the contract requires, and no schemas."""
     paths: dict[str, Any] = {}
     for path, methods in METHODS.items():
         paths[path] = {
@@ -130,7 +130,7 @@ def _parameters(path: str) -> list[dict[str, Any]]:
 
 
 def wadl(base: str) -> bytes:
-    """A description in WADL, its resources nested as Jersey nests them."""
+    """Return a WADL description whose resources are nested as Jersey nests them."""
     inner = "".join(_wadl_resource(path.removeprefix("/robot/"), methods) for path, methods in METHODS.items())
     text = (
         '<ns2:application xmlns:ns2="http://wadl.dev.java.net/2009/02" xmlns:xsd="http://www.w3.org/2001/XMLSchema">'

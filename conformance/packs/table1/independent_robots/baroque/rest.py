@@ -30,13 +30,13 @@ _UNACTUATED = (("linear", "y"), ("linear", "z"), ("angular", "x"), ("angular", "
 
 
 class Rest:
-    """Answers REST requests for one body."""
+    """The REST interface of one body."""
 
     def __init__(self, body: Body) -> None:
         self._body = body
 
     def answer(self, ask: Ask) -> Reply:
-        """Answer one request."""
+        """Return the response to a request."""
         described = self._description(ask)
         if described is not None:
             return described
@@ -186,7 +186,7 @@ def _input(ask: Ask, root: str) -> Any:
 
 
 def _wanted(ask: Ask) -> str | None:
-    """The format to answer in: of those with the highest quality the first one (RFC 9110 12.5.1)."""
+    """Return the format for a response: the first one of those with the highest quality (RFC 9110 12.5.1), or None."""
     accept = ask.fields.get("accept", "").strip()
     if not accept:
         return "application/json"
@@ -207,10 +207,10 @@ def _wanted(ask: Ask) -> str | None:
 
 
 def _format(ask: Ask) -> str:
-    """What to answer in.
+    """Return the format for a response.
 
     Raises:
-        NotTakenError: nothing that the client would have.
+        NotTakenError: the client accepts none of the formats.
     """
     format_ = _wanted(ask)
     if format_ is None:

@@ -29,7 +29,7 @@ class Ask:
 
 @dataclass
 class Reply:
-    """An answer: a body given as None has neither length nor media type."""
+    """A response; with None as its body it has neither a length nor a media type."""
 
     status: int
     body: bytes | None = None
@@ -46,7 +46,7 @@ class Loop:
         self._thread.start()
 
     def listen(self, answer: Callable[[Ask], Reply], port: int) -> str:
-        """Serve ``answer`` on loopback. Returns the URL."""
+        """Serve the function ``answer`` on loopback. Return the URL."""
 
         async def listen() -> int:
             server = await asyncio.start_server(lambda r, w: _talk(answer, r, w), "127.0.0.1", port, backlog=128)
@@ -55,7 +55,7 @@ class Loop:
         return f"http://127.0.0.1:{asyncio.run_coroutine_threadsafe(listen(), self._loop).result(10)}"
 
     def stop(self) -> None:
-        """End every connection."""
+        """Close every connection and stop the event loop."""
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(5)
 
@@ -77,7 +77,7 @@ async def _exchange(
     reader: asyncio.StreamReader,
     writer: asyncio.StreamWriter,
 ) -> bool:
-    """One request and its answer. Returns whether the connection can take another."""
+    """Read one request and send its response. Return whether the connection can be used for another request."""
     method = "GET"
     try:
         ask = await _next(connection, reader, writer)
@@ -152,7 +152,7 @@ def _asked(event: h11.Request) -> Ask:
 
 
 def problem(status: int, detail: str, *, xml: bool = False) -> Reply:
-    """An error with every member that RFC 9457 knows."""
+    """Return an error response with every member that RFC 9457 defines."""
     # Imported late: writing.py needs this module's types.
     from conformance.packs.table1.independent_robots.baroque.writing import as_json, as_xml  # noqa: PLC0415
 

@@ -28,7 +28,7 @@ class _Fault(Exception):  # noqa: N818 - a SOAP fault is what it is called
 
 
 class Soap:
-    """Answers SOAP requests for one body.
+    """The SOAP interface of one body.
 
     Attributes:
         base: URL of this server, for the WSDL's address.
@@ -39,7 +39,7 @@ class Soap:
         self.base = ""
 
     def answer(self, ask: Ask) -> Reply:  # noqa: PLR0911 - one for each kind of request
-        """Answer one request."""
+        """Return the response to a request."""
         service = _SERVICES.get(ask.path)
         if service is None:
             return Reply(404, b"?", "text/plain")
@@ -134,7 +134,7 @@ def _schema(service: str) -> Any:
 
 
 def _unqualified(name: str, value: Any) -> str:
-    """An element in no namespace, although its surroundings have a default one."""
+    """Return an element in no namespace, although its parent has a default namespace."""
     element = etree.Element(name)
     fill(element, value, nested=False)
     return etree.tostring(element, encoding="unicode").replace(f"<{name}", f'<{name} xmlns=""', 1)

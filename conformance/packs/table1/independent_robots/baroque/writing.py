@@ -1,4 +1,4 @@
-"""Output in three formats, none of them as anyone else would write it."""
+"""Write values in three formats, each in a valid but unusual notation."""
 
 import json
 from typing import Any
@@ -10,7 +10,7 @@ _ROOTS = {"Sensors": "sensor_list", "NavigationServices": "services", "Deliverie
 
 
 def as_json(value: Any) -> bytes:
-    """JSON: indented, keys in reverse order, characters escaped, floats with an exponent."""
+    """Return JSON: indented, keys in reverse order, characters escaped, floats with an exponent."""
     return _json(value, "\n").encode()
 
 
@@ -29,7 +29,7 @@ def _json(value: Any, indent: str) -> str:
 
 
 def as_xml(root: str, value: Any, *, namespace: str = "") -> bytes:
-    """XML with comments and CDATA; items of an array are nested under its field."""
+    """Return XML with comments and CDATA; items of an array are nested under its field."""
     top = etree.Element(
         f"{{{namespace}}}{root}" if namespace else _ROOTS.get(root, root), nsmap={"unused": "urn:example:unused"}
     )
@@ -66,6 +66,6 @@ def fill(element: Any, value: Any, namespace: str = "", *, nested: bool = True) 
 
 
 def as_text(value: Any) -> bytes:
-    """YAML in flow style where it is short, with the marker that ros2 topic echo prints after each message."""
+    """Return YAML, in flow style where it is short, with the marker that ros2 topic echo prints after each message."""
     text: str = yaml.safe_dump(value, default_flow_style=None, sort_keys=True, width=60, allow_unicode=False)
     return f"{text}---\n".encode()

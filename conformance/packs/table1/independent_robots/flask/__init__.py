@@ -1,8 +1,9 @@
 """A robot on Flask behind gunicorn, one process with threads because its state is in memory.
 
-Flask redirects what lacks its slash or has two in a row; gunicorn, with its defaults, refuses heads by pages of its
-own. It takes request lines of 4,094 octets, and what came of a chunked request whose client vanished counts as whole:
-`http/target-length` and `safety/client-vanished`, both SHOULD, warn of that, and the robot conforms all the same.
+Flask redirects paths without their final slash or with two slashes in a row; gunicorn, with its defaults, rejects
+malformed requests with its own error pages. gunicorn accepts request lines of 4,094 bytes, and treats a chunked request
+whose client vanished as complete: `http/target-length` and `safety/client-vanished`, both SHOULD, warn of that, and the
+robot conforms all the same.
 """
 
 import subprocess
@@ -15,7 +16,7 @@ _THREADS = 16
 
 
 def serve(rest_port: int, _soap_port: int) -> tuple[str, str, Callable[[], None]]:
-    """Start the robot. Returns REST's base URL, no WSDL and what stops it."""
+    """Start the robot. Return REST's base URL, an empty WSDL address, and a function that stops the robot."""
     sock, rest = bound(rest_port)
     command = [sys.executable, "-m", "gunicorn", "--bind", f"fd://{sock.fileno()}", "--threads", str(_THREADS)]
     command += ["--log-level", "critical"]

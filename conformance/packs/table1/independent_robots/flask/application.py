@@ -40,7 +40,7 @@ for _path, _methods in resources().items():
 
 @application.before_request
 def _one_host() -> None:
-    """Refuse what has no Host field or several ones, which WSGI joins by commas (RFC 9112 3.2)."""
+    """Reject a request without a Host field or with several, which WSGI joins with commas (RFC 9112 3.2)."""
     host = flask.request.environ.get("HTTP_HOST", "")
     if not host or "," in host:
         raise BadRequest("Host is not there once")
@@ -48,7 +48,7 @@ def _one_host() -> None:
 
 @application.errorhandler(HTTPException)
 def _refused(error: HTTPException) -> flask.Response:
-    """Flask's own errors as problems, with the header fields that belong to them."""
+    """Turn Flask's own errors into problems, and keep their header fields."""
     response = _response(problem(error.code or 500, error.description, message(flask.request.headers)))
     for name, value in error.get_headers(flask.request.environ):
         if name.lower() not in {"content-type", "content-length"}:

@@ -1,4 +1,4 @@
-"""A robot on Starlette behind hypercorn: h11's pages for what is no HTTP, Starlette's redirects for missing slashes."""
+"""A robot on Starlette behind hypercorn: h11's error pages, and Starlette's redirects for missing slashes."""
 
 import asyncio
 import threading
@@ -22,7 +22,7 @@ _View = Callable[[Request], Awaitable[Response]]
 
 
 def serve(rest_port: int, _soap_port: int) -> tuple[str, str, Callable[[], None]]:
-    """Start the robot. Returns REST's base URL, no WSDL and what stops it."""
+    """Start the robot. Return REST's base URL, an empty WSDL address, and a function that stops the robot."""
     sock, rest = bound(rest_port)
     config = Config()
     config.bind = [f"fd://{sock.detach()}"]
@@ -83,7 +83,7 @@ def _view(methods: dict[str, Handler], allowed: str) -> _View:
 
 
 async def _refused(request: Request, error: Exception) -> Response:
-    """Starlette's own errors as problems, with the header fields that belong to them."""
+    """Turn Starlette's own errors into problems, and keep their header fields."""
     if not isinstance(error, HTTPException):
         raise error
     answer = problem(error.status_code, error.detail, message(request.headers.items()))

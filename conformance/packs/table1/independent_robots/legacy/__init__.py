@@ -18,7 +18,7 @@ from conformance.packs.table1.independent_robots.legacy.services import Delivery
 
 
 def serve(rest_port: int, soap_port: int) -> tuple[str, str, Callable[[], None]]:
-    """Start the robot. Returns REST's base URL, the publishers' WSDL and what stops it."""
+    """Start the robot. Return REST's base URL, the publishers' WSDL, and a function that stops the robot."""
     rest_at, stop_rest = start(Delivery(), rest_port)
     soap = Soap()
     soap.base, stop_soap = start(soap, soap_port)

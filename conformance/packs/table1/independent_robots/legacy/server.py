@@ -11,11 +11,11 @@ class _Handler(WSGIRequestHandler):
     timeout = 20
 
     def get_environ(self) -> dict[str, Any]:
-        """Keep the target as it was sent, since WSGI's PATH_INFO loses what was escaped."""
+        """Add the target as it was sent, because WSGI's PATH_INFO has lost its escapes."""
         return {**super().get_environ(), "TARGET": self.path}
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - http.server's own name
-        """Say nothing."""
+        """Log nothing."""
 
 
 class _Server(ThreadingMixIn, WSGIServer):
@@ -23,11 +23,11 @@ class _Server(ThreadingMixIn, WSGIServer):
     request_queue_size = 128
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A connection that broke is the client's affair."""
+        """Ignore a connection that the client has broken."""
 
 
 def start(application: Any, port: int) -> tuple[str, Callable[[], None]]:
-    """Serve a WSGI application on loopback. Returns its URL and what stops it."""
+    """Serve a WSGI application on loopback. Return its URL and a function that stops the server."""
     server = make_server("127.0.0.1", port, application, server_class=_Server, handler_class=_Handler)
     threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True).start()
 

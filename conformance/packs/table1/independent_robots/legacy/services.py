@@ -35,13 +35,13 @@ def _java_double(text: str) -> float | None:
 
 
 class Delivery:
-    """REST: one resource, as a WSGI application."""
+    """The REST interface: one resource, as a WSGI application."""
 
     def __init__(self) -> None:
         self.accepted: list[tuple[int, list[float]]] = []
 
     def __call__(self, environ: dict[str, Any], start: Callable[..., Any]) -> Iterable[bytes]:
-        """Answer one request."""
+        """Respond to a request."""
         found = _PATH.fullmatch(environ["TARGET"].partition("?")[0])
         if found is None:
             return _page(start, 404)
@@ -59,7 +59,7 @@ class Delivery:
 
 
 class Soap:
-    """SOAP: one service, as a WSGI application.
+    """A SOAP service, as a WSGI application.
 
     Attributes:
         base: URL of this server, for the WSDL's address.
@@ -70,7 +70,7 @@ class Soap:
         self.accepted: list[dict[str, float]] = []
 
     def __call__(self, environ: dict[str, Any], start: Callable[..., Any]) -> Iterable[bytes]:
-        """Answer one request."""
+        """Respond to a request."""
         path, _, query = environ["TARGET"].partition("?")
         if path != "/turtlesim_publisher_ws":
             return _page(start, 404)

@@ -36,7 +36,7 @@ BUILD = Build(
 
 
 def serve(rest_port: int, soap_port: int) -> tuple[str, str, Callable[[], None]]:
-    """Start the robot. Returns REST's base URL, the publishers' WSDL and what stops it."""
+    """Start the robot. Return REST's base URL, the publishers' WSDL, and a function that stops the robot."""
     body = Body(BUILD)
     rest_at, stop_rest = start(Rest(body), rest_port)
     soap = Soap(body)

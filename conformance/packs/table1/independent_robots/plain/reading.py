@@ -1,4 +1,4 @@
-"""Input: JSON and XML into plain values, checked against a shape; what does not fit is refused by name and value."""
+"""Parse JSON and XML into plain values by a shape; errors name the field and value that do not fit."""
 
 from __future__ import annotations
 
@@ -49,10 +49,10 @@ PLAN = {
 
 
 class RefusedError(Exception):
-    """Input that is not taken.
+    """Raised for input that the robot rejects.
 
     Args:
-        status: what HTTP says of it.
+        status: the response's HTTP status.
         detail: names the offending field and value.
     """
 
@@ -72,12 +72,12 @@ class Element:
 
     @property
     def namespace(self) -> str:
-        """Its namespace, empty where it has none."""
+        """Return the element's namespace, or an empty string."""
         return self.name.rpartition(" ")[0]
 
     @property
     def local(self) -> str:
-        """Its name without the namespace."""
+        """Return the element's name without its namespace."""
         return self.name.rpartition(" ")[2]
 
 
@@ -158,10 +158,10 @@ def _shown(value: Any) -> str:
 
 
 def fit(value: Any, shape: Any, path: str = "") -> Any:
-    """Fit a JSON value to a shape: a dict of fields (``?`` marks those that may be left out) or a simple type's name.
+    """Return a JSON value that fits a shape: a dict of fields (``?`` marks optional ones) or a simple type's name.
 
     Raises:
-        RefusedError: it does not fit.
+        RefusedError: the value does not fit.
     """
     if isinstance(shape, dict):
         if not isinstance(value, dict):
@@ -204,10 +204,10 @@ def _simple(value: Any, type_: str, path: str) -> Any:
 def fit_element(  # noqa: C901 - one rule after another
     element: Element, shape: Any, path: str, *, ordered: bool
 ) -> Any:
-    """Fit an XML element's content to a shape, as fit() does; ``ordered`` asks for a sequence as XML Schema has it.
+    """Return an XML element's content as fit() does; ``ordered`` requires the order of an XML Schema sequence.
 
     Raises:
-        RefusedError: it does not fit.
+        RefusedError: the content does not fit.
     """
     for name, value in element.attributes.items():
         if name not in _HARMLESS:
@@ -239,10 +239,10 @@ def fit_element(  # noqa: C901 - one rule after another
 
 
 def number(text: str, name: str, *, integer: bool = False, pattern: re.Pattern[str] = NUMBER) -> float | int:
-    """A number written as text.
+    """Return the number that a text represents.
 
     Raises:
-        RefusedError: it is none, or not finite.
+        RefusedError: the text is not a number, or the number is not finite.
     """
     if integer:
         if not _INTEGER.fullmatch(text) or len(text) > 200:  # noqa: PLR2004 - no int has that many digits

@@ -41,10 +41,11 @@ DELIVERY = (
 
 
 class Rest:
-    """Answers REST requests for one body.
+    """The REST interface of one body.
 
     Attributes:
-        resources: by path without parameters, by method: what answers headers, body and target, or raises RefusedError.
+        resources: by path without parameters and by method, a function of headers, body and target that returns the
+            response or raises RefusedError.
     """
 
     def __init__(self, body: Body) -> None:
@@ -66,7 +67,7 @@ class Rest:
         }
 
     def answer(self, method: str, target: str, headers: Message, body: bytes) -> Answer:
-        """Answer one request; what is refused becomes a problem."""
+        """Return the response to a request; a rejected request gets a problem."""
         try:
             answer = self._answer(method, target, headers, body)
         except RefusedError as refused:
@@ -189,7 +190,7 @@ class Rest:
         """Accept a delivery.
 
         Raises:
-            RefusedError: its path has something that is no number, or no code.
+            RefusedError: the path has a text that is not a number, or an unknown code.
         """
         found = _DELIVERY.fullmatch(target.partition("?")[0])
         code, *texts = [unquote(text) for text in (found.groups() if found else ())]
@@ -213,7 +214,7 @@ class Rest:
 
 
 def refusal(refused: RefusedError, headers: Message) -> Answer:
-    """A problem, in XML where the client wants that."""
+    """Return a problem, as XML if the client prefers XML."""
     document, fields = {"status": refused.status, "detail": str(refused)}, {"Vary": "Accept"}
     if choose(_accept(headers)) == "application/xml":
         document["detail"] = _printable(str(refused))
@@ -234,7 +235,7 @@ def deliver(body: Body, interface: str, code: float, values: list[float]) -> Non
 
 
 def goal_value(goal: Goal) -> dict[str, Any]:
-    """A MoveBaseActionGoal."""
+    """Return a goal as a MoveBaseActionGoal."""
     since, header = stamp(goal.stamp), {"stamp": stamp(goal.stamp), "frame_id": goal.frame}
     return {
         "header": header,
@@ -245,10 +246,10 @@ def goal_value(goal: Goal) -> dict[str, Any]:
 
 
 def plan_value(body: Body, given: dict[str, Any]) -> dict[str, Any]:
-    """A GetPlan response.
+    """Return a GetPlan response.
 
     Raises:
-        RefusedError: the frame is not known, or there is no plan.
+        RefusedError: the frame is unknown, or there is no plan.
     """
     frame = given.get("frame_id", "map")
     if frame not in _FRAMES:
@@ -268,10 +269,10 @@ def plan_value(body: Body, given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _format(headers: Message) -> str:
-    """What to answer in.
+    """Return the format for a response.
 
     Raises:
-        RefusedError: nothing that the client would have.
+        RefusedError: the client accepts none of the formats.
     """
     format_ = choose(_accept(headers))
     if format_ is None:

@@ -1,4 +1,4 @@
-"""HTTP/1.0 on http.server, one thread and one connection for each request."""
+"""An HTTP/1.0 server on http.server, with one thread and one connection for each request."""
 
 import contextlib
 import json
@@ -20,7 +20,7 @@ _LINGER_S = 2.0
 
 @dataclass
 class Answer:
-    """What to answer: a status, a body with its media type, further header fields."""
+    """A response: a status, a body with its media type, further header fields."""
 
     status: int
     body: bytes = b""
@@ -29,14 +29,14 @@ class Answer:
 
 
 class Application(Protocol):
-    """What answers requests."""
+    """An object that responds to requests."""
 
     def answer(self, method: str, target: str, headers: Message, body: bytes) -> Answer:
-        """Answer one request."""
+        """Return the response to a request."""
 
 
 def origin_form(target: str) -> str:
-    """A target without scheme and authority, where it has them (RFC 9112 3.2.2)."""
+    """Return a request target without scheme and authority (RFC 9112 3.2.2)."""
     scheme, separator, rest = target.partition("://")
     return f"/{rest.partition('/')[2]}" if separator and scheme.lower() in {"http", "https"} else target
 
@@ -66,7 +66,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(answer)
 
     def _refusal(self) -> tuple[int, str] | None:
-        """Why the request's head is not good enough (RFC 9112 3.2, 6.1, 6.3)."""
+        """Return status and reason for rejecting the request's head (RFC 9112 3.2, 6.1, 6.3), or None."""
         hosts = self.headers.get_all("Host") or []
         lengths = set(self.headers.get_all("Content-Length") or [])
         if len(hosts) > 1 or (not hosts and self.request_version != "HTTP/1.0"):
@@ -82,7 +82,7 @@ class _Handler(BaseHTTPRequestHandler):
         return None
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """Answer what http.server itself, or the head's check, refuses."""
+        """Send the response to a request that http.server, or the check of the head, rejects."""
         self.request_version = "HTTP/1.0"  # a line that could not be read counts as HTTP/0.9, which has no status
         document = {"status": int(code), "detail": message or explain or "refused"}
         if not hasattr(self, "headers"):
@@ -103,7 +103,7 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.write(answer.body)
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - http.server's own name
-        """Say nothing."""
+        """Log nothing."""
 
 
 class _Server(ThreadingHTTPServer):
@@ -111,7 +111,7 @@ class _Server(ThreadingHTTPServer):
     request_queue_size = 128
 
     def shutdown_request(self, request: Any) -> None:
-        """Close in stages: what is closed with octets unread is reset, and takes the answer with it (RFC 9112 9.6)."""
+        """Close in stages: a connection closed with unread bytes is reset, and the response is lost (RFC 9112 9.6)."""
         with contextlib.suppress(OSError):
             request.shutdown(socket.SHUT_WR)
             request.settimeout(_LINGER_S)
@@ -121,11 +121,11 @@ class _Server(ThreadingHTTPServer):
         self.close_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A connection that broke is the client's affair."""
+        """Ignore a connection that the client has broken."""
 
 
 def start(application: Application, port: int) -> tuple[str, Callable[[], None]]:
-    """Serve an application on loopback. Returns its URL and what stops it."""
+    """Serve an application on loopback. Return its URL and a function that stops the server."""
     handler = type("Handler", (_Handler,), {"application": application})
     server = _Server(("127.0.0.1", port), handler)
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True)

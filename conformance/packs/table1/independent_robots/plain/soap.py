@@ -30,7 +30,7 @@ class _FaultError(Exception):
 
 
 class Soap:
-    """Answers SOAP requests for one body.
+    """The SOAP interface of one body.
 
     Attributes:
         base: URL of this server, for the WSDL's address.
@@ -41,7 +41,7 @@ class Soap:
         self.base = ""
 
     def answer(self, method: str, target: str, headers: Message, body: bytes) -> Answer:  # noqa: PLR0911 - one for each kind
-        """Answer one request."""
+        """Return the response to a request."""
         path, _, query = target.partition("?")
         if path not in _SERVICES:
             return Answer(404, b"not here", "text/plain")
@@ -63,7 +63,7 @@ class Soap:
         return _enveloped(200, content)
 
     def _envelope(self, body: bytes, *, reading: bool) -> str:
-        """Process an envelope (SOAP 1.1 section 4); the order of its faults is WS-I R2725's."""
+        """Process an envelope (SOAP 1.1 section 4), faults in the order of WS-I R2725; return the response."""
         top = parse_xml(body)
         if top.local == "Envelope" and top.namespace != _SOAP:
             raise _FaultError("VersionMismatch", f"this is SOAP 1.1, not {top.namespace!r}")

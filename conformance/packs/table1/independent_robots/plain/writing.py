@@ -1,4 +1,4 @@
-"""Output: one value as JSON, XML or YAML, and which of them a client wants."""
+"""Write a value as JSON, XML or YAML, and choose the format that the client accepts."""
 
 import json
 from typing import Any
@@ -10,7 +10,7 @@ FORMATS = ("application/json", "application/xml", "text/plain")
 
 
 def choose(accept: str | None) -> str | None:
-    """The media type to send for an Accept field (RFC 9110 12.5.1); None: no one that is acceptable."""
+    """Return the media type to send for an Accept field (RFC 9110 12.5.1), or None if none is acceptable."""
     if accept is None or not accept.strip():
         return FORMATS[0]
     ranges: list[tuple[str, float]] = []
@@ -38,7 +38,7 @@ def _quality(format_: str, ranges: list[tuple[str, float]]) -> float:
 
 
 def written(value: Any, root: str, format_: str) -> bytes:
-    """A value in a format."""
+    """Return a value in a format."""
     if format_ == "application/xml":
         return f'<?xml version="1.0" encoding="UTF-8"?>{element(root, value)}'.encode()
     if format_ == "text/plain":
@@ -47,7 +47,7 @@ def written(value: Any, root: str, format_: str) -> bytes:
 
 
 def as_json(value: Any) -> bytes:
-    """JSON in which whole floats are integers."""
+    """Return JSON in which whole floats are written as integers."""
     return json.dumps(_whole(value), separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
 
 
@@ -62,7 +62,7 @@ def _whole(value: Any) -> Any:
 
 
 def element(name: str, value: Any) -> str:
-    """XML; items of a list under a field repeat the field's element, those of a bare list are called item."""
+    """Return XML; items of a list in a field repeat the field's element, those of a bare list are called item."""
     if isinstance(value, dict):
         inner = "".join(
             "".join(element(key, item) for item in part) if isinstance(part, list) else element(key, part)
@@ -106,12 +106,12 @@ def _scalar(value: Any) -> str:
 
 
 def _quoted(char: str) -> str:
-    """A character inside YAML's double quotes."""
+    """Return a character as it is written inside YAML's double quotes."""
     if char in '"\\':
         return "\\" + char
     return char if char == " " or char.isprintable() else f"\\U{ord(char):08x}"
 
 
 def _carried(text: str) -> str:
-    """Text without the characters that XML 1.0 cannot carry (2.2)."""
+    """Return a text without the characters that XML 1.0 does not allow (2.2)."""
     return "".join(char if char in "\t\n\r" or (char >= " " and char not in "\ufffe\uffff") else "?" for char in text)
