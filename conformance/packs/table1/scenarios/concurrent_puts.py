@@ -1,6 +1,6 @@
-"""Several clients that put at one moment: one goal, different goals, different velocities.
+"""Several clients that PUT at the same moment: one goal, different goals, different velocities.
 
-Where the robot does not respond to a request, there is no trace: the one requirement of the scenario fails by that.
+Where the robot does not respond to a request, there is no trace, and the scenario's requirement fails by that.
 """
 
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ _SHARES: Final = ((0.5, -0.5), (-0.5, 0.5), (0.17, 0.17))
 
 @scenario(needs={Need.REST, Need.MOTION})
 def concurrent_goal(robot: Robot, effort: Effort) -> tuple[ConcurrentGoal, ...]:
-    """Put one new goal by several clients at one moment, then cancel it, again and again."""
+    """PUT one new goal from several clients at the same moment, then cancel it; repeat."""
     pose = choose_goals(robot, 1.5, 1)[0]
     trace: list[ConcurrentGoal] = []
     for turn in range(effort.cases(20)):
@@ -58,7 +58,7 @@ def concurrent_goal(robot: Robot, effort: Effort) -> tuple[ConcurrentGoal, ...]:
 
 
 def _after_cancel(robot: Robot, body: dict[str, Any]) -> tuple[GoalRead, ...]:
-    """Read for a while whether a cancelled goal goes on as another one; the robot may have a goal of its own."""
+    """Read the goal for a while after a cancel: a second copy of the cancelled goal would now be active."""
     reads: list[GoalRead] = []
     for _ in poll_for(robot.clock, _GOAL_STEP_S, _WATCHED_S):
         goal, exchange = robot.goal()
@@ -70,7 +70,7 @@ def _after_cancel(robot: Robot, body: dict[str, Any]) -> tuple[GoalRead, ...]:
 
 @scenario(needs={Need.REST, Need.MOTION})
 def concurrent_goals(robot: Robot, effort: Effort) -> tuple[GoalRead, ...]:
-    """Put different goals by several clients at one moment, and read which is active, again and again."""
+    """PUT different goals from several clients at the same moment, and read which one is active; repeat."""
     poses = choose_goals(robot, 1.5, _CLIENTS)
     reads: list[GoalRead] = []
     for turn in range(effort.cases(20)):
@@ -93,7 +93,7 @@ def concurrent_goals(robot: Robot, effort: Effort) -> tuple[GoalRead, ...]:
 
 @scenario(needs={Need.REST, Need.MOTION})
 def concurrent_velocities(robot: Robot, effort: Effort) -> tuple[ConcurrentVelocities, ...]:
-    """Put different velocities by several clients at one moment, and read which the robot reaches, again and again."""
+    """PUT different velocities from several clients at the same moment, and read which one the robot reaches."""
     velocities = [robot.share_of_limits(*shares) for shares in _SHARES]
     trace: list[ConcurrentVelocities] = []
     for _ in range(1 if effort.name == "quick" else 4):
@@ -106,7 +106,7 @@ def concurrent_velocities(robot: Robot, effort: Effort) -> tuple[ConcurrentVeloc
 
 
 def _put_velocities(robot: Robot, velocities: Sequence[Velocity], *, last: bool) -> ConcurrentVelocities:
-    """Put velocities at one moment, and read the velocity until it is one of them, or may have ended by itself."""
+    """PUT velocities at the same moment, and read until the robot reaches one, or it may have ended by itself."""
     sent = robot.clock.now()
     attempts = _put_together(robot, VELOCITY, [velocity.twist for velocity in velocities])
     accepted = tuple(
@@ -128,5 +128,5 @@ def _put_velocities(robot: Robot, velocities: Sequence[Velocity], *, last: bool)
 
 
 def _put_together(robot: Robot, path: str, values: Sequence[dict[str, Any]]) -> list[Attempt]:
-    """Send each value by a client of its own, all at one moment."""
+    """PUT each value from its own client, all at the same moment."""
     return send_together([[Outgoing(robot.rest, "PUT", path, JSON_BODY, body_of(value)) for value in values]])[0]

@@ -1,4 +1,4 @@
-"""The life of a goal: put, read, repeated, contradicted, displaced by another one, and cancelled."""
+"""The life of a goal: sent, read, repeated, contradicted, replaced by another one, and cancelled."""
 
 from dataclasses import dataclass, field, replace
 from http import HTTPStatus
@@ -56,7 +56,7 @@ class _Player:
     life: GoalLife = field(default_factory=GoalLife)
 
     def play(self, standstill: Standstill) -> None:
-        """Play it."""
+        """Play the scenario."""
         robot = self.robot
         self._no_goal()
         there, back = choose_goals(robot, 1.5, 2)
@@ -95,13 +95,13 @@ class _Player:
         )
 
     def _no_goal(self) -> None:
-        """Read and cancel where there is no goal."""
+        """Read and cancel the goal while the robot has none."""
         for _ in range(_TIMES):
             none = NoGoal(await_none(self.robot), self.robot.delete_goal())
             self.life = replace(self.life, none=(*self.life.none, none))
 
     def _put(self, body: dict[str, Any], pose: Pose) -> Put:
-        """Put a goal that is new, and wait until the robot shows it."""
+        """PUT a new goal, and wait until the robot shows it."""
         exchange = put_goal(self.robot, body)
         if exchange.response.status not in NEW | REPEATED:
             return Put(exchange, body, None, exchange, "", ended=False)
@@ -109,14 +109,14 @@ class _Player:
         return Put(exchange, body, goal, read, problem, ended=goal is None and arrived(self.robot, pose))
 
     def _put_beside(self, body: dict[str, Any], active: dict[str, Any]) -> tuple[Put, bool]:
-        """Put a goal under the active one's id; return that, and whether no goal is shown any more."""
+        """PUT a goal under the active goal's id; return the record, and whether the robot now shows no goal."""
         exchange = put_goal(self.robot, body)
         goal, read = self.robot.goal()
         differs = read.came if goal is None else difference(goal, active)
         return Put(exchange, body, goal, read, differs, ended=False), goal is None
 
     def _repeat(self, body: dict[str, Any], there: Pose) -> bool:
-        """Put the active goal again; return whether it was active: it may have ended ``there`` before."""
+        """PUT the active goal again; return whether it was still active, as it may have ended ``there`` before."""
         for turn in range(_TIMES):
             put, none = self._put_beside(body, body)
             if none and arrived(self.robot, there):
@@ -125,7 +125,7 @@ class _Player:
         return True
 
     def _contradict(self, body: dict[str, Any], other: dict[str, Any], there: Pose) -> bool:
-        """Put another pose under the active goal's id; return whether the goal was active: it may have ended."""
+        """PUT another pose under the active goal's id; return whether the goal was still active: it may have ended."""
         put, none = self._put_beside(other, body)
         if (put.exchange.response.status != HTTPStatus.CONFLICT or none) and arrived(self.robot, there):
             return False
@@ -143,7 +143,7 @@ class _Player:
         self.life = replace(self.life, velocity=exchange, drive=drive.trace)
 
     def _displace(self, body: dict[str, Any], pose: Pose) -> None:
-        """Put another goal, without an id, while one is active."""
+        """PUT another goal, without an id, while one is active."""
         second = self._put(body, pose)
         renamed = None
         if second.exchange.response.status not in NEW | REPEATED:
@@ -153,7 +153,7 @@ class _Player:
         self.life = replace(self.life, second=second, renamed=renamed)
 
     def _cancel(self, pose: Pose) -> bool:
-        """Cancel the active goal; return whether there was one: it may have ended at its ``pose``."""
+        """Cancel the active goal; return whether there was one, as it may have ended at its ``pose``."""
         cancelled = cancel(self.robot)
         if cancelled.exchange.response.status == HTTPStatus.NOT_FOUND and arrived(self.robot, pose):
             return False
@@ -162,7 +162,7 @@ class _Player:
 
 
 def cancel(robot: Robot) -> Cancelled:
-    """Cancel the active goal, and wait until there is none and the robot stands still."""
+    """Cancel the active goal, and wait until the robot has no goal and stands still."""
     drive = Drive(robot)
     exchange = robot.delete_goal(RATHER_XML)
     answered = robot.clock.now()
@@ -194,7 +194,7 @@ def slow_turn(robot: Robot) -> Velocity:
 
 
 def await_motion(robot: Robot) -> None:
-    """Wait a little until the robot moves, so that there is something to cancel."""
+    """Wait a little until the robot moves, so that a cancel has an effect."""
     for _ in poll_for(robot.clock, _STEP_S, min(1.0, robot.settle_s)):
         velocity, _ = robot.velocity()
         if velocity is None or not robot.near(velocity, STILL, 3):

@@ -1,4 +1,4 @@
-"""A goal that is driven to: it ends there, is then no longer current, and its id can be used again."""
+"""A goal that the robot reaches: it ends there, is then no longer active, and its id can be used again."""
 
 from dataclasses import dataclass, replace
 from http import HTTPStatus
@@ -37,7 +37,7 @@ _TURNED_RAD: Final = 0.05
 
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.DRIVE)
 def goal_reached(robot: Robot, effort: Effort, _prepared: None) -> GoalReached:
-    """Put a goal nearby, wait until the robot is there, and put the same goal again."""
+    """PUT a goal nearby, wait until the robot is there, and PUT the same goal again."""
     here = robot.map_pose()
     if here is None:
         raise NotPossibleError("the robot's pose cannot be read")
@@ -59,7 +59,7 @@ def goal_reached(robot: Robot, effort: Effort, _prepared: None) -> GoalReached:
 
 
 def _turning_before(robot: Robot, effort: Effort) -> Command | None:
-    """Command a velocity just before the goal; return None where that would show nothing, or costs too much time."""
+    """Command a velocity just before the goal; return None if that shows nothing or takes too much time."""
     limits = robot.limits
     turning = Velocity(angular_z=0.4 * limits.angular_rad_s)
     seen_from_rest = limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s
@@ -94,7 +94,7 @@ class _Way:
 
     @property
     def recorded(self) -> GoalReached:
-        """What was recorded so far."""
+        """Return the record so far."""
         return replace(self.trace, drive=self.drive.whole)
 
     def drive_to(self, there: Pose, start: Pose, longest_s: float) -> None:
@@ -138,7 +138,7 @@ class _Way:
         )
 
     def look_back(self, start: Pose, before: Command | None, body: dict[str, Any]) -> None:
-        """Watch, after a goal was reached, for the velocity from before it; request a plan back; put the goal again."""
+        """Watch, after a goal was reached, for the velocity from before it; request a plan back; PUT the goal again."""
         trace, robot = self.trace, self.robot
         if trace.undecided or not trace.ended or trace.left_m >= trace.reached_m or trace.way_m <= trace.has_to_m:
             return
@@ -155,7 +155,7 @@ class _Way:
         robot.delete_goal()
 
     def _watch_for(self, before: Command) -> None:
-        """Watch whether a velocity from before the goal, which has ended on the way, is taken up again at the goal."""
+        """Watch at the goal whether the robot resumes a velocity from before the goal, which has ended on the way."""
         limits, drive = self.robot.limits, Drive(self.robot)
         if limits.hold_s is None or drive.clock.now() < before.answered + 1.5 * limits.hold_s + limits.settle_s:
             return

@@ -28,7 +28,7 @@ _UNREADABLE: Final = "the robot's pose cannot be read"
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.RESTING)
 def plans_from_robot(robot: Robot, explore: Explorer) -> PlansFromRobot:
-    """Request plans from where the robot is to poses around it, near and farther."""
+    """Request plans from the robot's pose to poses around it, near and farther."""
     here = _here(robot)
     found = reachable(robot, here, robot.statement.motion.radius_m)
     if not found:
@@ -63,7 +63,7 @@ def plans_from_robot(robot: Robot, explore: Explorer) -> PlansFromRobot:
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.RESTING)
 def plans_from_start(robot: Robot, explore: Explorer) -> PlansFromStart:
-    """Request plans from a start in the request, also without all that has a default."""
+    """Request plans from a start in the request, also without the parameters that have a default."""
     starts = reachable(robot, _here(robot), max(1.0, robot.statement.motion.radius_m), 3)
     if len(starts) < 2:  # noqa: PLR2004 - a start and a goal
         raise NotPossibleError("the robot has no plan to two poses around it")
@@ -83,7 +83,7 @@ def plans_from_start(robot: Robot, explore: Explorer) -> PlansFromStart:
 
 
 def _by_default(robot: Robot, start: Pose, goal: Pose) -> DefaultPlan | None:
-    """Request a plan with and without the defaults; return None where the robot has no plan with them."""
+    """Request a plan with and without default values in the request; return None if there is no plan with them."""
     given = {"x": goal.x, "y": goal.y, "start_x": start.x, "start_y": start.y}
     explicit, _ = robot.read(query(**given, yaw=0.0, frame_id="map", tolerance=_DEFAULT_TOLERANCE_M), GET_PLAN)
     exchange = robot.get(query(**given))
@@ -105,7 +105,7 @@ def plans_in_frames(robot: Robot) -> tuple[FramePlan, ...]:
 
 
 def _in_frame(robot: Robot, frame: str, begin: Pose, *, known: bool) -> FramePlan:
-    """Request a plan to a pose beside ``begin``, where the robot is in the frame, if the frame is known."""
+    """Request a plan in a frame, to a pose 0.3 m beside ``begin``; ``known`` says that the robot knows the frame."""
     goal = begin._replace(x=begin.x + 0.3)
     exchange = robot.get(query(x=goal.x, y=goal.y, frame_id=frame))
     message, problem = read_as(exchange.response, GET_PLAN)

@@ -40,7 +40,7 @@ class _Player:
     goals: RefusedGoals = field(default_factory=RefusedGoals)
 
     def play(self, near: Pose) -> None:
-        """Play it with a pose that the robot can reach."""
+        """Play the scenario with a pose that the robot can reach."""
         robot, frame = self.robot, self.robot.statement.motion.frame
         for length in _NOT_UNIT:
             put = self._put_invalid(goal_body(near, frame, length=length), f"a quaternion of length {length:g}")
@@ -59,14 +59,14 @@ class _Player:
         self.goals = replace(self.goals, far=self._put_far(frame))
 
     def _put_invalid(self, body: dict[str, Any], special: str) -> SpecialGoal:
-        """Put a goal, and cancel it if the robot accepts it."""
+        """PUT an invalid goal, and cancel it if the robot accepts it."""
         exchange = put_goal(self.robot, body)
         if exchange.response.status < HTTPStatus.BAD_REQUEST:
             self.robot.delete_goal()
         return SpecialGoal(special, exchange)
 
     def _put_far(self, frame: str) -> tuple[FarGoal, ...]:
-        """Put goals outside every map, until one stays active."""
+        """PUT goals outside every map, until one stays active."""
         far: list[FarGoal] = []
         for pose in _FAR:
             exchange, read = put_goal(self.robot, goal_body(pose, frame)), None

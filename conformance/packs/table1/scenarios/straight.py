@@ -1,4 +1,4 @@
-"""Driving straight ahead and back: hardly at all, and as fast as the robot says that it can."""
+"""Driving straight ahead and back: very slowly, and at the highest declared speed."""
 
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.goals import make_room
@@ -11,7 +11,7 @@ from conformance.scenarios.stage import Need
 
 @scenario(needs={Need.REST, Need.MOTION})
 def straight(robot: Robot) -> Driven:
-    """Drive ahead for less than a second, back to where it began, and stop."""
+    """Drive ahead for less than a second, back to the start, and stop."""
     if not robot.actuated(0):
         raise NotPossibleError("the statement says that the robot cannot drive straight ahead")
     make_room(robot)

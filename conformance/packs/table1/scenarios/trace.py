@@ -12,8 +12,8 @@ class Driven:
 
     Attributes:
         drive: all commands and readings.
-        let_go: for each velocity that was left to itself, every try to see how long it holds.
-        ends_s: within so long a velocity that is not renewed has to end, s.
+        let_go: for each velocity that was not renewed, every measurement of how long it holds.
+        ends_s: time within which a velocity that is not renewed must end, s.
         not_tested: why a requirement could not be tested, by its id.
     """
 

@@ -1,4 +1,4 @@
-"""Turning: as fast as the robot can, renewed whatever is refused, bent into an arc, and at last left to itself."""
+"""Turning: at the highest speed, renewed also after rejected commands, along an arc, and at last not renewed."""
 
 import math
 import random
@@ -45,7 +45,7 @@ def turn(robot: Robot, run: Run) -> Driven:
 
 
 def _further(robot: Robot, run: Run) -> list[Velocity]:
-    """Return velocities at the ends of the range, which hold as long as others: one of them, by the seed, or both."""
+    """Return velocities at the limits, which must hold as long as others: one chosen by the seed, or both."""
     limits = robot.limits
     if limits.hold_s is None:
         return []
@@ -57,7 +57,7 @@ def _further(robot: Robot, run: Run) -> list[Velocity]:
 
 
 def _fast_left(robot: Robot) -> Velocity:
-    """Return the fastest turn to the left: also ahead, or back where there is no room, where the limits say so."""
+    """Return the fastest turn to the left, combined with the fastest drive where limits are declared for both."""
     ahead = 0.0
     if robot.actuated(0) and robot.limit_declared(0) and robot.limit_declared(5):
         ahead = direction(robot) * fastest(robot, 0)
@@ -79,7 +79,7 @@ class _Turning:
 
     @property
     def recorded(self) -> Driven:
-        """What was recorded so far."""
+        """Return the record so far."""
         return Driven(self.drive.whole, tuple(self.tries), tuple(self.not_tested), self._ends_s)
 
     def play(self) -> None:
@@ -109,12 +109,12 @@ class _Turning:
             self._ahead_from_rest()
 
     def _fast(self) -> Velocity | None:
-        """Turn left, and right on the spot, both as fast as the robot can; return the latter where it is reached."""
+        """Turn left, and right on the spot, both at the highest speed; return the second velocity if it is reached."""
         right = Velocity(angular_z=-fastest(self.robot, 5))
         return right if reach(self.drive, _fast_left(self.robot)) and reach(self.drive, right) else None
 
     def _ahead_from_rest(self) -> None:
-        """Command a linear part after the angular one has ended by itself: that one is zero, and stays so."""
+        """Command a linear part after the angular part has ended by itself: the angular part must stay zero."""
         drive, ahead = self.drive, Velocity(linear_x=0.3 * self.robot.limits.linear_m_s)
         if not drive.command_linear(ahead):
             return
@@ -125,9 +125,9 @@ class _Turning:
         drive.saw("rest-resources/linear-keeps-angular", expected, seen, "came back", holds=keeps)
 
     def let_go(self, turning: Velocity) -> None:
-        """Renew a velocity no more, and watch how it ends.
+        """Stop renewing a velocity, and watch how it ends.
 
-        What looks like a failure is tried again: a late response, or a busy machine, is no failure of the robot.
+        An apparent failure is measured again: a late response, or a busy machine, is no failure of the robot.
         """
         limits, tries = self.robot.limits, []
         for _ in range(_ATTEMPTS if limits.hold_s else 1):
@@ -144,10 +144,11 @@ class _Turning:
             self.tries.append(tuple(tries))
 
     def _watch(self, turning: Velocity) -> LetGo | None:
-        """Command a velocity, and look until the robot rests, or has to; return None where it is not taken.
+        """Command a velocity, and look until the robot rests or its time is over; return None if it is rejected.
 
-        Where the hold time is declared the robot is not read around its end: a velocity is ended by time, not by a
-        request, and a refused one does not renew it.
+        With a declared hold time, the suite does not read the robot around the end of that time, because a velocity
+        must end by
+        time and not by a request. A rejected command meanwhile must not renew it.
         """
         robot, drive, clock, limits = self.robot, self.drive, self.drive.clock, self.robot.limits
         last = drive.trace.last_full

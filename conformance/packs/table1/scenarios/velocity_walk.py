@@ -1,4 +1,4 @@
-"""Velocities in any order, where the turns before have made room for them."""
+"""Velocities in random order, after earlier turns have made room for them."""
 
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.goals import make_room
@@ -14,7 +14,7 @@ from conformance.verdict.explorer import Explorer
 
 @scenario(needs={Need.REST, Need.MOTION})
 def velocity_walk(robot: Robot, effort: Effort, explore: Explorer) -> Driven:
-    """Command velocities in any order: the robot does the last one, and its pose follows."""
+    """Command velocities in random order: the robot must reach the last one, and its pose must follow."""
     make_room(robot, room_for(robot.limits))
     # Zero is not a value that can be refused, however it is signed.
     zero = Drive(robot)
