@@ -108,7 +108,7 @@ def read_json(body: bytes) -> JsonText:
             parse_int=reader.whole,
         )
     except json.JSONDecodeError as error:
-        malformed = f"no JSON: {error.msg} at line {error.lineno} column {error.colno}"
+        malformed = f"not JSON: {error.msg} at line {error.lineno} column {error.colno}"
     except RecursionError:
         malformed = "JSON that is nested too deeply to be read"
     return JsonText(value, malformed, encoding, reader.non_finite, reader.twice)

@@ -70,12 +70,17 @@ def parse_yaml(body: bytes) -> Any:
     try:
         documents = list(yaml.load_all(body.decode("utf-8"), Loader=_Loader))
     except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
-        raise UnreadableError(f"no YAML: {' '.join(str(error).split())[:200]}") from error
+        raise UnreadableError(f"not YAML: {_short(error)}") from error
     while len(documents) > 1 and documents[-1] in (None, ""):
         documents.pop()
     if len(documents) != 1:
         raise UnreadableError(f"{len(documents)} YAML documents where one was expected")
     return documents[0]
+
+
+def _short(error: Exception) -> str:
+    """Return a parser's message on one line, without the placeholder for a file name."""
+    return " ".join(str(error).replace('in "<unicode string>", ', "at ").split())[:200]
 
 
 def by_itself(body: bytes) -> Any:
@@ -87,7 +92,7 @@ def by_itself(body: bytes) -> Any:
     try:
         return next(iter(yaml.load_all(body.decode("utf-8"), Loader=_ByItself)), None)
     except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
-        raise UnreadableError(f"no YAML: {' '.join(str(error).split())[:200]}") from error
+        raise UnreadableError(f"not YAML: {_short(error)}") from error
 
 
 def local_name(element: etree._Element) -> str:

@@ -35,10 +35,15 @@ def parse(document: bytes, *, doctype: bool = False, comments: bool = True) -> e
     try:
         root = etree.fromstring(document, parser)
     except (etree.XMLSyntaxError, ValueError) as error:
-        raise NotXmlError(f"no well-formed XML: {ascii(str(error))[1:-1][:300]}") from error
+        raise NotXmlError(f"not well-formed XML: {_short(error)}") from error
     if not doctype and has_doctype(root):
         raise NotXmlError("XML with a document type declaration (DOCTYPE)")
     return root
+
+
+def _short(error: Exception) -> str:
+    """Return lxml's message without the placeholder for a file name."""
+    return ascii(str(error).replace(" (<string>, line", " (line"))[1:-1][:300]
 
 
 def has_doctype(root: etree._Element) -> bool:

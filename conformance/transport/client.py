@@ -224,7 +224,7 @@ def _no_answer(error: Exception, seconds: float) -> _SilenceError:
     if isinstance(error, ClosedError):
         return _SilenceError("the server closed the connection without a response", NoAnswer.CLOSED)
     if isinstance(error, h11.RemoteProtocolError):
-        return _SilenceError(f"the response is not HTTP: {text}", NoAnswer.MALFORMED)
+        return _SilenceError(f"a response that is not HTTP: {text}", NoAnswer.MALFORMED)
     if isinstance(error, NoConnectionError):
         kind = NoAnswer.TLS if "SSL" in text or "certificate" in text.lower() else NoAnswer.REFUSED
         return _SilenceError(f"no connection: {text}", kind)

@@ -167,7 +167,7 @@ class HttpConnection:
         while isinstance(event := self._event(link, deadline), h11.Data):
             size += len(event.data)
             if size > _MAX_ANSWER:
-                raise h11.RemoteProtocolError(f"an answer of more than {_MAX_ANSWER} octets")
+                raise h11.RemoteProtocolError(f"a response of more than {_MAX_ANSWER} bytes")
             pieces.append(bytes(event.data))
         return b"".join(pieces)
 

@@ -237,7 +237,7 @@ def _content(reader: h11.Connection) -> tuple[bytes, bytes]:
     while isinstance(event := reader.next_event(), h11.Data):
         body += event.data
     if not isinstance(event, h11.EndOfMessage):
-        raise FramingError(f"no end of the content after {len(body)} octets of it (RFC 9112 6.3)")
+        raise FramingError(f"no end of the content after {len(body)} bytes of it (RFC 9112 6.3)")
     return bytes(body), reader.trailing_data[0]
 
 

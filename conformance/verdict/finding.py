@@ -104,11 +104,7 @@ class Finding:
         if self.seen > 1:
             parts.append(f"Seen {self.seen} times.")
         if self.again is not None:
-            came_back, sent, judged = self.again
-            what = "it failed" if judged else "it had the same kind of response"
-            parts.append(
-                f"{'Sent' if came_back == sent else 'Intermittent: sent'} again, {what} {came_back} of {sent} times."
-            )
+            parts.append(_repeated(self.again))
         return " ".join(parts)
 
     @property
@@ -172,8 +168,11 @@ def observed_in(exchange: Attempt | None, found: str) -> str:
     if exchange is None:
         return found or "something else"
     if isinstance(exchange, Unanswered):
-        said = found if exchange.problem in found else ": ".join(filter(None, (exchange.problem, found)))
-        return said if said.startswith("no response") else f"no response: {said}"
+        known = exchange.problem in found or found.startswith("no ")
+        said = found if known else ": ".join(filter(None, (exchange.problem, found)))
+        if exchange.kind is NoAnswer.MALFORMED:
+            return said
+        return said if said.startswith("no ") else f"no response: {said}"
     status = str(exchange.response.status)
     came = ", ".join(filter(None, (status, exchange.response.media_type)))
     said = found.removeprefix("status ")
@@ -184,6 +183,18 @@ def observed_in(exchange: Attempt | None, found: str) -> str:
     rest = said.removeprefix(status)
     # "200 with application/json" and the like name the media type themselves.
     return said if rest.startswith((" with ", " as ")) else f"{came}{rest}"
+
+
+def _repeated(again: Again) -> str:
+    """Return a sentence on the repetitions of the request alone."""
+    if again.came_back == again.sent:
+        return f"Repeated {again.sent} times: {'failed' if again.judged else 'the same kind of response'} each time."
+    what = "failed" if again.judged else "had the same kind of response"
+    times = "once" if again.came_back == 1 else f"{again.came_back} times"
+    return (
+        f"In {again.sent} repetitions without the requests before it, the request {what} {times}: the failure is "
+        "intermittent, or depends on earlier requests, which `roaas replay` sends."
+    )
 
 
 def _described(request: Request) -> str:

@@ -154,7 +154,7 @@ def _of_text(value: Any) -> Iterator[Mutation[bytes]]:
         ("malformed", "form data", b"x=0.1&y=0"),
         ("malformed", "XML", b"<x>0.1</x>"),
         ("malformed", "a word", b"stop"),
-        ("empty", "no octets", b""),
+        ("empty", "no bytes", b""),
         ("empty", "white space only", b" \n"),
         ("encoding", "UTF-16", valid.decode().encode("utf-16")),
         ("encoding", "UTF-16 without a mark", valid.decode().encode("utf-16-le")),

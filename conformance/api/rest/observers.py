@@ -85,9 +85,14 @@ class Observer(Listener):
         judge = self._api.run.judge
         expect(judge, "http/framing", exchange).that(holds=True, expected=_WELL_FRAMED)
         if answer.body:
-            found = f"Content-Type {answer.header('content-type')!r} on {len(answer.body)} octets"
+            named = answer.header("content-type")
+            found = (
+                f"{f'Content-Type: {named}' if named else 'no Content-Type'} with a body of {len(answer.body)} bytes"
+            )
             is_named = "/" in answer.media_type
-            expect(judge, "http/content-type", exchange).that(is_named, "Content-Type with a media type", found)
+            expect(judge, "http/content-type", exchange).that(
+                is_named, "a Content-Type header field with a media type", found
+            )
         twice = answer.repeated(*_SINGLE)
         expected = "no header twice, unless its value is a list"
         expect(judge, "http/field-once", exchange).that(not twice, expected, f"{twice} several times")
@@ -142,7 +147,7 @@ def _other_charset(answer: Response) -> str:
     if named is None and is_xml(answer.media_type):
         return ""
     charset = named[1] if named else "utf-8"
-    found = f"Content-Type {answer.header('content-type')!r} on octets that are not {charset}"
+    found = f"Content-Type {answer.header('content-type')!r} with bytes that are not {charset}"
     try:
         text = answer.body.decode(charset).lstrip("\ufeff")
     except (UnicodeError, LookupError):

@@ -48,7 +48,7 @@ def judge_there(api: RestInterface, requirement: str, call: Call, *, known: bool
         api.run.judge.note(requirement, f"not judged for {operation.label}: no request that may be sent shows it")
         return
     found = "" if there or exchange is None else _absence(exchange)
-    expected = f"a response that shows that {operation.label} is there"
+    expected = f"an operation {operation.label}, which the description declares"
     expect(api.run.judge, requirement, exchange).that(there, expected, found, cause=operation.label)
 
 

@@ -27,10 +27,10 @@ def xml_mutations(value: Any, schema: Schema, root: str) -> list[Mutation[bytes]
 def _of_document(value: Any, root: str) -> Iterator[Mutation[bytes]]:
     valid = xml_bytes(value, root)
     for what, body in (
-        ("no octets", b""),
+        ("no bytes", b""),
         ("XML cut short", valid[: -len(root) - 1]),
         ("an end tag without a start", valid + f"</{root}>".encode()),
-        ("JSON as XML", b'{"x": 0.1}'),
+        ("JSON in place of XML", b'{"x": 0.1}'),
         ("another root element", xml_bytes(value, STRANGE_NAME)),
         ("an empty root element", f"<{root}/>".encode()),
         ("text in the root element", f"<{root}>stop</{root}>".encode()),

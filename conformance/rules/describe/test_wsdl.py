@@ -151,7 +151,7 @@ def test_profile(soap: SoapServices, judge: Judge, effort: Effort) -> None:
             for rule, check in RULES.items():
                 found = iter([served.problem]) if served.description is None else _guarded(check, served.description)
                 problem = next(found, "")
-                expected = f"a WSDL that keeps {rule} of the Basic Profile"
+                expected = f"a WSDL that meets rule {rule} of the WS-I Basic Profile"
                 expect(judge, f"describe/wsdl-{rule}", served.exchange).that(not problem, expected, problem)
 
 

@@ -111,7 +111,7 @@ def _judge_too_large(api: RestInterface, judge: Judge, call: Call, fields: tuple
     refused = {413, 411, 400, 501} if fields else {413}
     expect(judge, "http/content-too-large", attempt).that(
         is_cut_off(attempt) or (isinstance(attempt, Exchange) and attempt.response.status in refused),
-        f"status 413 or a closed connection when the body has {_TOO_LARGE:,} octets",
+        f"status 413 or a closed connection when the body has {_TOO_LARGE:,} bytes",
         cause=f"{attempt.came} {bool(fields)}",
     )
 
@@ -128,7 +128,7 @@ def test_chunked_content(api: RestInterface, judge: Judge) -> None:
             (large, 1000),
             (large, len(large)),
         ):
-            what = f"{len(body)} octets in chunks of {size}"
+            what = f"{len(body)} bytes in chunks of {size}"
             _judge_chunked(api, judge, "http/chunked", call, raw.chunked(body, size), what)
         for what, extension, trailers in _CHUNK_FORMS:
             chunks = raw.chunked(call.body, 9, extension, trailers)

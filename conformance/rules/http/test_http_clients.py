@@ -78,6 +78,6 @@ def _judge_forgotten(api: RestInterface, judge: Judge, octets: bytes, attempt: U
     expect(judge, "http/pipelining", attempt).that(
         again.closed or count == _IN_A_ROW,
         f"{_IN_A_ROW} responses to as many requests, or a closed connection",
-        f"{count} responses, and the connection stays open",
+        f"no more responses after {count} of {_IN_A_ROW}, and the connection stays open",
         cause="forgotten",
     )

@@ -49,5 +49,5 @@ def test_a_part(api: RestInterface, judge: Judge) -> None:
         expect(judge, _RANGE, exchange).that(
             answer.status != _PARTIAL or fits or several,
             "another status than 206, or the header field Content-Range that fits the content",
-            f"status 206 with {len(answer.body)} octets and Content-Range: {answer.header('content-range')}",
+            f"status 206 with {len(answer.body)} bytes and Content-Range: {answer.header('content-range')}",
         )

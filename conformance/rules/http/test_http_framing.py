@@ -51,7 +51,7 @@ def test_every_octet_of_an_answer(api: RestInterface, rest: HttpClient, judge: J
             attempt, surplus = raw.read_one(rest, octets, came, method)
             fault = attempt.problem if isinstance(attempt, Unanswered) else ""
             if surplus:
-                fault = f"{len(surplus)} octets behind the response: {surplus[:40]!r}"
+                fault = f"{len(surplus)} bytes after the response: {surplus[:40]!r}"
             expect(judge, "http/framing", attempt).that(not fault, "one well-framed response", fault)
 
 
@@ -69,7 +69,7 @@ def test_answers_stay_aligned(api: RestInterface, rest: HttpClient, judge: Judge
             attempt, behind = raw.read_one(rest, octets, raw.rest_of(came, behind), "GET")
         fault = attempt.problem if isinstance(attempt, Unanswered) else ""
         if behind:
-            fault = f"{len(behind)} octets behind the second response"
+            fault = f"{len(behind)} bytes after the second response"
         expected = f"two well-framed responses, to {method} and GET"
         expect(judge, "http/framing", attempt).that(not fault, expected, fault)
 

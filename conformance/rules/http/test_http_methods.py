@@ -154,5 +154,5 @@ def test_head_has_no_body(api: RestInterface, judge: Judge) -> None:
         if isinstance(attempt, Unanswered):
             expect(judge, "http/framing", attempt).that(False, "a well-framed response to HEAD")
             continue
-        expected, found = "nothing behind the header section", f"{len(surplus)} octets behind it"
+        expected, found = "nothing after the header section", f"{len(surplus)} bytes after it"
         expect(judge, "http/head-no-body", attempt).that(not surplus, expected, found, cause=call.operation.id)

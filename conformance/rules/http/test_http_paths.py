@@ -120,7 +120,7 @@ def test_long_targets(api: RestInterface, rest: HttpClient, judge: Judge) -> Non
                     if none.kind is not NoAnswer.CLOSED or (second and length == min(_LONG_TARGETS)):
                         raise
             if exchange is not None:
-                when = f"the target has {len(path):,} octets"
+                when = f"the target has {len(path):,} bytes"
                 expect(judge, "http/uri-too-long", exchange).status(414, 400, 431, usual, when=when)
         again = call.send(api, fresh=True)
         expect(judge, "http/uri-too-long", again).status(usual, when="the request follows one with a long target")
@@ -139,7 +139,7 @@ def test_large_field(api: RestInterface, judge: Judge) -> None:
             if none.kind is not NoAnswer.CLOSED:
                 raise
             attempt = none.unanswered
-        when = f"a field has {_LONG_FIELD:,} octets"
+        when = f"a field has {_LONG_FIELD:,} bytes"
         expect(judge, "http/header-too-large", attempt).status(431, 400, 413, usual, when=when, closed=True)
 
 
@@ -150,7 +150,7 @@ def test_targets_of_8000_octets(api: RestInterface, rest: HttpClient, judge: Jud
         path = f"{call.path}{'&' if '?' in call.path else '?'}roaas="
         usual = rest.send("GET", f"{path}a").response.status
         exchange = rest.send("GET", path + "a" * (_TARGET_TAKEN - len(rest.prefix) - len(path)))
-        when = f"the target has {_TARGET_TAKEN:,} octets, as with a short one"
+        when = f"the target has {_TARGET_TAKEN:,} bytes, as with a short one"
         expect(judge, "http/target-length", exchange).status(usual, when=when)
 
 

@@ -205,7 +205,7 @@ def _judge_chunked(judge: Judge, service: SoapService, document: bytes, size: in
     answer = read_exchange(attempt) if isinstance(attempt, Exchange) else None
     expect(judge, "soap-basic-profile/chunked", attempt).that(
         raw.refuses_chunks(attempt) or (answer is not None and answer.accepted),
-        f"status 2xx with a SOAP message when {len(document):,} octets come in chunks of {size:,}",
+        f"status 2xx with a SOAP message when {len(document):,} bytes come in chunks of {size:,}",
         answer.describe() if answer is not None else "",
         cause=attempt.came,
     )

@@ -25,7 +25,7 @@ def test_no_file_comes_in():
 
 @pytest.mark.parametrize("document", [b"", b"<a>", b"\xff\xfe\x00", b"<a>&b;</a>", b"<a>" + b"<b>" * 300 + b"</a>"])
 def test_what_is_no_xml_says_why(document):
-    with pytest.raises(NotXmlError, match="no well-formed XML: "):
+    with pytest.raises(NotXmlError, match="not well-formed XML: "):
         parse(document)
 
 

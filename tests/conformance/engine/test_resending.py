@@ -30,7 +30,7 @@ def test_how_often_it_comes_back(monkeypatch, again, expected):
     assert finding.again[:2] == expected
     verdict = verdict_of(run.contract.ledger["http/head"], evidence, run.claims)
     assert verdict.value == "fail"
-    assert ("Intermittent: sent again, it had the same kind of response 2 of 5 times" in verdict.reason) == (
+    assert ("the request had the same kind of response 2 times: the failure is intermittent" in verdict.reason) == (
         expected[0] < 5
     )
 

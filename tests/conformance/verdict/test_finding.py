@@ -50,11 +50,13 @@ def test_how_often_a_failure_was_seen_and_came_back_is_in_the_text():
     finding = judge.met[-1]
     assert finding.text.endswith("Got 404, text/html. Seen 2 times.")
     finding.again = Again(5, 5)
-    assert finding.text.endswith("Sent again, it failed 5 of 5 times.")
+    assert finding.text.endswith("Repeated 5 times: failed each time.")
     finding.again = Again(1, 5)
-    assert finding.text.endswith("Intermittent: sent again, it failed 1 of 5 times.")
+    assert finding.text.endswith(
+        "the request failed once: the failure is intermittent, or depends on earlier requests, which `roaas replay` sends."
+    )
     finding.again = Again(5, 5, judged=False)
-    assert finding.text.endswith("Sent again, it had the same kind of response 5 of 5 times.")
+    assert finding.text.endswith("Repeated 5 times: the same kind of response each time.")
 
 
 def test_what_is_special_in_a_request_is_shown():

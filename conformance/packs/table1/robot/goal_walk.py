@@ -143,7 +143,7 @@ class GoalMachine(RuleBasedStateMachine):
         gone = none.response.status == HTTPStatus.NOT_FOUND
         holds = (status in CANCELLED or (near and status == HTTPStatus.NOT_FOUND)) and gone
         found = exchange.came if gone else none.came
-        return self._check("goal-delete", exchange, "204, then 404 for GET", holds=holds, found=found)
+        return self._check("goal-delete", exchange, "204 for DELETE, then 404 for GET", holds=holds, found=found)
 
     def _check(self, name: str, exchange: Exchange, expected: str, *, holds: bool, found: str = "") -> bool:
         return self._robot.judge.check(f"rest-resources/{name}", holds, exchange, expected, found=found)

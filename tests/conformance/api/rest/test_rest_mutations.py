@@ -75,5 +75,5 @@ def test_near_misses_hold_what_the_valid_body_asks_for():
         "x missing at linear",
         "linear twice at the body",
     }
-    assert not names & {"no octets", "null as root", "null at angular.z"}
+    assert not names & {"no bytes", "null as root", "null at angular.z"}
     assert all(is_invalid(item.made, body.schema) for item in made)

@@ -179,7 +179,7 @@ def test_formats_are_read_as_what_they_say_they_are():
 
 
 def test_garbage_is_bad_framing():
-    found = seen("GET", "/robot/pose/", None, problem="the response is not HTTP: illegal status line")
+    found = seen("GET", "/robot/pose/", None, problem="a response that is not HTTP: illegal status line")
     assert found == {"http/framing"}
 
 

@@ -34,9 +34,9 @@ def addressed(location: str) -> bytes:
     ("body", "status", "problem"),
     [
         (b"", "405 Method Not Allowed", "405"),
-        (b"<html><br></html>", "200 OK", "no well-formed XML"),
+        (b"<html><br></html>", "200 OK", "not well-formed XML"),
         (b"<html/>", "200 OK", "instead of wsdl:definitions"),
-        (b"\xff\xfe\x00", "200 OK", "no well-formed XML"),
+        (b"\xff\xfe\x00", "200 OK", "not well-formed XML"),
         (b'<!DOCTYPE a [<!ENTITY b "&b;">]><a>&b;</a>', "200 OK", "no"),
     ],
 )

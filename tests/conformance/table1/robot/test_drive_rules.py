@@ -105,7 +105,7 @@ def test_what_cannot_be_compared_is_not_judged(trace):
         (exchange(200, {"linear": {"x": 0.3, "y": 0, "z": 0}}), "angular is missing"),
         (exchange(200, _AHEAD._replace(angular_z=0.4).twist), "angular z 0.4 for 0.5"),
         (exchange(201), "status 201"),
-        (exchange(200), "no JSON"),
+        (exchange(200), "not JSON"),
     ],
 )
 def test_the_answer_to_a_command(answer, problem):

@@ -31,15 +31,20 @@ def test_stamps_lie_between(api: RestInterface, judge: Judge) -> None:
             if first is None or other is None or last is None or first <= other <= last or last < first:
                 found = ""
                 break
-            found = f"{other} (sec, nanosec) between {first} and {last}"
+            found = f"the stamp {_seconds(other)}, between JSON's {_seconds(first)} and {_seconds(last)}"
         judge.check(
             "rest-formats/same-values",
             not found,
             exchanges[1],
-            f"a stamp in {media_type} that is not before JSON's just before, nor behind JSON's just after",
+            f"a stamp in {media_type} that lies between the stamps of the JSON responses before and after it",
             found=found,
             cause="stamp",
         )
+
+
+def _seconds(stamp: tuple[float, float]) -> str:
+    """Return seconds and nanoseconds as a number of seconds."""
+    return f"{stamp[0]:.0f}.{stamp[1]:09.0f} s"
 
 
 def _stamp(exchange: Exchange) -> tuple[float, float] | None:

@@ -146,6 +146,6 @@ def goal_delete(trace: GoalLife) -> Iterator[Outcome]:
         yield Case(
             accepted and one.gone,
             one.read if accepted else one.exchange,
-            "204, then 404 for GET",
+            "204 for DELETE, then 404 for GET",
             f"{one.read.came} for GET" if accepted else "",
         )

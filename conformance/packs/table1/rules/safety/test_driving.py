@@ -63,7 +63,7 @@ def hold(trace: Driven, run: Run) -> Iterator[Outcome]:
                 early is None,
                 seen.velocity_exchange,
                 f"{last.velocity} for {limits.hold_s or 0:g} s after the command",
-                f"{seen.velocity} {seen.at - last.full:.2f} s after it",
+                f"{seen.velocity} {seen.at - last.full:.2f} s after the command",
                 "ended early",
             )
 
@@ -87,7 +87,7 @@ def hold_ends(trace: Driven, run: Run) -> Iterator[Outcome]:
             seen.velocity_exchange,
             f"a robot that begins to stop {limits.hold_s:g} s after the command, at the latest after "
             f"{last.longest(limits):.2f} s",
-            f"{seen.velocity} {seen.at - last.answered:.2f} s after it",
+            f"{seen.velocity} {seen.at - last.answered:.2f} s after the command",
             "holds too long",
         )
 

@@ -186,7 +186,7 @@ def test_64_kib(publishers: SoapService, judge: Judge) -> None:
     """Send a valid message of 64 KiB: the robot must accept it."""
     document = padded(envelope((delivery_messages.delivery(),)).written(), TAKEN_OCTETS)
     answer = send(publishers, require_valid_document(publishers, document))
-    judge_answer(judge, "soap-delivery/size", answer.accepted, answer, f"2xx for a message of {TAKEN_OCTETS:,} octets")
+    judge_answer(judge, "soap-delivery/size", answer.accepted, answer, f"2xx for a message of {TAKEN_OCTETS:,} bytes")
 
 
 @pytest.mark.requirement("soap-delivery/concurrent-answers")

@@ -88,7 +88,13 @@ def test_publishers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
             if operation == "ExecuteCoffeeRequest":
                 values["message_code"] = COFFEE
             _, problem, exchange = client.call(operation, values)
-            judge.check("soap-delivery/interop", not problem, exchange, f"{operation} by zeep", found=problem)
+            judge.check(
+                "soap-delivery/interop",
+                not problem,
+                exchange,
+                f"success for {operation}, called with the SOAP library zeep",
+                found=problem,
+            )
 
 
 @pytest.mark.phase("resting")
@@ -121,4 +127,6 @@ def test_subscribers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
                 problem = next(
                     (f"zeep finds no {path}" for path in _VALUES.get(operation, ()) if not _has(result, path)), ""
                 )
-            judge.check(id_, not problem, exchange, f"{operation} by zeep", found=problem)
+            judge.check(
+                id_, not problem, exchange, f"success for {operation}, called with the SOAP library zeep", found=problem
+            )

@@ -186,7 +186,7 @@ def test_64_kib(subscribers: SoapService, judge: Judge) -> None:
     for operation in _READ:
         question = envelope((Node(clark(delivery_messages.NAMESPACE, operation)),)).written()
         answer = send(subscribers, require_valid_document(subscribers, padded(question, TAKEN_OCTETS)))
-        expected = f"2xx for a message of {TAKEN_OCTETS:,} octets"
+        expected = f"2xx for a message of {TAKEN_OCTETS:,} bytes"
         judge_answer(judge, "soap-subscribers/size", answer.accepted, answer, expected, cause=answer.describe())
 
 
