@@ -35,14 +35,12 @@ _OBJECTS = 20_000
 
 @click.command(cls=ResultCommand, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("statement", required=False, type=click.Path(dir_okay=False, path_type=Path))
-@click.option(
-    "--init", is_flag=True, help="Ask the robot's descriptions and write a commented STATEMENT; judge nothing."
-)
+@click.option("--init", is_flag=True, help="Write a commented STATEMENT from the robot's descriptions; test nothing.")
 @click.option("--rest", metavar="URL", help="Base URL of the REST interface.")
 @click.option("--publishers-wsdl", metavar="URL", help="WSDL of the publishers service, URL or file.")
 @click.option("--subscribers-wsdl", metavar="URL", help="WSDL of the subscribers service, URL or file.")
-@click.option("--publishers-endpoint", metavar="URL", help="Where that service is, when its WSDL does not say so.")
-@click.option("--subscribers-endpoint", metavar="URL", help="Where that service is, when its WSDL does not say so.")
+@click.option("--publishers-endpoint", metavar="URL", help="Address of that service, if its WSDL has another.")
+@click.option("--subscribers-endpoint", metavar="URL", help="Address of that service, if its WSDL has another.")
 @click.option("--profile", metavar="NAME", help="Claim the classes of a profile of the contract, such as full.")
 @click.option("--class", "classes", multiple=True, metavar="NAME", help="Claim a conformance class; repeatable.")
 @click.option(
@@ -51,40 +49,46 @@ _OBJECTS = 20_000
     metavar="PACK",
     default=DEFAULT_PACK,
     show_default=True,
-    help="Judge by this contract pack: its name, or its folder.",
+    help="Contract pack to test against: its name or folder.",
 )
 @click.option(
     "--requirements",
     metavar="SET",
-    help="Score by this frozen set of requirements; what is newer is shown.  [default: all]",
+    help="Only this frozen set of requirements counts; newer ones are shown.  [default: all]",
 )
-@click.option("--allow-motion", is_flag=True, help="The robot may be moved: needed for most of the contract.")
-@click.option("--effort", type=click.Choice(EFFORTS), default="standard", show_default=True, help="How much to try.")
+@click.option(
+    "--allow-motion", is_flag=True, help="Allow the suite to move the robot; most of the contract needs that."
+)
+@click.option(
+    "--effort", type=click.Choice(EFFORTS), default="standard", show_default=True, help="How many cases to test."
+)
 @click.option(
     "--minutes",
     type=click.FloatRange(min=1),
     default=10.0,
     show_default=True,
-    help="How long --effort deep may take, about.",
+    help="Approximate duration of --effort deep.",
 )
 @click.option(
     "--seed",
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
-    help="Of everything random: same seed, same cases.",
+    help="Seed of all random choices: the same seed gives the same cases.",
 )
-@click.option("--nonce", metavar="TEXT", help="From whoever relies on the result: the seed is derived from it.")
+@click.option("--nonce", metavar="TEXT", help="Text chosen by the relying party; the seed is derived from it.")
 @click.option("--timeout", "timeout_s", type=_POSITIVE, metavar="S", help="Deadline of one request.  [default: 10]")
 @click.option("--request-rate", type=_POSITIVE, metavar="R", help="At most R requests per second.")
-@click.option("--ca-file", type=_FILE, help="Authorities to trust for HTTPS instead of the system's.")
+@click.option("--ca-file", type=_FILE, help="Certificate authorities (PEM) to trust for HTTPS instead of the system's.")
 @click.option(
-    "--ros-domain-id", type=click.IntRange(0, 232), help="Watch the robot's ROS side with a probe (needs rclpy)."
+    "--ros-domain-id",
+    type=click.IntRange(0, 232),
+    help="ROS domain of the robot: observe its topics with a probe (needs rclpy).",
 )
 @click.option(
-    "--baseline", type=click.Path(path_type=Path), help="Failures that are expected, with reason and expiry (TOML)."
+    "--baseline", type=click.Path(path_type=Path), help="Accepted failures, each with reason and expiry date (TOML)."
 )
-@click.option("--token-file", type=_FILE, help="Holds the bearer token to send.")
+@click.option("--token-file", type=_FILE, help="File with the bearer token to send.")
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
@@ -92,8 +96,8 @@ _OBJECTS = 20_000
     show_default=True,
     help="Folder for the results.",
 )
-@click.option("--plan", is_flag=True, help="Print what would be done in which order; send nothing.")
-@click.option("--fleet", type=_FILE, metavar="FILE", help="Judge many robots, each in a process of its own (TOML).")
+@click.option("--plan", is_flag=True, help="Print the scenarios and checks in their order; send nothing.")
+@click.option("--fleet", type=_FILE, metavar="FILE", help="Test several robots, each in its own process (TOML).")
 @click.option(
     "--parallel", type=click.IntRange(min=1), metavar="N", help="With --fleet: at most N robots at once.  [default: 4]"
 )
@@ -101,10 +105,11 @@ _OBJECTS = 20_000
 @click.option("--force", is_flag=True, help="With --init: overwrite STATEMENT.")
 @click.pass_obj
 def certify(door: FrontDoor, /, statement: Path | None, **options: Any) -> CommandResult:
-    """Judge a robot by its contract, requirement by requirement.
+    """Test a robot against its contract, and judge each requirement.
 
-    STATEMENT is the robot's implementation conformance statement (TOML); options win over it. --fleet names many.
-    Without claimed classes (statement, --profile, --class), those are judged whose interfaces have an address.
+    STATEMENT is the robot's implementation conformance statement (TOML); options override it. --fleet takes several
+    statements. If no classes are claimed (statement, --profile, --class), all classes are judged whose interfaces have
+    an address.
 
     Exit code: 0 conformant, 1 not conformant, 2 usage, 3 robot not reached, 4 inconclusive, 130 interrupted.
     """

@@ -22,26 +22,28 @@ _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
 @click.command(cls=ResultCommand, context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("result", type=click.Path(exists=True, path_type=Path))
 @click.argument("requirement", required=False)
-@click.option("--allow-motion", is_flag=True, help="The robot may be moved, as by the requests that were recorded.")
+@click.option("--allow-motion", is_flag=True, help="Allow the recorded requests to move the robot.")
 @click.option(
     "--statement",
     "statement_file",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="The robot's statement: let the requirements' own checks judge again, in place of sending what was recorded.",
+    help="The robot's statement: run the requirements' checks again instead of the recorded requests.",
 )
 @click.option(
-    "--contract", "pack", metavar="PACK", help="The contract pack, where the result's is in a folder of your own."
+    "--contract", "pack", metavar="PACK", help="Folder of the contract pack, if the result's pack is not installed."
 )
 @click.option("--recorded", is_flag=True, help="Judge the traces of the run again; send nothing.")
-@click.option("--token-file", type=click.Path(exists=True, dir_okay=False), help="Holds the bearer token to send.")
+@click.option("--token-file", type=click.Path(exists=True, dir_okay=False), help="File with the bearer token to send.")
 @click.option(
     "--token-for",
     "trusted",
     multiple=True,
     metavar="URL",
-    help="An address that may have the token: RESULT says where requests go, and may be anybody's; repeatable.",
+    help="Address to which the token may be sent, as RESULT may name other servers; repeatable.",
 )
-@click.option("--ca-file", type=click.Path(exists=True, dir_okay=False), help="Authorities to trust for HTTPS.")
+@click.option(
+    "--ca-file", type=click.Path(exists=True, dir_okay=False), help="Certificate authorities (PEM) to trust for HTTPS."
+)
 @click.option(
     "--timeout",
     "timeout_s",
@@ -62,14 +64,14 @@ def replay(  # noqa: C901 - one branch for each way to judge
     ca_file: str | None,
     timeout_s: float | None,
 ) -> CommandResult:
-    """Send a finding's requests again, in order, and say whether it is still there.
+    """Send the requests of findings again, in order, and report whether each failure occurs again.
 
-    RESULT is a result.json, or the folder that holds one; REQUIREMENT is an id such as http/head, by default all that
-    were not met. What was wrong with an answer by itself is judged as in the run; of all else, a finding counts as
-    still there when the last answer has the status, the media type and content as then. With --statement the checks of
-    the requirements run again, with the seed and effort of the result, and judge; options win over the statement.
+    RESULT is a result.json, or its folder; REQUIREMENT is an id such as http/head, by default all requirements that
+    were not met. A response that is wrong in itself is judged as in the run. Any other failure counts as repeated if
+    the last response has the same status, media type and content as in the run. With --statement, the requirements'
+    own checks run again, with the seed and effort of the result; options override the statement.
 
-    Exit code: 0 all gone, 1 one is still there, 2 usage, 3 robot not reached, 4 the checks could not judge.
+    Exit code: 0 no failure again, 1 a failure again, 2 usage, 3 robot not reached, 4 the checks could not judge.
     """
     # Imported here, so that --help stays quick.
     from conformance.engine.permission import moves  # noqa: PLC0415

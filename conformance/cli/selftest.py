@@ -47,7 +47,7 @@ _SHORT = 15
     type=click.Choice(["quick", "standard"]),
     default="quick",
     show_default=True,
-    help="Of the first run of each; a mutant that survives is judged again at standard.",
+    help="Effort of the first run; a survivor is tested again at standard.",
 )
 @click.option(
     "--compare/--no-compare", default=True, help="Run the plain Schemathesis command line against REST mutants too."
@@ -67,7 +67,7 @@ _SHORT = 15
     metavar="N",
     help="Judge N mutants made by rule from the pack's descriptions, in place of those made by hand.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the sample of mutants by rule.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the sample of generated mutants.")
 @click.option("--list", "listed", is_flag=True, help="List the mutants, and run nothing.")
 @click.option(
     "--out",
