@@ -1,4 +1,4 @@
-"""Findings of a conformance result, in words: the same on every page and in every CI format.
+"""Describe the failures ("findings") of a conformance result in words, for all pages and CI formats alike.
 
 Since version 1.2 a failure's `message` says what the suite sent, what it expected by which rule, and what it got.
 Before 1.2 `message` held only what the suite got; then the text is composed here.
@@ -24,8 +24,8 @@ class Finding:
     """One failure of a requirement.
 
     Attributes:
-        requirement: the requirement, as result.json has it.
-        failure: the failure, as result.json has it.
+        requirement: the requirement's entry in result.json.
+        failure: the failure's entry in result.json.
         blocks: ids of the requirements that the suite could not test because of this failure.
     """
 
@@ -35,13 +35,13 @@ class Finding:
 
     @property
     def number(self) -> int | None:
-        """Return the finding's number in the result; None before version 1.2."""
+        """Return the finding's number in the result (1 is the most urgent); None before version 1.2."""
         number: int | None = self.failure.get("number")
         return number
 
     @property
     def cause(self) -> str:
-        """Return the kind of cause, one of `CAUSES`."""
+        """Return the key of the kind of cause in `CAUSES`, such as "server-error"; "rule" by default."""
         return str(self.failure.get("cause", "rule"))
 
     @property
@@ -53,7 +53,7 @@ class Finding:
 
     @property
     def text(self) -> str:
-        """Return what the suite sent, what it expected by which rule, and what it got."""
+        """Return the failure in words: what the suite sent, what it expected by which rule, and what it got."""
         if "observed" in self.failure:
             return str(self.failure["message"])
         sent = f"Sent `{self.subject}`. " if self.failure["request"] else ""
@@ -64,7 +64,7 @@ class Finding:
 
 
 def findings(requirements: Sequence[Mapping[str, Any]], result: Mapping[str, Any]) -> list[Finding]:
-    """Return the findings of some requirements in the order in which a vendor should look at them."""
+    """Return the findings of some requirements, sorted so that a vendor should look at the first one first."""
     blocks = {cause["number"]: tuple(cause["blocks"]) for cause in result.get("causes", ())}
     found = [
         Finding(requirement, failure, blocks.get(failure.get("number"), ()))
@@ -75,7 +75,7 @@ def findings(requirements: Sequence[Mapping[str, Any]], result: Mapping[str, Any
 
 
 def by_requirement(found: Sequence[Finding]) -> Iterator[tuple[Mapping[str, Any], list[Finding]]]:
-    """Group findings: yield each requirement with those of its findings that follow one another."""
+    """Yield each requirement with its findings; a requirement occurs again if other findings stand between its own."""
     for _, group in groupby(found, key=lambda finding: finding.requirement["id"]):
         own = list(group)
         yield own[0].requirement, own

@@ -1,4 +1,4 @@
-"""Reads result files: JSON that is validated by its public JSON Schema before it is shown."""
+"""Read result files: JSON that is validated by its public JSON Schema before a page shows its content."""
 
 import json
 from functools import cache
@@ -39,28 +39,28 @@ def _schema(result_format: str) -> dict[str, Any]:
 
 @cache
 def validator(result_format: str) -> Draft202012Validator:
-    """Return the validator of a format; it is cached, because building it costs more than using it."""
+    """Return the JSON Schema validator of a result format, cached because building it takes longer than using it."""
     return Draft202012Validator(_schema(result_format))
 
 
 @cache
 def _quick_validator(result_format: str) -> jsonschema_rs.Validator:
-    """Return a validator that is a hundred times faster, and gives poorer error messages."""
+    """Return a JSON Schema validator that is a hundred times faster than `validator`, with poorer error messages."""
     return jsonschema_rs.validator_for(_schema(result_format))
 
 
 def read_result(path: Path) -> dict[str, Any]:
-    """Return a conformance result; errors as in `reports.errors`."""
+    """Read and validate a conformance result file; raise a `ReportError` subclass if the file is not a valid result."""
     return _read(path, RESULT_FORMAT)
 
 
 def read_latency(path: Path) -> dict[str, Any]:
-    """Return a latency result; errors as in `reports.errors`."""
+    """Read and validate a latency result file; raise a `ReportError` subclass if the file is not a valid result."""
     return _read(path, LATENCY_FORMAT)
 
 
 def read_fleet(path: Path) -> dict[str, Any]:
-    """Return the result of a fleet; errors as in `reports.errors`."""
+    """Read and validate a fleet's result file; raise a `ReportError` subclass if the file is not a valid result."""
     return _read(path, FLEET_FORMAT)
 
 

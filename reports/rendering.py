@@ -1,4 +1,4 @@
-"""Writes the pages for the result files in a directory."""
+"""Write all pages and CI files for the result files in a directory."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -25,7 +25,7 @@ def render(directory: Path, notary: Notary | None = None) -> list[Path]:
     `fleet.json` fleet.html and fleet.md. If one result is broken, the pages of the others are written first.
 
     Raises:
-        ResultMissingError: there is no such directory, or no result file in it.
+        ResultMissingError: the directory does not exist, or holds no result file.
         ResultUnreadableError: a file cannot be read, or the directory cannot be written to.
         ResultGarbledError: a file is not JSON.
         ResultFormatError: a file is of another format or version.
@@ -55,7 +55,7 @@ def render(directory: Path, notary: Notary | None = None) -> list[Path]:
 
 
 def render_formats(directory: Path, names: Sequence[str]) -> list[Path]:
-    """Write a directory's `result.json` in formats of `reports.formats.catalogue`, and return the paths.
+    """Write a directory's `result.json` in the named formats (see `reports.formats.catalogue`), and return the paths.
 
     Raises:
         ReportError: as for `render`.
@@ -78,7 +78,10 @@ def _conformance(path: Path, notary: Notary | None) -> dict[str, str]:
 
 
 def _signed_by(path: Path, digest: str) -> str | None:
-    """Return the key named in the envelope beside a result, if that is for this result; nothing is verified."""
+    """Return the id of the signing key that the envelope beside a result file names, without verifying the signature.
+
+    Return None if no envelope exists, or if it is malformed or signs another result than the one with this digest.
+    """
     try:
         opened = open_envelope(read_envelope(path.with_name(ENVELOPE_NAME)))
         return opened.keyid if statement_in(opened).digest_of(RESULT_SUBJECT) == digest else None

@@ -1,1 +1,1 @@
-"""Signed certificates: keys, the signed statement, its envelope, and the policy by which a relying party judges it."""
+"""Sign conformance results, and verify signed results ("certificates") by the recipient's policy."""

@@ -1,10 +1,8 @@
-"""Read and check the file around a signed statement: a DSSE v1 envelope with one signature.
+"""Parse the envelope file of a signed certificate: DSSE v1 (Dead Simple Signing Envelope), one signature.
 
-DSSE is Dead Simple Signing Envelope. This module checks what securesystemslib does not: the payload's type is
-in-toto's,
-there is exactly one signature, the base64 is canonical, and the envelope has no other members. An envelope with a key
-in it, for example, is refused, because only the relying party decides which keys to trust. `signature` verifies the
-signature.
+This module checks what securesystemslib does not: the payload type is in-toto's, there is exactly one signature, the
+base64 is canonical, and the envelope has no other members. An envelope that includes a key, for example, is refused,
+because only the recipient decides whom to trust. The module `signature` verifies the signature.
 """
 
 import base64
@@ -34,12 +32,12 @@ class _Envelope(msgspec.Struct, forbid_unknown_fields=True, rename="camel"):
 
 
 class Opened(NamedTuple):
-    """An envelope whose signature is not verified.
+    """The decoded parts of an envelope, before its signature is verified.
 
     Attributes:
-        payload: the signed content.
-        keyid: the key that the signature names.
-        signature: the signature itself.
+        payload: the signed content, in bytes.
+        keyid: the id of the signing key, as the signature names it.
+        signature: the signature's bytes.
     """
 
     payload: bytes
@@ -48,11 +46,11 @@ class Opened(NamedTuple):
 
 
 def read_envelope(path: Path) -> bytes:
-    """Return an envelope's file, cut off shortly after the largest size that is accepted.
+    """Return the bytes of an envelope file, but at most 4 MiB + 1 so that `open_envelope` can refuse a larger file.
 
     Raises:
-        ResultMissingError: there is no such file.
-        ResultUnreadableError: it cannot be read.
+        ResultMissingError: the file does not exist.
+        ResultUnreadableError: the file cannot be read.
     """
     try:
         with path.open("rb") as file:
@@ -64,10 +62,10 @@ def read_envelope(path: Path) -> bytes:
 
 
 def open_envelope(octets: bytes) -> Opened:
-    """Return the parts of an envelope.
+    """Parse the bytes of an envelope and return its payload, key id and signature, without verifying the signature.
 
     Raises:
-        EnvelopeRefusedError: it is not as `signature.seal` writes it.
+        EnvelopeRefusedError: the envelope is larger than 4 MiB, malformed, or not as `signature.seal` writes envelopes.
     """
     if len(octets) > _MOST_OCTETS:
         raise EnvelopeRefusedError(f"not a certificate: it has more than {_MOST_OCTETS} octets")
@@ -84,10 +82,10 @@ def open_envelope(octets: bytes) -> Opened:
 
 
 def statement_in(opened: Opened) -> Statement:
-    """Return the statement in an envelope, whose signature is not verified.
+    """Parse the payload of an envelope and return the in-toto statement, without verifying the signature.
 
     Raises:
-        EnvelopeRefusedError: it is not a certificate.
+        EnvelopeRefusedError: the payload is not the statement of a conformance run.
     """
     try:
         statement = msgspec.json.decode(opened.payload, type=Statement)

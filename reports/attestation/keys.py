@@ -1,4 +1,4 @@
-"""Ed25519 keys as PEM files, which `openssl pkey` reads as well.
+"""Make, read and identify Ed25519 keys in PEM files, which `openssl pkey` reads as well.
 
 A key is identified by its fingerprint: SHA-256 of the public key as DER (SubjectPublicKeyInfo, RFC 8410), as
 `openssl pkey -pubin -in public-key.pem -outform DER | sha256sum` prints it.
@@ -25,7 +25,7 @@ PUBLIC_NAME = "public-key.pem"
 
 
 def generate(directory: Path) -> str:
-    """Make a key pair, write it to signing-key.pem (mode 0600) and public-key.pem, and return its fingerprint.
+    """Make an Ed25519 key pair, write signing-key.pem (mode 0600) and public-key.pem, and return the fingerprint.
 
     Raises:
         KeyUnusableError: one of the files exists already, or the folder cannot be written to.
@@ -48,10 +48,10 @@ def generate(directory: Path) -> str:
 
 
 def signer_of(path: Path) -> CryptoSigner:
-    """Return the signer of a private key file.
+    """Read an Ed25519 private key from a PEM file and return a signer that signs with this key.
 
     Raises:
-        KeyUnusableError: it cannot be read, has a passphrase, or is not an Ed25519 private key.
+        KeyUnusableError: the file cannot be read, has a passphrase, or does not hold an Ed25519 private key.
     """
     try:
         key = load_pem_private_key(_octets(path), None)
@@ -63,10 +63,10 @@ def signer_of(path: Path) -> CryptoSigner:
 
 
 def public_key(path: Path) -> SSlibKey:
-    """Return a public key.
+    """Read an Ed25519 public key from a PEM file and return the key, with its fingerprint as key id.
 
     Raises:
-        KeyUnusableError: it cannot be read, or is not an Ed25519 public key.
+        KeyUnusableError: the file cannot be read, or does not hold an Ed25519 public key.
     """
     try:
         key = load_pem_public_key(_octets(path))
@@ -78,7 +78,7 @@ def public_key(path: Path) -> SSlibKey:
 
 
 def fingerprint(key: Ed25519PublicKey) -> str:
-    """Return the SHA-256 of the key as DER, in hexadecimal."""
+    """Return the key's fingerprint: the SHA-256 of its DER form, in hexadecimal."""
     return hashlib.sha256(key.public_bytes(Encoding.DER, PublicFormat.SubjectPublicKeyInfo)).hexdigest()
 
 

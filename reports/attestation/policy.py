@@ -1,4 +1,4 @@
-"""The policy: what a relying party requires of a certificate besides its signature, as TOML."""
+"""Judge a signed certificate by a policy: a TOML file with the recipient's requirements, one per line."""
 
 import datetime as dt
 import tomllib
@@ -20,12 +20,12 @@ OWN = "installed"
 
 @dataclass(frozen=True)
 class Known:
-    """What the verifying suite knows.
+    """The digests and profiles of the installed suite, with which a certificate is compared.
 
     Attributes:
-        suite: its digest.
-        requirement_sets: digests by name.
-        profiles: classes by name of the profile.
+        suite: digest of the installed suite.
+        requirement_sets: digest of each requirement set, by its name.
+        profiles: names of the conformance classes in each profile, by the profile's name.
     """
 
     suite: str = ""
@@ -34,21 +34,23 @@ class Known:
 
 
 class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a certificate must meet. The defaults are the default policy; docs/certificates.md explains each point.
+    """The requirements that a certificate must meet to be accepted.
+
+    The defaults are the default policy; docs/certificates.md explains each field.
 
     Attributes:
-        robot: the robot's name, or None for any; vendor and firmware likewise.
+        robot: required robot name, or None for any; `vendor` and `firmware` likewise.
         verdicts: accepted verdicts of the whole run.
-        profile: the profile whose classes must have passed, unless `classes` names them.
-        suites: digests of trusted suites; "installed" is the one that verifies.
-        requirement_sets: names of accepted sets, which the verifying suite must know.
-        efforts: accepted efforts.
+        profile: profile whose conformance classes must have passed, unless `classes` names them.
+        suites: digests of trusted suites; "installed" stands for the suite that verifies.
+        requirement_sets: names of accepted requirement sets, which the verifying suite must know.
+        efforts: accepted effort levels of the run.
         motion: whether the robot must have been allowed to move.
-        ros: whether ROS topics must have been observed for the classes that ask for it.
-        baseline: whether accepted failures are tolerated.
+        ros: whether the suite must have observed the ROS topics of every passed class that uses ROS topics.
+        baseline: whether failures that the vendor's baseline file accepts are tolerated.
         interrupted: whether an incomplete run is tolerated.
-        max_age_days: greatest age of the run.
-        nonce: the nonce that the run must have been made with, or None.
+        max_age_days: greatest age of the run in days.
+        nonce: nonce that the run must have been made with, or None for any.
     """
 
     robot: str | None = None
@@ -69,7 +71,13 @@ class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Point(NamedTuple):
-    """One point of a policy: its name, whether the certificate meets it, and what the certificate says."""
+    """The result of one check of a policy.
+
+    Attributes:
+        name: the policy field that was checked, or the file name if a file was compared.
+        met: whether the certificate meets the requirement.
+        found: text that says what the certificate contains.
+    """
 
     name: str
     met: bool
@@ -77,10 +85,11 @@ class Point(NamedTuple):
 
 
 def read_policy(path: Path, known: Known) -> Policy:
-    """Return the policy in a file.
+    """Read a policy from a TOML file and return it.
 
     Raises:
-        PolicyUnusableError: it cannot be read, has an unknown line, or names an unknown profile.
+        PolicyUnusableError: the file cannot be read, has an unknown field or a wrong value, or names an unknown
+            profile.
     """
     try:
         policy = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Policy)
@@ -94,7 +103,10 @@ def read_policy(path: Path, known: Known) -> Policy:
 
 
 def judge(statement: Statement, policy: Policy, known: Known, now: dt.datetime) -> list[Point]:
-    """Judge a verified statement by a policy, point by point."""
+    """Check a verified statement against each field of a policy, and return one result per check.
+
+    `known` describes the installed suite; `now` is the time from which the age of the run is counted.
+    """
     run = statement.predicate.roaas
     return [*_robot(run, policy), *_verdict(run, policy, known), *_run(run, policy, known), *_time(run, policy, now)]
 

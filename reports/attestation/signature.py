@@ -1,4 +1,4 @@
-"""Signs a statement into an envelope, and verifies one: Ed25519 and DSSE by securesystemslib."""
+"""Sign a statement into an envelope, and verify an envelope: Ed25519 and DSSE by securesystemslib."""
 
 import msgspec
 from securesystemslib.dsse import Envelope
@@ -11,17 +11,17 @@ from reports.errors import EnvelopeRefusedError
 
 
 def seal(statement: Statement, signer: Signer) -> str:
-    """Sign a statement, and return the envelope as JSON."""
+    """Sign a statement and return the signed DSSE envelope as indented JSON text."""
     envelope = Envelope(msgspec.json.encode(statement), PAYLOAD_TYPE, {})
     envelope.sign(signer)
     return msgspec.json.format(msgspec.json.encode(envelope.to_dict()), indent=1).decode() + "\n"
 
 
 def unseal(octets: bytes, key: Key) -> Statement:
-    """Verify an envelope with a trusted key, and return the signed statement.
+    """Verify an envelope's signature by a trusted public key, and return the signed statement.
 
     Raises:
-        EnvelopeRefusedError: the envelope is not signed with that key, or is not as `seal` writes it.
+        EnvelopeRefusedError: the envelope is not signed by that key, or is not as `seal` writes envelopes.
     """
     opened = open_envelope(octets)
     if opened.keyid != key.keyid:

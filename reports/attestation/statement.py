@@ -1,8 +1,9 @@
-"""The signed statement: an in-toto Statement v1 whose predicate is a Simple Verification Result (SVR) v0.2.
+"""Build the statement to sign: an in-toto Statement v1 with a Simple Verification Result (SVR) v0.2 as predicate.
 
-SVR lists verified properties: the classes that passed without an accepted failure. in-toto's test-result predicate was
-not used, because it has only PASSED, WARNED and FAILED for a whole run. Everything else that a policy checks is in the
-predicate's extension field `roaas`; consumers ignore fields that they do not know (in-toto attestation, parsing rules).
+SVR lists verified properties: here, the conformance classes that passed without an accepted failure. in-toto's
+test-result predicate was not used, because it has only PASSED, WARNED and FAILED for a whole run. Everything else that
+a policy checks is in the predicate's extension field `roaas`; consumers ignore fields that they do not know (in-toto
+attestation, parsing rules).
 """
 
 import datetime as dt
@@ -28,19 +29,22 @@ Text = str | None
 
 
 class Subject(msgspec.Struct, frozen=True):
-    """An artifact, identified by its SHA-256 digest in hexadecimal; the name is for readers."""
+    """A signed file, identified by its SHA-256 digest in hexadecimal.
+
+    The name is for readers; `digest` maps the hash algorithm's name to the digest.
+    """
 
     name: str
     digest: dict[str, str]
 
     @property
     def sha256(self) -> str:
-        """Return the digest, or an empty string if there is none of this kind."""
+        """Return the SHA-256 digest in hexadecimal, or an empty string if only other digests are given."""
         return self.digest.get("sha256", "")
 
 
 class Robot(msgspec.Struct, frozen=True):
-    """The robot, as the vendor's statement names it."""
+    """The robot's name, vendor and firmware version, as the vendor's statement gives them."""
 
     name: Text = None
     vendor: Text = None
@@ -48,7 +52,7 @@ class Robot(msgspec.Struct, frozen=True):
 
 
 class Suite(msgspec.Struct, frozen=True):
-    """The suite's version, and the contract by which the suite judged."""
+    """The test suite's version and digest, and the version of the contract that the robot was judged by."""
 
     version: str
     digest: str
@@ -56,26 +60,27 @@ class Suite(msgspec.Struct, frozen=True):
 
 
 class RequirementSet(msgspec.Struct, frozen=True):
-    """The requirements by which the suite judged."""
+    """The name and digest of the set of requirements that the robot was judged by."""
 
     name: str
     digest: str
 
 
 class Run(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What a policy checks of a run; it holds neither addresses nor tokens.
+    """The facts about a conformance run that a policy checks, without addresses or tokens.
 
     Attributes:
         verdict: verdict of the whole run.
-        classes: verdict of each class.
+        classes: verdict of each conformance class, by the class's name.
         requirements: number of requirements with each verdict.
-        outcomes: ids by level and verdict, so that two certificates can be compared; empty in older certificates.
-        accepted: ids of the requirements whose failure the baseline accepts.
-        accepted_until: last day on which the baseline accepts all failures, if it does.
+        outcomes: ids of requirements by level and verdict, so that two certificates can be compared; empty in older
+            certificates.
+        accepted: ids of the requirements whose failure the baseline file accepts.
+        accepted_until: last day on which the baseline file accepts the failures, or None.
         baseline: digest of the file of accepted failures, or None.
-        nonce: the relying party's nonce that the run was made with, or None.
-        views: for classes that depend on it, whether ROS topics were observed.
-        intermittent: ids of the requirements that failed only at times.
+        nonce: the recipient's nonce that the run was made with, or None.
+        views: for each class that uses ROS topics, whether the suite observed them.
+        intermittent: ids of the requirements that failed in some attempts and passed in others.
         started: RFC 3339, UTC.
         finished: RFC 3339, UTC.
     """
@@ -102,7 +107,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     @property
     def ended(self) -> dt.datetime | None:
-        """Return `finished` as a time, or None if it is not a time in UTC."""
+        """Return `finished` as a datetime, or None if the text is not a time in UTC."""
         try:
             moment = dt.datetime.fromisoformat(self.finished)
         except ValueError:
@@ -111,14 +116,14 @@ class Run(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Verifier(msgspec.Struct, frozen=True):
-    """The suite that verified the robot; `policies` are the contract's files."""
+    """The suite that tested the robot, by its URN, and the files of the contract pack (`policies` in SVR)."""
 
     id: str
     policies: list[Subject]
 
 
 class Predicate(msgspec.Struct, frozen=True, rename="camel"):
-    """SVR v0.2 with the extension field `roaas`."""
+    """The predicate of the statement: SVR v0.2 with the extension field `roaas` for the run's facts."""
 
     verifier: Verifier
     time_created: str
@@ -127,7 +132,7 @@ class Predicate(msgspec.Struct, frozen=True, rename="camel"):
 
 
 class Statement(msgspec.Struct, frozen=True, rename="camel"):
-    """in-toto Statement v1."""
+    """An in-toto Statement v1: the signed files (`subject`) and the predicate about the run."""
 
     type: str = msgspec.field(name="_type")
     subject: list[Subject]
@@ -135,17 +140,17 @@ class Statement(msgspec.Struct, frozen=True, rename="camel"):
     predicate: Predicate
 
     def digest_of(self, name: str) -> str | None:
-        """Return the digest of the subject with that name, or None."""
+        """Return the SHA-256 digest of the signed file with that name, or None if no such file is listed."""
         return next((item.sha256 for item in self.subject if item.name == name), None)
 
 
 def statement_of(result: Mapping[str, Any], octets: bytes, pages: Mapping[str, str]) -> Statement:
-    """Return the statement to sign.
+    """Return the in-toto statement to sign for a result file and the pages written from it.
 
     Args:
         result: a valid `roaas-result/1` document.
-        octets: the content of its file.
-        pages: the pages written from it, by file name.
+        octets: the content of the document's file.
+        pages: content of the pages written from the document, by file name.
     """
     digests = result.get("digests") or {}
     contract = [
@@ -162,23 +167,23 @@ def statement_of(result: Mapping[str, Any], octets: bytes, pages: Mapping[str, s
 
 
 def passed(run: Run) -> list[str]:
-    """Return the classes that passed without an accepted failure."""
+    """Return the names of the classes that passed without a failure that the baseline file accepts."""
     accepted = {id_.partition("/")[0] for id_ in run.accepted}
     return [name for name, verdict in run.classes.items() if verdict == "pass" and name not in accepted]
 
 
 def property_name(class_: str) -> str:
-    """Return the property of a class: REST_RESOURCES for `rest-resources`."""
+    """Return the name of a conformance class as an SVR property: REST_RESOURCES for `rest-resources`."""
     return class_.upper().replace("-", "_")
 
 
 def sha256(octets: bytes) -> str:
-    """Return the SHA-256 in hexadecimal."""
+    """Return the SHA-256 digest of some bytes, in hexadecimal."""
     return hashlib.sha256(octets).hexdigest()
 
 
 def seed_of(nonce: str) -> int:
-    """Return the seed of a run with this nonce, which `roaas certify --nonce` derives in the same way."""
+    """Return the random seed that `roaas certify --nonce` derives from a nonce: six bytes of a SHA-256."""
     return int.from_bytes(hashlib.sha256(b"roaas-nonce/1\0" + nonce.encode()).digest()[:6])
 
 

@@ -1,4 +1,7 @@
-"""Verify a certificate: its signature, the policy, and whether the files beside it are the ones that were signed."""
+"""Verify a certificate: its signature, the recipient's policy, and the files that belong to the certificate.
+
+`PROVED` and `NOT_PROVED` are the texts that say what a successful verification proves and what it does not.
+"""
 
 import datetime as dt
 from collections.abc import Iterator
@@ -24,25 +27,38 @@ NOT_PROVED = (
 
 @dataclass(frozen=True)
 class Verification:
-    """The signed statement, and the points of the policy, including the compared files."""
+    """The outcome of verifying one certificate.
+
+    Attributes:
+        statement: the signed statement.
+        points: the checks of the policy, followed by those of the compared files.
+    """
 
     statement: Statement
     points: tuple[Point, ...]
 
     @property
     def accepted(self) -> bool:
-        """Return whether every point is met."""
+        """Return whether the certificate passed every check."""
         return all(point.met for point in self.points)
 
 
 def verify(
     octets: bytes, key: Key, policy: Policy, known: Known, *, now: dt.datetime, directory: Path | None = None
 ) -> Verification:
-    """Verify an envelope, and the result in a directory if one is given.
+    """Verify a signed envelope by a trusted key and a policy, and optionally compare the signed files.
+
+    Args:
+        octets: the content of the envelope file.
+        key: the public key that the recipient trusts.
+        policy: the requirements that the certificate must meet.
+        known: digests and profiles of the installed suite.
+        now: the time from which the age of the run is counted.
+        directory: folder with result.json and the pages to compare with the signed digests, or None.
 
     Raises:
-        EnvelopeRefusedError: it is not signed by the key, or not a certificate.
-        ResultUnreadableError: the directory's result cannot be read.
+        EnvelopeRefusedError: the envelope is not signed by the key, or is not a certificate.
+        ResultUnreadableError: a file of the directory cannot be read.
     """
     statement = unseal(octets, key)
     files = () if directory is None else _files(statement, directory)
@@ -50,7 +66,7 @@ def verify(
 
 
 def _files(statement: Statement, directory: Path) -> Iterator[Point]:
-    """Yield, for result.json and each page that exists, whether the file is the one that was signed."""
+    """Compare result.json and each existing page in the directory with the signed digests; yield one check per file."""
     for name in (RESULT_SUBJECT, *PAGE_SUBJECTS):
         path = directory / name
         if name in PAGE_SUBJECTS and not path.exists():

@@ -1,1 +1,1 @@
-"""The certificate of a result.json as HTML and Markdown, and the difference of two results."""
+"""Write the certificate of a result.json as HTML and Markdown, and compare two results."""

@@ -1,4 +1,4 @@
-"""What changed between two conformance results, requirement by requirement.
+"""Compare two conformance results requirement by requirement.
 
 A failure is a requirement that was judged and not met, whatever its level, and whether or not the baseline accepts it.
 So a change of the level or of the baseline does not count as a change of the robot.
@@ -13,7 +13,7 @@ Requirement = Mapping[str, Any]
 
 
 class Kind(StrEnum):
-    """What happened to a requirement, the worst change first."""
+    """The kind of change of a requirement between two results, the worst kind first."""
 
     NEW_FAILURE = "new failures"
     LOST = "lost coverage"
@@ -45,7 +45,7 @@ MEANINGS = {
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A requirement in an old and a new result; None for a result without that requirement."""
+    """A change of one requirement: its entries in the old and the new result, None where the requirement is absent."""
 
     id: str
     kind: Kind
@@ -54,12 +54,12 @@ class Change:
 
     @property
     def text(self) -> str:
-        """Return the text of the requirement in the newer result."""
+        """Return the requirement's text, from the newer result if the requirement is there."""
         return str((self.new or self.old or {})["text"])
 
     @property
     def course(self) -> str:
-        """Return level and verdict, before → now."""
+        """Return the level and the verdict, each as "before → now" if different, such as "MUST, pass → fail"."""
         levels = [item["level"] for item in (self.old, self.new) if item]
         verdicts = [item["verdict"] if item else "absent" for item in (self.old, self.new)]
         level = levels[0] if levels[0] == levels[-1] else f"{levels[0]} → {levels[-1]}"
@@ -67,12 +67,12 @@ class Change:
 
     @property
     def reason(self) -> str:
-        """Return the reason in the newer result."""
+        """Return the reason that the newer result gives for the requirement's verdict, or an empty string."""
         return str((self.new or {}).get("reason") or "")
 
     @property
     def regression(self) -> bool:
-        """Return whether a MUST newly fails, or passed before and could not be judged now."""
+        """Return whether a MUST fails that did not fail before, or passed before and could not be judged now."""
         return self.kind is Kind.NEW_FAILURE or (
             self.kind is Kind.LOST and self.new is not None and self.new["level"] == "MUST"
         )
@@ -80,11 +80,11 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Two results compared.
+    """The comparison of an old and a new conformance result.
 
     Attributes:
-        changes: the changes, the worst first.
-        circumstances: how the runs differ: name, before, now.
+        changes: the changed requirements, the worst kind of change first.
+        circumstances: settings in which the two runs differ: name, value before, value now.
         still_failing: number of requirements that failed before and fail now.
     """
 
@@ -96,19 +96,19 @@ class Difference:
 
     @property
     def groups(self) -> dict[Kind, tuple[Change, ...]]:
-        """Return the changes of each kind that occurs."""
+        """Return the changes grouped by kind, the worst kind first."""
         return {
             kind: found for kind in Kind if (found := tuple(change for change in self.changes if change.kind is kind))
         }
 
     @property
     def regressions(self) -> tuple[Change, ...]:
-        """Return the regressions."""
+        """Return the changes that are regressions (see `Change.regression`)."""
         return tuple(change for change in self.changes if change.regression)
 
 
 def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> Difference:
-    """Compare two valid `roaas-result/1` documents."""
+    """Compare two valid `roaas-result/1` documents and return the changes."""
     before = {item["id"]: item for item in old["requirements"]}
     now = {item["id"]: item for item in new["requirements"]}
     changes = [
@@ -136,7 +136,7 @@ def _kinds(old: Requirement | None, new: Requirement | None) -> Iterator[Kind]:
 
 
 def _course(old: Requirement, new: Requirement) -> Iterator[Kind]:
-    """Yield the kinds of change that follow from the two verdicts."""
+    """Yield the kinds of change that follow from a requirement's old and new verdict."""
     if old["verdict"] == "not-claimed" and _judged(new):
         yield Kind.FIRST_JUDGED
     elif _failed(new):

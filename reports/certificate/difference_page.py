@@ -1,4 +1,4 @@
-"""The output of `roaas diff`: text for the terminal, a page, and Markdown."""
+"""Write the output of `roaas diff`: text for the terminal, an HTML page, and Markdown."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ _TONES = {Kind.NEW_FAILURE: "bad", Kind.LOST: "warning", Kind.FIXED: "good"}
 
 
 def headline(found: Difference) -> str:
-    """Return a summary in a sentence."""
+    """Return a summary of the changes in one sentence, such as "1 regression: 1 new failures, 2 fixed."."""
     counts = [f"{len(changes)} {kind}" for kind, changes in found.groups.items() if kind in _TONES]
     still = f"{found.still_failing} still failing" if found.still_failing else ""
     summary = ", ".join([*counts, *filter(None, [still])]) or "no requirement changed its verdict"
@@ -22,7 +22,7 @@ def headline(found: Difference) -> str:
 
 
 def difference_text(found: Difference) -> str:
-    """Return the text for a terminal."""
+    """Return the changes between two results as text for a terminal, at most 50 of each kind."""
     lines = [headline(found)]
     for kind, changes in found.groups.items():
         lines += ["", f"{opened(kind)} ({len(changes)}). {MEANINGS[kind]}"]
@@ -39,12 +39,12 @@ def difference_text(found: Difference) -> str:
 
 
 def difference_html(found: Difference, names: tuple[str, str]) -> str:
-    """Return the page; `names` are the two files."""
+    """Return the changes between two results as an HTML page; `names` are the paths of the two files."""
     return html_page("diff.html.j2", **_values(found, names))
 
 
 def difference_markdown(found: Difference, names: tuple[str, str]) -> str:
-    """Return the short form for a pull request; `names` are the two files."""
+    """Return the changes between two results as Markdown for a pull request; `names` are the paths of the two files."""
     return markdown_page("diff.md.j2", **_values(found, names))
 
 

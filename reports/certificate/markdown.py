@@ -1,6 +1,6 @@
-"""The certificate's short form for a pull request or the summary of a CI job: Markdown of limited size.
+"""Write the certificate as Markdown of limited size, for a pull request or the summary of a CI job.
 
-GitHub drops a job summary of more than 1 MiB, so a very bad run would show nothing.
+GitHub drops a job summary of more than 1 MiB, so without a limit a run with many failures would show nothing.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ _HEADINGS = {"fail": "What failed", "warn": "Warnings"}
 
 
 class _Part(NamedTuple):
-    """The requirements with one verdict: those shown in full, and the others."""
+    """The requirements of one verdict: Markdown blocks of those with details, and the rest, listed by id only."""
 
     heading: str
     in_full: Sequence[str]
@@ -27,7 +27,7 @@ class _Part(NamedTuple):
 
 
 def certificate_markdown(result: Mapping[str, Any]) -> str:
-    """Return a valid `roaas-result/1` document as Markdown of less than 1 MiB."""
+    """Return a valid `roaas-result/1` document as a Markdown certificate of less than 1 MiB."""
     values = page_values(result)
     parts, left = [], MOST_OCTETS
     for verdict, heading in _HEADINGS.items():
@@ -45,5 +45,5 @@ def certificate_markdown(result: Mapping[str, Any]) -> str:
 
 
 def _urgency(requirement: Mapping[str, Any]) -> int:
-    """Return the lowest number of the requirement's findings: 1 is what a vendor should look at first."""
+    """Return the lowest number of the requirement's findings, or 0; a vendor should look at number 1 first."""
     return min((failure.get("number", 0) for failure in requirement["failures"]), default=0)

@@ -1,6 +1,6 @@
-"""The certificate: a conformance result as a page that a vendor can hand to a customer.
+"""Write the certificate: a conformance result as an HTML page that a vendor can hand to a customer.
 
-This module computes what all forms of the certificate say; the templates lay it out. The page calls itself a
+This module computes the content of all forms of the certificate; the templates lay it out. The page calls itself a
 certificate only if every claimed class passed.
 """
 
@@ -43,7 +43,7 @@ _CLASS_ORDER = ("fail", "inconclusive", "pass", "not-claimed")
 
 @dataclass(frozen=True, slots=True)
 class ClassSummary:
-    """One conformance class with its requirements, the worst verdict first."""
+    """One conformance class of a result with its requirements, the worst verdict first."""
 
     name: str
     title: str
@@ -55,26 +55,27 @@ class ClassSummary:
 
     @property
     def cases(self) -> int:
-        """Return the number of cases executed for the class."""
+        """Return the number of test cases that were executed for the class."""
         return sum(requirement["cases"] for requirement in self.requirements)
 
     def count(self, verdict: str, level: str | None = None) -> int:
-        """Return the number of requirements with that verdict, of one level or of all."""
+        """Return how many of the class's requirements have that verdict, of one level or of all levels."""
         return sum(
             requirement["verdict"] == verdict and level in (None, requirement["level"])
             for requirement in self.requirements
         )
 
     def level(self, level: str) -> int:
-        """Return the number of requirements of that level."""
+        """Return how many of the class's requirements have that level (MUST, SHOULD, ...)."""
         return sum(requirement["level"] == level for requirement in self.requirements)
 
 
 @dataclass(frozen=True, slots=True)
 class Untested:
-    """Requirements of claimed classes that were not judged for the same reason.
+    """The requirements of claimed classes that were not tested for one common reason.
 
     Attributes:
+        reason: the reason, in words.
         because_of: number of the finding that kept the suite from testing them, or None.
     """
 
@@ -85,7 +86,10 @@ class Untested:
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """What all forms of the certificate show, the worst verdict first."""
+    """The content of a certificate, computed from a conformance result.
+
+    Conformance classes are sorted with the worst verdict first; `untested` groups requirements that were not tested.
+    """
 
     result: Mapping[str, Any]
     classes: tuple[ClassSummary, ...]
@@ -108,7 +112,7 @@ class Certificate:
 
     @property
     def title(self) -> str:
-        """Return the title that the document may have."""
+        """Return "Certificate of conformance" if the robot is conformant, otherwise "Conformance report"."""
         return "Certificate of conformance" if self.result["verdict"] == "conformant" else "Conformance report"
 
     @property
@@ -119,14 +123,14 @@ class Certificate:
 
     @property
     def maker(self) -> str:
-        """Return vendor and version, as far as they are stated."""
+        """Return the robot's vendor and version as text, as far as the vendor states them."""
         robot = self.result["statement"]["robot"]
         parts = [robot.get("vendor"), f"version {robot['version']}" if robot.get("version") else None]
         return ", ".join(part for part in parts if part)
 
     @property
     def headline(self) -> str:
-        """Return the verdict in a sentence, and which failures are accepted until when."""
+        """Return the verdict in a sentence; also name the failures that the baseline accepts, with date and reason."""
         accepted = self.result.get("accepted_until")
         if not accepted:
             return self._headline
@@ -138,7 +142,7 @@ class Certificate:
 
     @property
     def declared(self) -> str:
-        """Return the figures that the vendor declares, on which the verdict depends."""
+        """Return the figures that the vendor declares and the verdict depends on, as "name = value" text."""
         figures = self.result["statement"].get("declared", {})
         return ", ".join(f"{name} = {figure:g}" for name, figure in figures.items()) or "nothing"
 
@@ -160,7 +164,7 @@ class Certificate:
 
     @property
     def contract(self) -> str:
-        """Return the contract's title, version and pack; before version 1.2 only its version."""
+        """Return title, version and pack name of the contract; for results before version 1.2 only its version."""
         pack = self.result.get("pack")
         if not pack:
             return str(self.result["suite"]["contract"])
@@ -168,19 +172,19 @@ class Certificate:
 
     @property
     def subject(self) -> str:
-        """Return the name and version of the contract to which a conforming robot conforms."""
+        """Return the title of the specification that a conforming robot conforms to, "RoAAS" by default."""
         return str(self.result.get("pack", {}).get("title", "RoAAS"))
 
     def findings(self, verdict: str) -> list[Finding]:
-        """Return the findings of requirements with a verdict, in the order in which a vendor should look at them."""
+        """Return the findings (failures) of requirements with that verdict, the most urgent finding first."""
         return findings(self.with_verdict(verdict), self.result)
 
     def with_verdict(self, verdict: str) -> tuple[Mapping[str, Any], ...]:
-        """Return the requirements of all classes with that verdict."""
+        """Return the requirements with that verdict, of all classes."""
         return tuple(r for c in self.classes for r in c.requirements if r["verdict"] == verdict)
 
     def counts(self) -> Iterator[tuple[str, int]]:
-        """Yield the number of requirements for each verdict that occurs, the worst first."""
+        """Yield each verdict that occurs with its number of requirements, the worst verdict first."""
         for verdict in _ORDER:
             number = len(self.with_verdict(verdict))
             if number:
@@ -188,7 +192,7 @@ class Certificate:
 
 
 def certificate(result: Mapping[str, Any]) -> Certificate:
-    """Arrange a valid `roaas-result/1` document for the templates."""
+    """Return a valid `roaas-result/1` document as a `Certificate`, the object that the page templates use."""
     classes = tuple(sorted(_classes(result), key=lambda c: _CLASS_ORDER.index(c.verdict)))
     return Certificate(result, classes, tuple(_untested(classes)))
 
@@ -223,17 +227,17 @@ def _untested(classes: tuple[ClassSummary, ...]) -> Iterator[Untested]:
 
 
 def certificate_html(result: Mapping[str, Any], seal: Seal | None = None) -> str:
-    """Return the certificate as an HTML page."""
+    """Return the certificate of a result as an HTML page; `seal` holds the fingerprints to show."""
     return html_page("certificate.html.j2", seal=seal, **page_values(result))
 
 
 def certificate_print(result: Mapping[str, Any], seal: Seal) -> str:
-    """Return a signed certificate's summary on one sheet of A4, for print."""
+    """Return a one-page A4 summary of a signed certificate as HTML, for printing."""
     return html_page("certificate-print.html.j2", seal=seal, **page_values(result))
 
 
 def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values that the templates of all forms use."""
+    """Return the template variables that the HTML, print and Markdown forms of the certificate share."""
     return {
         "certificate": certificate(result),
         "result": result,

@@ -1,1 +1,1 @@
-"""The room's commands: report, compare, diff, keygen, sign, verify and registry."""
+"""Define the command-line commands for reports: report, compare, diff, keygen, sign, verify and registry."""

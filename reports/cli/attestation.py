@@ -1,4 +1,4 @@
-"""`roaas keygen` and `roaas verify`."""
+"""Define the commands `roaas keygen` and `roaas verify`."""
 
 import datetime as dt
 from pathlib import Path
@@ -50,7 +50,7 @@ def verify(
     nonce: str | None,
     result: Path | None,
 ) -> None:
-    """Check the signature of a certificate, and whether it meets your policy. No network is needed.
+    """Verify the signature of a certificate and check the certificate against your policy, without a network.
 
     Exit code: 0 accepted; 1 refused; 2 wrong usage, or a file cannot be read.
     """

@@ -1,4 +1,4 @@
-"""`roaas diff`."""
+"""Define the command `roaas diff`."""
 
 from pathlib import Path
 

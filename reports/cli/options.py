@@ -1,4 +1,4 @@
-"""What the commands of this room share: kinds of parameters, and the front door."""
+"""Define the parameter types and options that the report commands share, and their interface to the suite."""
 
 from pathlib import Path
 from typing import Protocol
@@ -19,16 +19,13 @@ CONTRACT = click.option(
 
 
 class FrontDoor(Protocol):
-    """The object in the command's context, through which a command calls packages that it does not import."""
+    """The click context object (`ctx.obj`), by which a command gets information from the conformance suite."""
 
     def known(self, pack: str | None) -> dict[str, object]:
-        """Return the versions and requirements of a contract pack that the installed suite knows.
-
-        The keys are those of `policy.Known`.
-        """
+        """Return the installed suite's digests and profiles for a contract pack, with the fields of `policy.Known`."""
 
 
 def policy_of(door: FrontDoor, path: Path | None, pack: str | None) -> tuple[Policy, Known]:
-    """Return the policy in a file, or the default policy, and what `FrontDoor.known` returns for a contract pack."""
+    """Return the policy (from a file, or the default) and the installed suite's digests for a contract pack."""
     known = msgspec.convert(door.known(pack), Known)
     return read_policy(path, known) if path else Policy(), known

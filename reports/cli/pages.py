@@ -1,4 +1,4 @@
-"""`roaas report` and `roaas compare`."""
+"""Define the commands `roaas report` and `roaas compare`."""
 
 from pathlib import Path
 
@@ -58,9 +58,13 @@ def compare(old: Path, new: Path, threshold: float, out: Path | None) -> None:
 
 
 def tell_change(old: Path, new: Path, threshold: float, out: Path | None = None) -> int:
-    """Print what changed between two latency results, and return the exit code of `roaas compare`.
+    """Compare two latency results, print the changes, and return the exit code of `roaas compare`.
 
-    `threshold` is a share, 0.05 for 5 %. Pages are written to `out` if it is given.
+    Args:
+        old: the older latency.json, or the folder that holds the file.
+        new: the newer one, likewise.
+        threshold: the share by which a quantile must change to count, 0.05 for 5 %.
+        out: folder for compare.html and compare.md, or None to write no pages.
 
     Raises:
         ReportError: a result cannot be read, or the two cannot be compared.

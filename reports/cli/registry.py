@@ -1,4 +1,4 @@
-"""`roaas registry build`."""
+"""Define the command `roaas registry build`."""
 
 import datetime as dt
 from pathlib import Path
@@ -40,10 +40,10 @@ def registry() -> None:
 def build(
     door: FrontDoor, envelopes: tuple[Path, ...], keys: Path, *, policy: Path | None, pack: str | None, out: Path
 ) -> None:
-    """Write SITE from ENVELOPES: files, or folders in which certificate.intoto.json is looked for at any depth.
+    """Write a static site (SITE) from signed certificates: ENVELOPES are files or folders.
 
-    The site works without a network. Exit code: 0 every envelope verifies; 1 the site is written, and some envelopes
-    were refused; 2 wrong usage, or a file cannot be read.
+    Folders are searched for certificate.intoto.json at any depth. The site works without a network. Exit code: 0 every
+    envelope verifies; 1 the site is written, and some envelopes were refused; 2 wrong usage, or a file cannot be read.
     """
     now = dt.datetime.now(dt.UTC)
     wanted, known = policy_of(door, policy, pack)

@@ -1,4 +1,4 @@
-"""`roaas sign`."""
+"""Define the command `roaas sign`."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from reports.rendering import render
 def sign(directory: Path, key: Path) -> None:
     """Sign DIR/result.json: write DIR/certificate.intoto.json, and write the pages again.
 
-    Exit code 2: there is no result, it contradicts itself, or the key cannot be used.
+    Exit code 2: DIR has no result, the result contradicts itself, or the key cannot be used.
     """
     for path in render(directory, Notary(key)):
         click.echo(path)

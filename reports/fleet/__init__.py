@@ -1,1 +1,1 @@
-"""The page of a fleet: which robot passed which classes."""
+"""Write the pages for a fleet run: which robot passed which classes."""

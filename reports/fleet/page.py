@@ -1,4 +1,4 @@
-"""fleet.json as a page and as Markdown: which robots passed, failed or could not be judged."""
+"""Write fleet.json as HTML and Markdown: which robots passed, failed or could not be judged."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -20,12 +20,12 @@ OUTCOMES = {
 
 
 def fleet_html(document: Mapping[str, Any]) -> str:
-    """Return the page of a valid `roaas-fleet/1` document, which links to the robots' certificates."""
+    """Return a valid `roaas-fleet/1` document as an HTML page, which links to the robots' certificates."""
     return html_page("fleet.html.j2", **_values(document))
 
 
 def fleet_markdown(document: Mapping[str, Any]) -> str:
-    """Return the short form for a pull request."""
+    """Return a valid `roaas-fleet/1` document as short Markdown for a pull request."""
     return markdown_page("fleet.md.j2", **_values(document))
 
 

@@ -1,1 +1,1 @@
-"""A conformance result in the formats that CI systems and code hosts read: one module for each."""
+"""Write a conformance result in the formats that CI systems and code hosts read: one module for each format."""

@@ -1,4 +1,4 @@
-"""GitHub's workflow commands: the ten worst cases as annotations, and the number of the others.
+"""Write GitHub workflow commands: the ten worst test cases as annotations, and the number of the others.
 
 GitHub shows ten errors and ten warnings of a step and silently drops the rest.
 """
@@ -14,7 +14,7 @@ MOST = 10
 
 
 def annotations(result: Mapping[str, Any]) -> str:
-    """Return a valid `roaas-result/1` document as workflow commands, one a line."""
+    """Return a valid `roaas-result/1` document as GitHub workflow commands, one per line."""
     found = worst_first(cases(result))
     lines = [_command(result, case) for case in found[:MOST]]
     if len(found) > MOST:
@@ -31,7 +31,7 @@ def _command(result: Mapping[str, Any], case: Case) -> str:
 
 
 def _data(text: str) -> str:
-    """Escape the characters that end a workflow command, so that a text from a robot cannot start another command."""
+    """Escape `%`, carriage return and line feed, so that text from a robot cannot start another workflow command."""
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 

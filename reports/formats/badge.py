@@ -1,4 +1,4 @@
-"""A badge in the format of shields' endpoint: green for a conforming robot only."""
+"""Write a badge as JSON for shields.io's endpoint; the badge is green only if the robot is conformant."""
 
 import json
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ _COLOURS = {"conformant": "brightgreen", "not-conformant": "red", "inconclusive"
 
 
 def badge(result: Mapping[str, Any]) -> str:
-    """Return a valid `roaas-result/1` document as a badge."""
+    """Return the JSON of a shields.io badge with the verdict of a valid `roaas-result/1` document."""
     verdict, colour = VERDICT_WORDS[result["verdict"]].lower(), _COLOURS[result["verdict"]]
     values = list(result["classes"].values())
     text = f"{verdict} ({values.count('pass')} of {len(values)} classes)"

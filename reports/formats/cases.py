@@ -1,6 +1,6 @@
-"""A conformance result as test cases, from which every CI format is written.
+"""Convert a conformance result to test cases, from which every CI format is written.
 
-There is a case for each requirement. A class whose verdict no requirement explains (a missing prerequisite, nothing
+Each requirement becomes a case. A class whose verdict no requirement explains (a missing prerequisite, nothing
 executed) gets a case of its own, and so does a run without any verdict. So no CI system shows green by mistake.
 """
 
@@ -23,7 +23,7 @@ _SHOWN_CURL = 8000
 
 
 class Outcome(StrEnum):
-    """The outcome of a case."""
+    """The outcome of a test case, as CI formats distinguish outcomes."""
 
     FAILED = "failed"
     ERROR = "error"  # could not be judged
@@ -52,9 +52,9 @@ class Case:
         name: id of the requirement, `class NAME`, or `run`.
         class_name: the conformance class; empty for the run.
         outcome: its outcome.
-        message: one line on it, or empty.
-        requirement: as result.json has it; None for a class or the run.
-        findings: the requirement's findings, in the order in which a vendor should look at them.
+        message: the reason for the outcome in one line, or empty.
+        requirement: the requirement's entry in result.json; None for a class or the run.
+        findings: the requirement's failures, the most urgent first.
     """
 
     name: str
@@ -66,7 +66,7 @@ class Case:
 
     @property
     def detail(self) -> str:
-        """Return all details; empty if nothing was judged."""
+        """Return the requirement, its checks and its findings as text; empty for skipped cases, a class or the run."""
         if self.requirement is None or self.outcome is Outcome.SKIPPED:
             return ""
         rule = f"{self.requirement['level']}: {self.requirement['text']}\nSource: {self.requirement['source']}"
@@ -77,17 +77,17 @@ class Case:
 
     @property
     def rule(self) -> str:
-        """Return a name that is the same in every run."""
+        """Return the case's name with `/` for spaces, an id that is the same in every run."""
         return self.name.replace(" ", "/")
 
     @property
     def fingerprint(self) -> str:
-        """Return a digest of the rule's name, 64 hexadecimal digits."""
+        """Return the SHA-256 of the case's rule id as 64 hexadecimal digits, which is the same in every run."""
         return hashlib.sha256(f"roaas/1 {self.rule}".encode()).hexdigest()
 
 
 def cases(result: Mapping[str, Any]) -> list[Case]:
-    """Return the cases of a valid `roaas-result/1` document, class by class."""
+    """Return the test cases of a valid `roaas-result/1` document, class by class."""
     found = [case for name in classes(result) for case in _of_class(result, name)]
     if not found or (
         result["verdict"] != "conformant"
@@ -98,19 +98,22 @@ def cases(result: Mapping[str, Any]) -> list[Case]:
 
 
 def worst_first(found: Sequence[Case]) -> list[Case]:
-    """Return the cases that need attention: failed, not judged, accepted, warnings; the most urgent finding first."""
+    """Return only the cases that failed, were not judged, were accepted or have a warning, in this order.
+
+    Cases with the same outcome are sorted by the number of their most urgent finding.
+    """
     order = [Outcome.FAILED, Outcome.ERROR, Outcome.ACCEPTED, Outcome.WARNING]
     shown = (case for case in found if case.outcome in order)
     return sorted(shown, key=lambda case: (order.index(case.outcome), _first(case)))
 
 
 def _first(case: Case) -> float:
-    """Return the number of the case's first finding; cases without a finding come last."""
+    """Return the number of the case's first finding, as a sort key; infinity for a case without a finding."""
     return case.findings[0].number or 0 if case.findings else math.inf
 
 
 def classes(result: Mapping[str, Any]) -> list[str]:
-    """Return the names of all classes, including classes without a verdict."""
+    """Return the names of all conformance classes in a result, including classes without a verdict."""
     return list(dict.fromkeys([*result["classes"], *(r["class"] for r in result["requirements"])]))
 
 

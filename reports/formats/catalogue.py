@@ -1,4 +1,4 @@
-"""All formats by the name that `roaas report --format` takes, with their file names."""
+"""List all output formats by the name that `roaas report --format` takes, with their file names."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ from reports.formats.sarif import sarif
 
 
 class Format(NamedTuple):
-    """A format: the file name that its readers expect, and the function that writes it."""
+    """An output format: the file name that its readers expect, and the function that converts a result to its text."""
 
     file: str
     write: Callable[[Mapping[str, Any]], str]

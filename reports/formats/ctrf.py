@@ -1,4 +1,4 @@
-"""Write CTRF, the Common Test Report Format: a JSON document for tools that show test results.
+"""Write CTRF, the Common Test Report Format: one JSON format for the many tools that show test results.
 
 | outcome | becomes |
 |---|---|
@@ -29,7 +29,7 @@ _STATUSES = {
 
 
 def ctrf(result: Mapping[str, Any]) -> str:
-    """Return a valid `roaas-result/1` document as a CTRF report."""
+    """Return a valid `roaas-result/1` document as a CTRF report (JSON text)."""
     tests = [_test(result, case) for case in cases(result)]
     statuses = [test["status"] for test in tests]
     start = _milliseconds(result["started"])

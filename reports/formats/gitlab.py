@@ -1,4 +1,4 @@
-"""GitLab's code quality report, from which a merge request shows new and resolved failures.
+"""Write GitLab's code quality report, from which a merge request shows new and resolved failures.
 
 A fingerprint depends only on the requirement, so that the same failure is the same entry in every run, whatever values
 the robot returned. A requirement without a verdict is an entry as well.
@@ -16,7 +16,7 @@ _SEVERITIES = {Outcome.FAILED: "critical", Outcome.ERROR: "major", Outcome.ACCEP
 
 
 def gitlab(result: Mapping[str, Any]) -> str:
-    """Return a valid `roaas-result/1` document as a code quality report."""
+    """Return a valid `roaas-result/1` document as a GitLab code quality report (JSON text)."""
     return json.dumps([_entry(result, case) for case in worst_first(cases(result))], indent=1) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""junit.xml: a conformance result in the format that most CI systems read.
+"""Write junit.xml: a conformance result in the format that most CI systems read.
 
 It has a test suite for each conformance class and a test case for each requirement. It is valid by the junit-10.xsd of
 Jenkins' xUnit plugin, without the extensions that other readers refuse.
@@ -26,7 +26,7 @@ _ELEMENTS = {Outcome.FAILED: "failure", Outcome.ERROR: "error", Outcome.ACCEPTED
 
 
 def junit(result: Mapping[str, Any]) -> str:
-    """Return a valid `roaas-result/1` document as JUnit XML, which declares UTF-8."""
+    """Return a valid `roaas-result/1` document as JUnit XML text with an XML declaration (UTF-8)."""
     found = cases(result)
     robot = result["statement"]["robot"].get("name") or result["target"].get("rest") or "robot"
     root = etree.Element(

@@ -1,6 +1,7 @@
-"""The line to which a code host links a case: in the vendor's statement, or in the contract's ledger.
+"""Find the file and line that a code host links to a test case.
 
-result.json has the lines (`places`). The robot's source code is unknown, so a case links to the claim in the statement.
+The line is in the vendor's statement, or in the contract's ledger, the file that lists its requirements. result.json
+has the lines (`places`). The robot's source code is unknown, so a case links to the claim in the statement.
 """
 
 from collections.abc import Iterator, Mapping
@@ -17,8 +18,8 @@ class Place:
     """A line of a file.
 
     Attributes:
-        file: its path relative to where the run was started, with `/`.
-        line: counted from 1.
+        file: path of the file relative to the directory in which the run was started, with `/`.
+        line: number of the line, counted from 1.
     """
 
     file: str
@@ -26,7 +27,10 @@ class Place:
 
 
 def places_of(result: Mapping[str, Any], case: Case) -> list[Place]:
-    """Return the file and line where the vendor claims a requirement, and where the contract has it; at least one."""
+    """Return the lines where the vendor claims the case's class and where the contract defines the requirement.
+
+    The list has at least one place; a place that result.json does not know is left out.
+    """
     return list(_places(result, case))
 
 

@@ -1,6 +1,6 @@
-"""SARIF 2.1.0 (OASIS, errata 01), which code hosts show beside a repository's files.
+"""Write SARIF 2.1.0 (OASIS, errata 01), which code hosts show beside a repository's files.
 
-There is a result for each case that needs attention. Passed and skipped cases are left out, because some hosts show
+The log has a result for each case that needs attention. Passed and skipped cases are left out, because some hosts show
 every result as a problem, whatever its kind. A case without a verdict is of kind `open`; the run is then another result
 of level `error`, so that a host that counts errors does not show an inconclusive run as green.
 
@@ -24,7 +24,7 @@ _LEVELS = {Outcome.FAILED: "error", Outcome.ERROR: "none", Outcome.ACCEPTED: "wa
 
 
 def sarif(result: Mapping[str, Any]) -> str:
-    """Return a valid `roaas-result/1` document as a SARIF log of one run."""
+    """Return a valid `roaas-result/1` document as a SARIF log (JSON text) with one run."""
     found = worst_first(cases(result))
     if any(case.outcome is Outcome.ERROR for case in found) and not any(case.name == "run" for case in found):
         found.append(Case("run", "", Outcome.ERROR, certificate(result).headline))
@@ -97,6 +97,6 @@ def _location(place: Place) -> dict[str, Any]:
 
 
 def _text(text: str) -> str:
-    """Return one line in which placeholders (SARIF 3.11.5) and links (3.11.6) are escaped."""
+    """Return the text on one line, with placeholders (SARIF 3.11.5) and links (3.11.6) escaped."""
     line = excerpt(text, MESSAGE)
     return line.replace("{", "{{").replace("}", "}}").replace("\\", "\\\\").replace("[", "\\[").replace("]", "\\]")

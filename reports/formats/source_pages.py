@@ -1,4 +1,4 @@
-"""Links from a requirement's source to its web page: RFCs, the Basic Profile, W3C documents, CWE."""
+"""Link a requirement's source to its web page: RFCs, the Basic Profile, W3C documents, CWE."""
 
 import re
 
@@ -18,7 +18,7 @@ _PAGES = (
 
 
 def page_of(source: str) -> str | None:
-    """Return the web page, on https, of the first source that has one."""
+    """Return the https URL of the first source in a "; "-separated list that has a known web page, or None."""
     for part in source.split("; "):
         for pattern, page in _PAGES:
             if found := re.match(pattern, part):

@@ -1,4 +1,4 @@
-"""Two robots measured alternately in one run (`roaas load --against`): verdict signs, and the ratios as a figure."""
+"""Show two robots measured alternately in one run (`roaas load --against`): verdict signs and a figure."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,12 +12,15 @@ TAGS = {"slower": ("bad", "✗"), "not slower": ("good", "✓"), "unclear": ("wa
 
 
 def tag(change: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Return the CSS tone and the sign for a change's verdict; None if the change was not judged."""
+    """Return CSS tone and sign for the verdict on one compared quantile, or None if it was not judged."""
     return TAGS.get(change["verdict"])
 
 
 def picture(result: Mapping[str, Any]) -> Picture | None:
-    """Return a figure of the ratios with their intervals, and of the tolerance as a dashed line."""
+    """Return a figure of the ratios of service times of both robots, or None without a second robot.
+
+    Each ratio has its 95 % interval; a dashed line marks the tolerance.
+    """
     compared = result.get("against")
     if compared is None:
         return None

@@ -1,13 +1,13 @@
-"""Two latency results, compared quantile by quantile with a confidence interval and a threshold.
+"""Compare two latency results quantile by quantile with a confidence interval and a threshold.
 
 For each series that both results hold, the ratio new / old of the median and of the 99th percentile gets an interval.
 It is computed from the intervals in the two results (which come from resampled blocks) on the logarithmic scale, by the
 method of variance estimates recovery (Zou and Donner, Statistics in Medicine 27, 2008). With many quantiles one of them
 looks slower by chance, so the intervals are widened until they hold simultaneously at 95 % (Bonferroni).
 
-A change counts only if its whole interval is beyond the threshold. The threshold is the greater of the one given and of
-the A/A noise in either result, because two runs differ more than the blocks of one run do. A response time includes the
-load generator's own lag, so a difference smaller than that lag is not the robot's.
+A change counts only if its whole interval is beyond the threshold. The threshold is the greater of the given threshold
+and of the A/A control's deviation in either result, because two runs differ more than the blocks of one run do. A
+response time includes the load generator's own lag, so a difference smaller than that lag is not the robot's.
 """
 
 import math
@@ -30,7 +30,7 @@ _SAME_RATE = 0.02
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One quantile of one series in both results.
+    """The comparison of one quantile of one series in both results.
 
     Attributes:
         time: "service" or "response".
@@ -40,8 +40,9 @@ class Change:
         interval: the ratio's interval; the intervals of all changes hold simultaneously at 95 %.
         threshold: the share by which the value must change to count, 0.05 for 5 %.
         lag_ms: the generator's own lag at the quantile, which a response time includes; 0 for a service time.
-        verdict: "slower", "faster", "same", "unclear" (the interval is neither beyond the threshold nor within the one
-            that was given) or "no figure".
+        verdict: "slower", "faster", "same", "unclear" (the interval is neither beyond `threshold` nor within the
+            threshold
+            that the user gave) or "no figure".
     """
 
     operation: str
@@ -59,13 +60,13 @@ class Change:
 
     @property
     def series(self) -> str:
-        """Return the name of the series on the page."""
+        """Return the series' name as pages show it: operation, interface and client."""
         return f"{self.operation}, {self.interface.upper()}, {self.client}"
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Two results and the changes between them.
+    """The comparison of an old and a new latency result.
 
     Attributes:
         changes: one for each series, time and quantile in both results.
@@ -81,11 +82,11 @@ class Comparison:
 
     @property
     def valid(self) -> bool:
-        """Return whether both results are valid and share a quantile that could be compared."""
+        """Return whether both results are valid and at least one quantile could be compared."""
         return bool(self.old["valid"] and self.new["valid"] and any(c.interval for c in self.changes))
 
     def with_verdict(self, verdict: str) -> list[Change]:
-        """Return the changes with that verdict, the greatest first."""
+        """Return the changes with that verdict, the greatest change first."""
         found = [change for change in self.changes if change.verdict == verdict]
         return sorted(found, key=lambda change: -abs(math.log(change.ratio or 1.0)))
 
@@ -96,10 +97,12 @@ class Comparison:
 
 
 def compare(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, str], threshold: float) -> Comparison:
-    """Compare two valid `roaas-latency/1` documents; `threshold` is a share, 0.05 for 5 %, and `names` are their paths.
+    """Compare two valid `roaas-latency/1` documents quantile by quantile.
+
+    `threshold` is the share by which a quantile must change to count, 0.05 for 5 %; `names` are the documents' paths.
 
     Raises:
-        ResultsIncompatibleError: they were measured under different loads, or share no series.
+        ResultsIncompatibleError: the results were measured under different loads, or share no series.
         ResultInvalidError: a histogram cannot be decoded.
     """
     _same_load(old["plan"], new["plan"], names)
@@ -145,7 +148,10 @@ def _same_load(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str,
 
 
 def _same_cap(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, str]) -> None:
-    """Raise an error for two closed-model results with different caps: their times include waiting for the cap."""
+    """Raise `ResultsIncompatibleError` for two closed-model results with different caps on the request rate.
+
+    Times under a cap include waiting for the cap.
+    """
     caps = [(plan.get("limits") or {}).get("max_rate") for plan in (old, new)]
     if new["model"] == "closed" and caps[0] != caps[1]:
         limits = [f"a cap of {rate(cap)} requests/s" if cap is not None else "no cap" for cap in caps]
@@ -170,7 +176,10 @@ def _changes(old: Series, new: Series, noise: Sequence[Mapping[str, Any]], thres
 
 
 def _settled(change: Change, together: int, asked: float) -> Change:
-    """Widen a change's interval so that `together` intervals hold simultaneously, and set its verdict."""
+    """Widen a change's interval so that `together` intervals hold simultaneously, and set its verdict.
+
+    `asked` is the threshold that the user gave.
+    """
     if change.interval is None or change.ratio is None or change.old_ms is None or change.new_ms is None:
         return change
     interval = widened(change.ratio, change.interval, together)
@@ -181,7 +190,10 @@ def _settled(change: Change, together: int, asked: float) -> Change:
 
 
 def widened(ratio: float, interval: tuple[float, float], together: int) -> tuple[float, float]:
-    """Return one of `together` intervals, widened so that all hold simultaneously (normal on a log scale)."""
+    """Return a 95 % interval of a ratio, widened so that `together` such intervals hold simultaneously.
+
+    The method is Bonferroni's, with a normal distribution on the log scale.
+    """
     alone, all_of_them = (NormalDist().inv_cdf(1 - (1 - _CONFIDENCE) / 2 / count) for count in (1, together))
     factor = all_of_them / alone
     low, high = (math.log(bound / ratio) * factor for bound in interval)
@@ -194,9 +206,9 @@ def _lag(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, float]:
 
 
 def noise_of(noise: Sequence[Mapping[str, Any]], series: Series, quantile: str) -> float:
-    """Return how far an interface's ratio to itself (A/A control) was from 1, as a share; 0 if there was no control.
+    """Return how far the A/A control's ratio differs from 1, as a share; 0 if no control was measured.
 
-    The value for a quantile is at least that of the lower quantiles, also if its own was not measured.
+    The deviation of a quantile is at least that of the lower quantiles, also if its own was not measured.
     """
     lower = _ASCENDING[: _ASCENDING.index(quantile) + 1]
     operation, client, _ = series.key
@@ -213,7 +225,7 @@ def noise_of(noise: Sequence[Mapping[str, Any]], series: Series, quantile: str) 
 def ratio_interval(
     old: float | None, old_bounds: Sequence[float] | None, new: float | None, new_bounds: Sequence[float] | None
 ) -> tuple[float, float] | None:
-    """Return the 95 % interval of new / old from both intervals; None if a value is missing or not above 0.
+    """Return the 95 % interval of new / old from both values' intervals; None if a value is missing or not above 0.
 
     With log ratio d and arms a of each estimate: d - sqrt(a_new_low² + a_old_high²), d + sqrt(a_new_high² +
     a_old_low²).
@@ -230,7 +242,7 @@ def ratio_interval(
 
 
 def judge(interval: tuple[float, float], threshold: float, asked: float) -> str:
-    """Return the verdict on an interval of new / old.
+    """Return "slower", "faster", "same" or "unclear" for an interval of new / old.
 
     "slower" and "faster" need the whole interval beyond `threshold`, which includes the A/A control's deviation. "same"
     needs the whole interval within `asked`, the threshold that the user gave.

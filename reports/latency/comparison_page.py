@@ -1,4 +1,4 @@
-"""The output of `roaas compare`: a table for the terminal, a page with figures, and Markdown."""
+"""Write the output of `roaas compare`: a table for the terminal, an HTML page with figures, and Markdown."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -18,7 +18,7 @@ _HEAD = ("series", "time", "at", "old ms", "new ms", "new/old", "95 % interval",
 
 
 def verdict(comparison: Comparison) -> Verdict:
-    """Return the verdict on the comparison, with the greatest change and its interval."""
+    """Return the verdict on a comparison of two latency results, with the greatest change and its interval."""
     if not comparison.valid:
         because = " ".join(comparison.remarks) or "No quantile has an interval in both results."
         return Verdict("warning", "?", "Not comparable", because)
@@ -38,7 +38,7 @@ def verdict(comparison: Comparison) -> Verdict:
 
 
 def sentence(of: Change) -> str:
-    """Return a sentence that describes a change of one quantile."""
+    """Return a sentence on one changed quantile: old and new time, their ratio, and its 95 % interval."""
     return (
         f"{of.series}: the {of.time} time at {QUANTILE_WORDS[of.quantile]} went from {ms(of.old_ms)} to "
         f"{ms(of.new_ms)} ms, {ratio(of.ratio)} times (95 % interval {interval(of.interval, of_ratio=True)}, "
@@ -47,7 +47,7 @@ def sentence(of: Change) -> str:
 
 
 def table(comparison: Comparison) -> str:
-    """Return all changes in aligned columns, for a terminal."""
+    """Return all compared quantiles as a table in aligned columns, for a terminal."""
     rows = [_HEAD, *(_row(one) for one in comparison.changes)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(_HEAD))]
     # Words are aligned to the left, numbers to the right.
@@ -62,13 +62,13 @@ def table(comparison: Comparison) -> str:
 
 
 def comparison_html(comparison: Comparison, names: tuple[str, str]) -> str:
-    """Return the page; `names` are the two files."""
+    """Return the comparison of two latency results as an HTML page; `names` are the paths of the two files."""
     pictures = {"ratios": _ratios(comparison.changes), "change": change(comparison.old_series, comparison.new_series)}
     return html_page("compare.html.j2", pictures=pictures, **_values(comparison, names))
 
 
 def comparison_markdown(comparison: Comparison, names: tuple[str, str]) -> str:
-    """Return the short form for a pull request; `names` are the two files."""
+    """Return the comparison of two latency results as short Markdown; `names` are the paths of the two files."""
     return markdown_page("compare.md.j2", **_values(comparison, names))
 
 

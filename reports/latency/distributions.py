@@ -1,4 +1,4 @@
-"""Distributions of latencies, decoded from the HDR histograms of a result file.
+"""Decode the latency distributions of a result file from their HDR histograms.
 
 A histogram holds whole microseconds in HdrHistogram's V2 encoding, compressed, in base64. It is decoded once into three
 arrays in milliseconds, from which every curve is drawn.
@@ -26,12 +26,12 @@ _TAIL = 0.025
 
 @dataclass(frozen=True, slots=True)
 class Distribution:
-    """Recorded values, grouped by the histogram's own buckets.
+    """The latencies of a series, grouped by the buckets of the HDR histogram.
 
     Attributes:
         low_ms: lower edge of each bucket that is not empty, ascending.
-        high_ms: its upper edge (half a microsecond beyond its highest value).
-        counts: how many values it holds.
+        high_ms: upper edge of each bucket (half a microsecond beyond its highest value).
+        counts: number of values in each bucket.
     """
 
     low_ms: Floats
@@ -40,11 +40,11 @@ class Distribution:
 
     @property
     def total(self) -> int:
-        """Return the number of values."""
+        """Return the number of values in all buckets."""
         return int(self.counts.sum())
 
     def quantiles(self, at: Floats) -> Floats:
-        """Return the values at the quantiles `at` (0 to 1), interpolated inside a bucket."""
+        """Return the latencies (ms) at the quantiles `at` (0 to 1), interpolated inside a bucket."""
         reached = np.cumsum(self.counts)
         rank = np.clip(at, 0.0, 1.0) * self.total
         index = np.minimum(np.searchsorted(reached, rank, side="left"), len(reached) - 1)
@@ -55,7 +55,7 @@ class Distribution:
 
     @property
     def highest_supported(self) -> float:
-        """Return the highest quantile for which so many values give a 95 % interval with an upper bound.
+        """Return the highest quantile whose 95 % interval has an upper bound, given the number of values.
 
         The largest of n values lies above the q-quantile with probability 1 - q**n; that is at least 97.5 %
         up to q = 0.025**(1/n).
@@ -64,14 +64,14 @@ class Distribution:
 
 
 def distribution(encoded: str, where: str) -> Distribution | None:
-    """Decode a histogram; return None if it is empty.
+    """Decode an HDR histogram and return its distribution, or None if the histogram is empty.
 
     Args:
         encoded: base64 of the V2 encoding.
         where: the place in the result file, for the error message.
 
     Raises:
-        ResultInvalidError: it cannot be decoded.
+        ResultInvalidError: the histogram cannot be decoded.
     """
     if not encoded:
         return None
@@ -97,7 +97,7 @@ def distribution(encoded: str, where: str) -> Distribution | None:
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """One series of a latency result with its distributions.
+    """A series (one operation, client and interface) of a latency result, with its decoded distributions.
 
     Attributes:
         data: the series as in the file.
@@ -111,12 +111,12 @@ class Series:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """Return operation, client and interface, which identify a series."""
+        """Return (operation, client, interface), which identify a series."""
         return self.data["operation"], self.data["client"], self.data["interface"]
 
     @property
     def name(self) -> str:
-        """Return the name of the series on the page."""
+        """Return the series' name as pages show it: operation and interface."""
         return f"{self.data['operation']}, {self.data['interface'].upper()}"
 
 
@@ -125,7 +125,10 @@ AllSeries = Mapping[tuple[str, str, str], Series]
 
 
 def all_series(result: Mapping[str, Any], path: str) -> AllSeries:
-    """Return every series by operation, client and interface, wire before zeep and REST before SOAP."""
+    """Return every series of a result by (operation, client, interface), with decoded histograms.
+
+    The wire client comes before zeep, and REST before SOAP. `path` is the result's file, for error messages.
+    """
     found = {}
     for index, data in enumerate(result["series"]):
         where = f"{path}: at $.series[{index}]"

@@ -1,4 +1,4 @@
-"""A latency result in sentences: the verdict, and remarks with their intervals."""
+"""Describe a latency result in sentences: the verdict, and remarks with their confidence intervals."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -19,11 +19,13 @@ PAPER = {"rest_ms": 1.5, "soap_ms": 2.5, "ratio": 1.67}
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The head of the report.
+    """The verdict at the top of a latency page.
 
     Attributes:
-        tone: "good", "bad", "warning" or "quiet".
-        sentence: the result, with its interval.
+        tone: "good", "bad", "warning" or "quiet"; it sets the colour.
+        sign: the sign beside the words, such as "✓".
+        words: the verdict in a few words.
+        sentence: the measured result, with its interval.
     """
 
     tone: str
@@ -33,7 +35,7 @@ class Verdict:
 
 
 def verdict(result: Mapping[str, Any], series: AllSeries) -> Verdict:
-    """Return the result's own headline with a tone and a sign."""
+    """Return the verdict for a page: the headline stored in the result, with the tone and sign that fit."""
     said = result["headline"]
     return Verdict(*_tone(result, series), said["words"], said["sentence"])
 
@@ -51,7 +53,10 @@ def _tone(result: Mapping[str, Any], series: AllSeries) -> tuple[str, str]:
 
 
 def remarks(result: Mapping[str, Any], series: AllSeries) -> list[str]:
-    """Return further observations, a sentence each: stalls, knees, failed requests, and the run's own notes."""
+    """Return further observations, a sentence each: stalls, knees, failed requests, and the run's own notes.
+
+    A knee is the highest request rate at which the robot still meets the latency criterion.
+    """
     return [
         *_server_share(series),
         *work(series),
@@ -69,7 +74,7 @@ def remarks(result: Mapping[str, Any], series: AllSeries) -> list[str]:
 
 
 def _server_share(series: AllSeries) -> Iterator[str]:
-    """Yield how much of SOAP's extra time the server spends, if the robot states its time."""
+    """Yield for each operation how much of SOAP's extra time the server spends, if both state a Server-Timing."""
     for (operation, client, interface), soap in series.items():
         rest = series.get((operation, client, "rest"))
         if (client, interface) != ("wire", "soap") or rest is None:
@@ -85,7 +90,7 @@ def _server_share(series: AllSeries) -> Iterator[str]:
 
 
 def _further(result: Mapping[str, Any]) -> Iterator[str]:
-    """Yield how long interfaces other than SOAP and REST take at the median."""
+    """Yield for each interface other than SOAP and REST how its median time compares with REST's."""
     for way in result.get("further_interfaces", []):
         if way["quantile"] == "p50" and way["ci95"]:
             yield (
@@ -96,7 +101,7 @@ def _further(result: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _followed(result: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a sentence for each interface: how long a delivery takes until the robot's application has received it."""
+    """Yield the median time of a delivery until the application has received it, for each interface."""
     ways = result.get("end_to_end", {}).get("ways", [])
     parts = [
         f"{ms(way['to_application_ms']['p50'])} ms over {way['interface'].upper()}"
@@ -110,7 +115,7 @@ def _followed(result: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _stalled(result: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the stalls in one sentence; overlapping stalls of several series count as one."""
+    """Yield one sentence on all stalls and the longest; overlapping stalls of several series count as one."""
     moments: list[list[Stall]] = []
     for stall in sorted(stalls(result), key=lambda stall: stall.start_s):
         if moments and stall.start_s < max(other.end_s for other in moments[-1]):
@@ -130,7 +135,7 @@ def _stalled(result: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _two_modes(series: AllSeries) -> Iterator[str]:
-    """Yield a sentence for each series with two modes, and one on series with many requests far above the median."""
+    """Yield a sentence for each series with a bimodal latency, and one on requests over five times the median."""
     far = []
     for one in series.values():
         found = one.data.get("modes")
@@ -170,7 +175,7 @@ def _knees(result: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _searched(result: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the knee of each interface that was found by bisection."""
+    """Yield a sentence on the knee (highest sustainable rate) of each interface that was searched by bisection."""
     for knee in result.get("knee_search", []):
         name = "REST and SOAP at once" if knee["interface"] == "both" else knee["interface"].upper()
         if knee["rate"] is None:
@@ -203,7 +208,7 @@ def _failed(result: Mapping[str, Any], series: AllSeries) -> Iterator[str]:
 
 
 def _noted(result: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the result's notes, which are clauses, as sentences."""
+    """Yield the notes stored in the result as sentences, with a capital letter and a period."""
     yield from (f"{opened(note.rstrip('.'))}." for note in result.get("notes", []) if note)
 
 

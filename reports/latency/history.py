@@ -1,4 +1,4 @@
-"""The history of a robot's latency: the stored results of `roaas load --save NAME` as a page and as CSV.
+"""Write the history of a robot's latency: all results stored by `roaas load --save NAME`, as HTML and CSV.
 
 The CSV is for a change-point detector such as Apache Otava. It has a row for each run, in order of time, and a column
 for each quantile that every run has.
@@ -23,7 +23,7 @@ _QUANTILES = ("p50", "p99")
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One stored result.
+    """One stored latency result: time, robot's version, load in words, and series.
 
     Attributes:
         series: by operation, client and interface.
@@ -39,7 +39,7 @@ def write_history(folder: Path) -> list[Path]:
     """Write history.html and history.csv beside the stored results in a folder, and return their paths.
 
     Raises:
-        ReportError: there is no result, or one cannot be read.
+        ReportError: the folder has no result, or a result cannot be read.
     """
     files = sorted(folder.glob("20*.json"))
     if not files:
@@ -60,7 +60,7 @@ def _run(result: Mapping[str, Any]) -> Run:
 
 
 def history_csv(runs: Sequence[Run]) -> str:
-    """Return a row for each run: time, robot's version, and the quantiles that every run has, in milliseconds."""
+    """Return CSV with a row for each run: time, robot's version, and the quantiles (ms) that every run has."""
     columns = {
         f"{operation}_{interface}_{client}_{quantile}_ms": ((operation, client, interface), quantile)
         for operation, client, interface in runs[-1].series
@@ -76,7 +76,7 @@ def history_csv(runs: Sequence[Run]) -> str:
 
 
 def history_html(name: str, runs: Sequence[Run]) -> str:
-    """Return the page: the medians of all runs with their intervals, as a figure and as a table."""
+    """Return an HTML page with the medians of all runs and their intervals, as a figure and as a table."""
     keys = list(dict.fromkeys(key for run in runs for key in run.series))
     rows = [
         (

@@ -1,4 +1,4 @@
-"""How numbers are written: with their significant digits, and a dash where there is no number."""
+"""Format numbers with their significant digits, and missing numbers as a dash."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ _WHOLE_PERCENT = 10
 
 
 def ms(value: float | None) -> str:
-    """Return milliseconds with three decimals below 10, and fewer above: 0.074, 12.3, 1,810."""
+    """Return milliseconds as text with three decimals below 10, and fewer above: 0.074, 12.3, 1,810."""
     if value is None:
         return NONE
     size = abs(value)
@@ -21,12 +21,12 @@ def ms(value: float | None) -> str:
 
 
 def ratio(value: float | None) -> str:
-    """Return a ratio with two decimals."""
+    """Return a ratio as text with two decimals, or a dash for None."""
     return NONE if value is None else f"{value:.2f}"
 
 
 def rate(value: float | None) -> str:
-    """Return requests per second: 4,000, or 12.5."""
+    """Return requests per second as text: 4,000, or 12.5; a dash for None."""
     if value is None:
         return NONE
     return f"{value:,.0f}" if value >= _WHOLE_RATE or value == int(value) else f"{value:.1f}"
@@ -41,7 +41,7 @@ def share(value: float | None) -> str:
 
 
 def interval(bounds: Sequence[float] | None, *, of_ratio: bool = False) -> str:
-    """Return an interval of milliseconds or of ratios: 1.58 to 1.63."""
+    """Return an interval of milliseconds or of ratios as text: 1.58 to 1.63; a dash for None."""
     if bounds is None:
         return NONE
     write = ratio if of_ratio else ms

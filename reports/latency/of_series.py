@@ -1,4 +1,4 @@
-"""Remarks on single series: the robot's own work, requests after a pause, and repeats."""
+"""Write remarks on single series: the server's own work, requests after a pause, and repeats."""
 
 from collections.abc import Iterator
 
@@ -10,7 +10,7 @@ _OTHER_WORK = 1.5
 
 
 def work(series: AllSeries) -> Iterator[str]:
-    """Yield a remark for each operation on which the robot itself works longer over one interface than the other."""
+    """Yield a remark for each operation whose server time differs by 1.5 times or more between REST and SOAP."""
     for (operation, client, interface), rest in series.items():
         soap = series.get((operation, client, "soap"))
         if interface != "rest" or client != "wire" or soap is None:
@@ -24,7 +24,7 @@ def work(series: AllSeries) -> Iterator[str]:
 
 
 def cold(series: AllSeries) -> Iterator[str]:
-    """Yield one sentence that compares requests after a pause with requests without one, for all series."""
+    """Yield one sentence that compares median times of requests after a pause with those without a pause."""
     text, after, behind = [], "", ""
     for one in series.values():
         pause = one.data.get("after_pause")
@@ -38,7 +38,7 @@ def cold(series: AllSeries) -> Iterator[str]:
 
 
 def _behind(spacing_s: float) -> str:
-    """Return in words how closely the requests without a pause followed one another."""
+    """Return words for the time between successive requests without a pause; `spacing_s` is in seconds, 0 for none."""
     if not spacing_s:
         return "right behind another request"
     limit = f"the limit of {rate(1 / spacing_s)} requests/s allows no less"
@@ -46,7 +46,10 @@ def _behind(spacing_s: float) -> str:
 
 
 def repeated(series: AllSeries) -> Iterator[str]:
-    """Yield a remark for each series with repeats: the range of the repeats' medians and the fit of their intervals."""
+    """Yield a remark for each series with repeats, on the range of their medians.
+
+    It also says how many of the repeats' intervals do not contain the overall median.
+    """
     for one in series.values():
         repeats = [repeat for repeat in one.data.get("repeats", []) if repeat["p50"] and repeat["ci95_ms"]["p50"]]
         whole = one.data["service_ms"]["p50"]

@@ -1,4 +1,4 @@
-"""The latency report: a measurement of SOAP and REST as a page and as Markdown."""
+"""Write the latency report: a measurement of SOAP and REST as an HTML page and as Markdown."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ JUDGED = {
 
 @dataclass(frozen=True, slots=True)
 class PaperRow:
-    """One row of the comparison with the paper, which gives means; None if not measured.
+    """A table row with mean times over REST and SOAP, of the paper or of this run; None if not measured.
 
     `bounds` is the 95 % interval of the ratio.
     """
@@ -62,7 +62,7 @@ def latency_html(result: Mapping[str, Any], path: str = "latency.json") -> str:
 
 
 def latency_markdown(result: Mapping[str, Any], path: str = "latency.json") -> str:
-    """Return the short form for a pull request; arguments and errors as for the page."""
+    """Return a valid `roaas-latency/1` document as short Markdown for a pull request; errors as for `latency_html`."""
     series = all_series(result, path)
     return markdown_page("latency.md.j2", **_values(result, series))
 
@@ -92,13 +92,13 @@ def _values(result: Mapping[str, Any], series: AllSeries) -> dict[str, Any]:
 
 
 def _missing(series: AllSeries) -> list[str]:
-    """Return why values are missing, each reason once."""
+    """Return the reasons why values of any series are missing, each reason once."""
     reasons = (reason for one in series.values() for reason in one.data.get("reasons", {}).values())
     return sorted({reason.rpartition("; ")[2] for reason in reasons})
 
 
 def _rounds(result: Mapping[str, Any]) -> list[str]:
-    """Return a description of the blocks from which the medians' intervals were resampled, by operation and client."""
+    """Return a line for each operation and client on the resampling: numbers of rounds and blocks, autocorrelation."""
     lines = []
     for entry in result["comparisons"]:
         rounds = entry.get("rounds")
@@ -113,7 +113,7 @@ def _rounds(result: Mapping[str, Any]) -> list[str]:
 
 
 def paper_rows(result: Mapping[str, Any], series: AllSeries) -> list[PaperRow]:
-    """Return the paper's means, followed by this run's for each operation and client."""
+    """Return the table rows of mean times: the paper's, followed by this run's for each operation and client."""
     means_compared = {(c["operation"], c["client"]): c for c in result["comparisons"] if c["quantile"] == "mean"}
     rows = [PaperRow("the paper, delivery", PAPER["rest_ms"], PAPER["soap_ms"], PAPER["ratio"], None)]
     for operation, client in dict.fromkeys(key[:2] for key in series):

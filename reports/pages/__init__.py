@@ -1,1 +1,1 @@
-"""What all pages share: templates, and the escaping of text from a robot."""
+"""Share code among all pages: templates, the table of robots and classes, and escaping of text from a robot."""

@@ -1,4 +1,4 @@
-"""A table of robots and conformance classes, as the pages of a fleet and of a registry show it."""
+"""Build the table of robots and conformance classes that the pages of a fleet and of a registry show."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class Mark(Enum):
-    """The cell of a robot and a class: tone, sign and words. Only TRUSTED is green."""
+    """The content of a table cell for a robot and a class: colour tone, sign and words. Only TRUSTED is green."""
 
     TRUSTED = ("good", "✓", "passed")
     ACCEPTED = ("warning", "!", "passed except for accepted failures")
@@ -17,17 +17,17 @@ class Mark(Enum):
 
     @property
     def tone(self) -> str:
-        """Return the class in the style sheet."""
+        """Return the name of the cell's CSS class, which sets its colour."""
         return self.value[0]
 
     @property
     def sign(self) -> str:
-        """Return the sign beside the colour."""
+        """Return the sign that the cell shows, such as "✓"."""
         return self.value[1]
 
     @property
     def words(self) -> str:
-        """Return the words that a screen reader reads."""
+        """Return the meaning of the sign in words, for screen readers."""
         return self.value[2]
 
 
@@ -36,13 +36,13 @@ _OF_VERDICT = {"fail": Mark.FAILED, "inconclusive": Mark.INCONCLUSIVE, "not-clai
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One robot.
+    """The table row of one robot.
 
     Attributes:
-        name: of the robot.
-        marks: by class.
-        tone: style of the word beside the name.
-        word: the verdict on the robot as a whole.
+        name: the robot's name.
+        marks: content of the cells, by the name of the conformance class.
+        tone: CSS class of `word`.
+        word: the verdict on the robot as a whole, shown beside the name.
         notes: lines under the name.
         href: relative link to the robot's page, or empty.
         until: RFC 3339 time after which no cell is green, or empty.
@@ -59,29 +59,32 @@ class Row:
 
 @dataclass(frozen=True)
 class Matrix:
-    """The rows, and the classes that occur in them, in the order of their first occurrence."""
+    """The table: its rows, and the titles of the conformance classes by name."""
 
     rows: tuple[Row, ...]
     titles: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def classes(self) -> tuple[str, ...]:
-        """Return the columns."""
+        """Return the columns: the names of all classes in the rows, in the order of their first occurrence."""
         return tuple(dict.fromkeys(name for row in self.rows for name in row.marks))
 
     def trusted(self, row: Row) -> str:
-        """Return the numbers of a row's green columns; the filter uses numbers, so that no name enters the CSS."""
+        """Return the numbers (from 0) of a row's green columns, separated by spaces.
+
+        The page's filter uses numbers, so that no class name enters the CSS.
+        """
         numbers = (number for number, name in enumerate(self.classes) if row.marks.get(name) is Mark.TRUSTED)
         return " ".join(map(str, numbers))
 
 
 def marks(classes: Mapping[str, str], trusted: Iterable[str], *, stands: bool = True) -> dict[str, Mark]:
-    """Return the mark of each class.
+    """Return the table cell content for each class of a robot.
 
     Args:
         classes: the verdict of each class.
         trusted: the classes that passed without an accepted failure.
-        stands: whether any class may be green.
+        stands: False if no class may be green, because the result does not count.
     """
     green = set(trusted)
     found = {}

@@ -1,4 +1,4 @@
-"""Makes the pages: Jinja templates become self-contained files that load nothing and send nothing.
+"""Make pages from Jinja templates: self-contained files that load nothing and send nothing.
 
 Each page includes its style and its script, and a Content-Security-Policy that allows nothing else. The policy names
 the script by its digest (CSP Level 3, section 2.3.1), so that text from a robot could not run as a script even if its
@@ -23,7 +23,7 @@ TEMPLATE_DIR = Path(__file__).parent / "templates"
 
 
 def html_page(template: str, **values: Any) -> str:
-    """Return an HTML template filled with values; everything except `Markup` is escaped."""
+    """Return an HTML page: the named template filled with the values, which are escaped unless they are `Markup`."""
     script = _asset("page.js")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = (
@@ -45,12 +45,12 @@ def html_page(template: str, **values: Any) -> str:
 
 
 def markdown_page(template: str, **values: Any) -> str:
-    """Return a Markdown template filled with values; the templates escape text from outside by filters."""
+    """Return Markdown: the named template filled with the values; the templates escape external text by filters."""
     return _environment(html=False).get_template(template).render(generator_name=f"RoAAS {suite_version()}", **values)
 
 
 def write_pages(directory: Path, pages: dict[str, str]) -> list[Path]:
-    """Write pages by their file names, and return their paths.
+    """Write pages, given by file name, into a directory, and return their paths.
 
     Each is written to a temporary file first, so that an interrupted run leaves the old page or the new one.
 
@@ -69,7 +69,7 @@ def write_pages(directory: Path, pages: dict[str, str]) -> list[Path]:
 
 
 def suite_version() -> str:
-    """Return the version of the installed distribution, or "unknown" if it is not installed."""
+    """Return the version of the installed `roaas` distribution, or "unknown" if it is not installed."""
     try:
         return version("roaas")
     except PackageNotFoundError:
@@ -101,19 +101,19 @@ def _environment(*, html: bool) -> Environment:
 
 
 def _finalize(value: Any) -> Any:
-    """Make control characters visible in the text of every `{{ … }}`; markup of this package is unchanged."""
+    """Escape unprintable characters in a template's `{{ … }}` text; return `Markup` unchanged."""
     if isinstance(value, str) and not isinstance(value, Markup):
         return visible(value)
     return value
 
 
 def opened(text: str) -> str:
-    """Return the text with a capital letter at its beginning."""
+    """Return the text with its first letter in upper case."""
     return text[:1].upper() + text[1:]
 
 
 def grouped(number: float) -> str:
-    """Return a number with separated thousands: 12,345."""
+    """Return a number with commas between thousands: 12,345."""
     return f"{number:,}"
 
 

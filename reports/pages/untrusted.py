@@ -1,4 +1,4 @@
-"""Makes text from a robot safe to show: without invisible characters, and of limited length.
+"""Make text from a robot safe to show: without invisible characters, and of limited length.
 
 A robot may send anything: terminal escapes, a right-to-left override that reverses a verdict, lone surrogates that
 cannot be encoded, a gigabyte of one letter. Unprintable characters are shown as their escapes, and a long text is cut
@@ -26,7 +26,10 @@ def visible(text: str) -> str:
 
 
 class _Escapes(dict[int, int | str]):
-    """Code points and their replacements; each is computed once, which is ten times faster for long texts."""
+    """A translation table for `str.translate` that maps unprintable characters to escapes.
+
+    Each entry is computed once, when it is first used, which is ten times faster for long texts.
+    """
 
     def __missing__(self, code: int) -> int | str:
         character = chr(code)
@@ -39,7 +42,7 @@ _ESCAPES = _Escapes()
 
 
 def excerpt(text: str, limit: int) -> str:
-    """Return the text on one line, cut to about `limit` characters: for messages and table cells."""
+    """Return the text on one line, with escapes and cut to about `limit` characters, for messages and table cells."""
     line = " ".join(visible(text[: limit + 1]).split())
     return line if len(text) <= limit else f"{line[:limit]}…"
 
@@ -62,12 +65,15 @@ class Excerpt:
 
     @property
     def cut(self) -> bool:
-        """Return whether the excerpt leaves out a part of the text."""
+        """Return whether a part of the text is not shown."""
         return self.omitted > 0
 
 
 def beginning(text: str, limit: int, octets: int | None = None) -> Excerpt:
-    """Return the first `limit` characters of a body; `octets` is its length if it had been cut before it was stored."""
+    """Return the first `limit` characters of a text, and how much is omitted.
+
+    `octets` is the whole length in bytes if the text had been cut before it was stored.
+    """
     shown = visible(text[:limit])
     present = len(text.encode("utf-8", "surrogatepass"))
     if octets is not None and octets > present:
@@ -88,7 +94,7 @@ def code_span(text: str, limit: int = 300) -> str:
 
 
 def coded(text: str) -> Markup:
-    """Return the text as HTML, with `<code>` around what stands between backticks."""
+    """Return the text as HTML, with `<code>` around each part between backticks."""
     parts = (escape(part) if number % 2 == 0 else Markup("<code>{}</code>").format(part)
              for number, part in enumerate(text.split("`")))  # fmt: skip
     return Markup().join(parts)

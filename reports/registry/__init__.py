@@ -1,1 +1,1 @@
-"""Write a static site from signed certificates: which robot passed which classes, which key signed that, and when."""
+"""Build a static site from signed certificates: which robot passed which classes, signed by whom, and when."""

@@ -1,4 +1,4 @@
-"""What changed between two firmwares, by the rules of `roaas diff`, from their certificates."""
+"""Compare the certificates of a robot's firmware versions by the rules of `roaas diff`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,10 +14,12 @@ from reports.registry.entries import Certificate
 
 @dataclass(frozen=True)
 class FirmwareChange:
-    """Certificates of two firmwares of one robot.
+    """The comparison of the certificates of two successive firmware versions of one robot.
 
     Attributes:
-        found: the difference by requirement, or None if an older certificate does not list its requirements.
+        old: certificate of the older firmware.
+        new: certificate of the newer firmware.
+        found: the changed requirements, or None if one certificate is too old to list its requirements.
     """
 
     old: Certificate
@@ -26,7 +28,7 @@ class FirmwareChange:
 
     @property
     def classes(self) -> list[tuple[str, str, str]]:
-        """Return the classes whose verdict changed: name, before, after."""
+        """Return the conformance classes whose verdict changed, as (name, verdict before, verdict after)."""
         before, after = self.old.run.classes, self.new.run.classes
         names = dict.fromkeys((*before, *after))
         courses = ((name, before.get(name, "not-claimed"), after.get(name, "not-claimed")) for name in names)
@@ -34,7 +36,10 @@ class FirmwareChange:
 
 
 def firmware_changes(latest_first: tuple[Certificate, ...]) -> list[FirmwareChange]:
-    """Return the change from each firmware to the next, the latest first."""
+    """Return the changes between successive firmware versions, the latest first.
+
+    The argument holds one certificate for each firmware, the latest first.
+    """
     return [FirmwareChange(old, new, _difference(old.run, new.run)) for new, old in pairwise(latest_first)]
 
 
@@ -43,7 +48,7 @@ def _difference(old: Run, new: Run) -> Difference | None:
 
 
 def _as_result(run: Run) -> Mapping[str, Any]:
-    """Return the parts of a result that a comparison reads, taken from a certificate."""
+    """Return the certificate's facts as a partial `roaas-result/1` document that `difference` can compare."""
     accepted = set(run.accepted)
     return {
         "requirements": [

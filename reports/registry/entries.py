@@ -1,6 +1,6 @@
-"""Read the envelopes of a registry: accept those that one of its keys signed, and refuse the others.
+"""Read and verify the envelopes for a registry site: accept those that a trusted key signed, and refuse the others.
 
-Nothing from a refused envelope is shown on the site, which identifies the file by its digest and gives a fixed reason.
+Nothing from a refused envelope is shown. The site identifies its file by digest and gives a reason in its own words.
 The person who builds the site sees the details.
 """
 
@@ -22,13 +22,13 @@ _PRIVATE = b"PRIVATE KEY-----"
 
 @dataclass(frozen=True)
 class Certificate:
-    """An envelope whose signature verifies.
+    """An envelope whose signature was verified by one of the registry's trusted keys.
 
     Attributes:
         octets: content of the envelope's file.
         statement: the signed statement.
-        key: fingerprint of the signing key, which is one of the registry's.
-        publishable: whether the signed content has no fields that are unknown here, which might be addresses.
+        key: fingerprint of the signing key.
+        publishable: False if the signed content has fields that this version does not know, which might be addresses.
     """
 
     octets: bytes
@@ -38,7 +38,7 @@ class Certificate:
 
     @property
     def run(self) -> Run:
-        """Return the signed facts about the run."""
+        """Return the facts about the conformance run from the signed statement."""
         return self.statement.predicate.roaas
 
     @property
@@ -49,12 +49,12 @@ class Certificate:
 
 @dataclass(frozen=True)
 class Refused:
-    """An envelope that was refused.
+    """An envelope that was refused, for example because no trusted key signed it.
 
     Attributes:
         digest: SHA-256 of its file, in hexadecimal.
         reason: for the site; it contains nothing from the envelope.
-        detail: for the person who builds the site: the file, and what is wrong with it.
+        detail: for the person who builds the site: the file's path, and what is wrong with the file.
     """
 
     digest: str
@@ -63,7 +63,7 @@ class Refused:
 
 
 def find_envelopes(places: Iterable[Path]) -> list[Path]:
-    """Return the given files, and every certificate.intoto.json at any depth in the given folders.
+    """Return the given files, and the path of every certificate.intoto.json at any depth in the given folders.
 
     Raises:
         ResultMissingError: a folder holds no certificate.
@@ -79,10 +79,10 @@ def find_envelopes(places: Iterable[Path]) -> list[Path]:
 
 
 def read_keys(directory: Path) -> tuple[dict[str, SSlibKey], list[Path]]:
-    """Return the public keys in a folder (*.pem) by fingerprint, and the paths of private keys, which are not used.
+    """Return the public keys of a folder (*.pem) by fingerprint, and the paths of private keys, which are ignored.
 
     Raises:
-        KeyUnusableError: there is no public key, or a file is not an Ed25519 key.
+        KeyUnusableError: the folder holds no public key, or a file is not an Ed25519 key.
     """
     keys: dict[str, SSlibKey] = {}
     private: list[Path] = []
@@ -101,11 +101,11 @@ def read_keys(directory: Path) -> tuple[dict[str, SSlibKey], list[Path]]:
 
 
 def read_entries(paths: Iterable[Path], keys: Mapping[str, SSlibKey]) -> list[Certificate | Refused]:
-    """Read and verify envelopes; identical files count once.
+    """Read envelope files and verify each by the trusted keys; identical files count once.
 
     Raises:
-        ResultMissingError: there is no such file.
-        ResultUnreadableError: it cannot be read.
+        ResultMissingError: a file does not exist.
+        ResultUnreadableError: a file cannot be read.
     """
     files: dict[bytes, Path] = {}
     for path in paths:
@@ -118,7 +118,7 @@ def read_entries(paths: Iterable[Path], keys: Mapping[str, SSlibKey]) -> list[Ce
 
 
 def entry_of(octets: bytes, keys: Mapping[str, SSlibKey]) -> Certificate | Refused:
-    """Verify one envelope."""
+    """Verify the content of one envelope file by the trusted keys; return the certificate or the refusal."""
     reason = "it is not an envelope with one signature"
     try:
         opened = open_envelope(octets)

@@ -1,4 +1,4 @@
-"""The site's files: an index of robots and classes, a page for each robot, and the envelopes themselves."""
+"""Write the files of a registry site: an index of robots and classes, a page for each robot, and the envelopes."""
 
 import datetime as dt
 import re
@@ -25,7 +25,7 @@ _CHANGE_TONES = {Kind.NEW_FAILURE: "bad", Kind.LOST: "warning"}
 
 
 def write_site(site: Path, found: Sequence[History], refused: Sequence[Refused], now: dt.datetime) -> list[Path]:
-    """Write the site, delete robots and envelopes of an earlier build, and return the files written.
+    """Write the registry site, delete outdated pages and envelopes of an earlier build, and return the paths written.
 
     Raises:
         ResultUnreadableError: the folder cannot be written to.
@@ -108,7 +108,7 @@ def _marks(standing: Standing) -> dict[str, Mark]:
 
 
 def _word(standing: Standing) -> tuple[str, str]:
-    """Return the CSS tone and words for a certificate: its verdict, or the first reason why it does not count."""
+    """Return tone and words: the verdict of a certificate that counts, or the first reason against it."""
     if not standing.stands:
         return "quiet", standing.against[0]
     verdict = standing.certificate.run.verdict

@@ -1,4 +1,4 @@
-"""The certificates of each robot: the latest one counts if it meets the policy."""
+"""Decide for each robot whether its latest certificate counts, that is, whether it meets the registry's policy."""
 
 import datetime as dt
 import re
@@ -34,12 +34,12 @@ _LONG_AGO = dt.datetime.min.replace(tzinfo=dt.UTC)
 
 @dataclass(frozen=True)
 class Standing:
-    """A certificate, and whether it counts.
+    """A certificate, and whether it counts on the registry site.
 
     Attributes:
-        against: why it does not count, in a few words each; empty if it counts.
-        details: each point of the policy that it does not meet, with what it says.
-        until: when it expires, or None if its time cannot be read.
+        against: reasons why the certificate does not count, a few words each; empty if it counts.
+        details: each policy check that the certificate fails, with what the certificate contains.
+        until: when the certificate expires, or None if its time cannot be read.
     """
 
     certificate: Certificate
@@ -54,24 +54,24 @@ class Standing:
 
     @property
     def trusted(self) -> list[str]:
-        """Return the classes that the certificate shows as passed, or none if it does not count."""
+        """Return the classes that passed without an accepted failure; empty if the certificate does not count."""
         return passed(self.certificate.run) if self.stands else []
 
 
 @dataclass(frozen=True)
 class History:
-    """One robot's certificates, the latest first."""
+    """All certificates of one robot, the latest first."""
 
     standings: tuple[Standing, ...]
 
     @property
     def current(self) -> Standing:
-        """Return the only certificate that may count."""
+        """Return the latest certificate, the only one that may count."""
         return self.standings[0]
 
     @property
     def name(self) -> str:
-        """Return the robot's name."""
+        """Return the robot's name, or "Unnamed robot"."""
         return self.current.certificate.run.robot.name or "Unnamed robot"
 
     @property
@@ -81,7 +81,7 @@ class History:
 
     @property
     def page(self) -> str:
-        """Return the file name of the robot's page: a readable name, and a digest that makes it unique."""
+        """Return the file name of the robot's page: the robot's name, and a digest that makes the file name unique."""
         letters = re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-")[:40].rstrip("-")
         robot = self.current.certificate.run.robot
         digest = sha256(msgspec.json.encode((robot.vendor or "", robot.name or "")))[:12]
@@ -89,7 +89,7 @@ class History:
 
     @property
     def firmwares(self) -> tuple[Certificate, ...]:
-        """Return the latest certificate of each firmware, the latest first."""
+        """Return the latest certificate of each firmware version, the latest first."""
         latest: dict[str | None, Certificate] = {}
         for standing in self.standings:
             latest.setdefault(standing.certificate.run.robot.version, standing.certificate)
@@ -97,9 +97,10 @@ class History:
 
 
 def histories(certificates: Iterable[Certificate], policy: Policy, known: Known, now: dt.datetime) -> list[History]:
-    """Return the history of each robot, identified by name and vendor, sorted by name.
+    """Group certificates by robot (name and vendor), judge each by the policy, and return the robots sorted by name.
 
-    A later certificate always supersedes an earlier one, whichever trusted key signed it and whatever it says: an older
+    A later certificate always supersedes an earlier one, whichever trusted key signed it and whatever its verdict: an
+    older
     result may no longer hold.
     """
     by_robot: dict[tuple[str, str], list[Certificate]] = defaultdict(list)
@@ -141,7 +142,7 @@ def _own(certificate: Certificate, *, first: bool) -> Iterator[str]:
 
 
 def _after(finished: dt.datetime | None, days: float) -> dt.datetime | None:
-    """Return when a certificate expires; None if the calendar has no such day."""
+    """Return the time `days` after `finished`, when a certificate expires; None if the calendar has no such day."""
     try:
         return finished + dt.timedelta(days=days) if finished else None
     except OverflowError:

@@ -1,1 +1,1 @@
-"""The figures of the latency reports: one module for each kind, drawn with matplotlib, as inline SVG."""
+"""Draw the figures of the latency reports with matplotlib as inline SVG: one module for each kind."""

@@ -1,4 +1,4 @@
-"""What all figures share: size, colours, axes, and the conversion of a matplotlib figure to SVG inside a page.
+"""Define what all figures share: size, colours, axes, and the conversion of a matplotlib figure to inline SVG.
 
 A figure consists of small panels, so that its text stays readable on a phone; a page sets them side by side where it
 has room. The colours are Okabe and Ito's, which people with the common kinds of colour blindness can tell apart. No
@@ -72,8 +72,8 @@ class Picture:
     """A figure of a page: panels with a caption.
 
     Attributes:
-        name: unique on its page; becomes the element's id.
-        caption: what the figure shows and how to read it.
+        name: unique on its page; it becomes the HTML id.
+        caption: text that says what the figure shows and how to read it.
         panels: the drawings as SVG.
     """
 
@@ -83,7 +83,7 @@ class Picture:
 
 
 class Panel:
-    """One drawing: a matplotlib figure with one pair of axes."""
+    """A drawing: a matplotlib figure with one pair of axes."""
 
     def __init__(self, title: str, alt: str, height: float = _HEIGHT) -> None:
         self._figure = Figure(figsize=(_WIDTH, height), dpi=_DPI, layout="constrained")
@@ -105,7 +105,7 @@ class Panel:
 
 
 def picture(name: str, caption: str) -> Callable[[Callable[P, Iterator[Panel]]], Callable[P, Picture | None]]:
-    """Turn a function that yields panels into one that returns their picture, or None if it yields none."""
+    """Decorate a function that yields panels so that it returns their `Picture`, or None if it yields none."""
 
     def decorate(panels: Callable[P, Iterator[Panel]]) -> Callable[P, Picture | None]:
         @wraps(panels)
@@ -120,7 +120,10 @@ def picture(name: str, caption: str) -> Callable[[Callable[P, Iterator[Panel]]],
 
 
 def _inline(document: bytes, name: str, alt: str) -> str:
-    """Make an SVG document an element of a page: with unique ids, an alternative text, and no size of its own."""
+    """Return an SVG document as an element for an HTML page.
+
+    Its ids are prefixed with `name`, `alt` becomes its alternative text, and its fixed size is removed.
+    """
     root = etree.fromstring(document, etree.XMLParser(resolve_entities=False, no_network=True))
     svg = "{http://www.w3.org/2000/svg}"
     for element in [*root.iter(f"{svg}metadata"), *root.iter(f"{svg}style")]:
@@ -148,12 +151,12 @@ def _inline(document: bytes, name: str, alt: str) -> str:
 
 
 def milliseconds(value: float) -> str:
-    """Return a tick's label: 0.05, 1, 20, 1,000."""
+    """Return the label of an axis tick in milliseconds: 0.05, 1, 20, 1,000."""
     return f"{value:,.0f}" if value >= _WHOLE_MS else f"{value:g}"
 
 
 def log_time_axis(axes: Axes, label: str) -> None:
-    """Make the y axis logarithmic, with milliseconds as plain numbers."""
+    """Make the y axis logarithmic, with milliseconds as plain numbers, and set its label."""
     axes.set_yscale("log")
     low, high = axes.get_ylim()
     decades = math.log10(high / low) if low > 0 else 3.0

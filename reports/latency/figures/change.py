@@ -1,4 +1,4 @@
-"""The percentile spectrum of each series in two runs, old and new."""
+"""Draw the percentile spectrum of each series in two runs, old and new."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Latency over the run: a heat map of all requests, and the median of each block."""
+"""Draw latency over the run: a heat map of all requests, and the median of each block."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from reports.latency.figures.canvas import COLOUR, MARK, Panel, log_time_axis, p
 
 
 def leading(series: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Return the series of the wire client, or all series if the wire client has none, so that the page stays small."""
+    """Return the series of the "wire" client if any exist, otherwise all series, so that the page stays small."""
     return [one for one in series if one["client"] == "wire"] or list(series)
 
 
@@ -20,7 +20,7 @@ def leading(series: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     "requests. Two bands mean that latency has two modes. A step means that the robot or the machine changed.",
 )
 def heat(result: Mapping[str, Any]) -> Iterator[Panel]:
-    """Yield a panel for each series of the heat map; a darker cell holds more requests."""
+    """Yield a heat map for each series: time of the run by service time, darker cells for more requests."""
     found = result.get("heat_map") or {}
     edges = found.get("edges_ms", [])
     for series in leading(found.get("series", [])):
@@ -55,7 +55,10 @@ _MAPS = {"rest": "Blues", "soap": "Oranges", "rosbridge": "Greens"}
 
 @picture("blocks", "The median of each short block of one interface. The confidence intervals come from their scatter.")
 def blocks(result: Mapping[str, Any]) -> Iterator[Panel]:
-    """Yield a panel for each client and operation: the median of each block, from which intervals are computed."""
+    """Yield a panel for each client and operation: the median latency of each block over the run.
+
+    The confidence intervals are computed from these medians.
+    """
     found = leading([block for block in result.get("blocks", []) if block["phase"] == "duel"])
     kinds = ((block["client"], operation) for block in found for operation in block["p50_ms"])
     for client, operation in dict.fromkeys(kinds):

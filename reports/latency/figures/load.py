@@ -1,4 +1,4 @@
-"""Latency over the load: over the offered rate up to saturation, and over the number of busy connections."""
+"""Draw latency over the load: over the offered rate up to saturation, and over the number of busy connections."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -15,7 +15,10 @@ from reports.latency.figures.canvas import COLOUR, MARK, Panel, log_time_axis, p
     "the number of connections that are always busy: where latency doubles with it, the robot is saturated.",
 )
 def load(result: Mapping[str, Any]) -> Iterator[Panel]:
-    """Yield latency over the offered rate, with knees as vertical lines, and over the number of busy connections."""
+    """Yield panels of latency over the offered rate and over the number of busy connections, if measured.
+
+    A vertical line marks the knee, the highest rate that met the latency criterion.
+    """
     steps = [step for step in result.get("steps", []) if step["offered_rate"] > 0]
     crowds = [one for one in result.get("over_connections", []) if one["p50_ms"] is not None]
     if steps:

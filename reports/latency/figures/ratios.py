@@ -1,4 +1,4 @@
-"""Ratios with their intervals: of SOAP to REST, of a new run to an old one, or of one robot to another."""
+"""Draw ratios with their intervals: of SOAP to REST, of a new run to an old one, or of one robot to another."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from reports.latency.figures.canvas import INK, PAPER_COLOUR, SOFT, Panel, Pictu
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """One row; `interval` is the ratio's 95 % interval, or None if the run is too short for one."""
+    """A row of a figure of ratios; `interval` is the ratio's 95 % interval, or None if the run is too short."""
 
     label: str
     ratio: float
@@ -21,9 +21,9 @@ class Ratio:
 def ratios(
     name: str, title: str, rows: Sequence[Ratio], caption: str, *, mark: tuple[float, str] | None = None
 ) -> Picture | None:
-    """Return a panel with a dot and a bar for each row, on a logarithmic axis that includes 1; None without rows.
+    """Return a figure with a dot and an interval bar for each row, or None without rows.
 
-    `mark` is a value to compare with, and its name.
+    The axis is logarithmic and includes 1. `mark` is a reference value, drawn as a dashed line, and its label.
     """
 
     @picture(name, caption)
@@ -69,7 +69,7 @@ def _panel(title: str, rows: Sequence[Ratio], mark: tuple[float, str] | None) ->
 
 
 def _ticks(low: float, high: float) -> list[float]:
-    """Return the ticks of the finest scale whose labels do not overlap; each scale includes 1."""
+    """Return axis ticks between `low` and `high`, as fine as possible without overlapping labels; they include 1."""
     scales = (
         (0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5),
         (0.25, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0),

@@ -1,4 +1,4 @@
-"""Where the time goes: the spans of a request, stacked, for each client."""
+"""Draw the time that requests spend in each span (build, wire, server, parse), stacked, for each client."""
 
 from collections.abc import Iterator, Mapping
 
@@ -15,7 +15,7 @@ SPANS = ("build", "wire", "server", "parse")
     "without that header it is part of wire. Parse: the client reads the response.",
 )
 def spans(series: AllSeries) -> Iterator[Panel]:
-    """Yield a panel for each client: the mean spans of each operation and interface, end to end."""
+    """Yield a panel for each client: stacked bars of the mean spans of each operation and interface."""
     for client in dict.fromkeys(key[1] for key in series):
         bars = {s.name: means(s) for key, s in series.items() if key[1] == client and s.data["count"]}
         bars = {name: parts for name, parts in bars.items() if parts}
@@ -24,7 +24,7 @@ def spans(series: AllSeries) -> Iterator[Panel]:
 
 
 def means(series: Series) -> dict[str, float]:
-    """Return the mean milliseconds of each observed span; means can be added, quantiles cannot."""
+    """Return the mean time (ms) of each observed span of a request; means can be added, quantiles cannot."""
     observed = {name: series.data["spans_ms"][name] for name in SPANS}
     return {name: part["mean"] for name, part in observed.items() if part is not None and part["mean"] is not None}
 

@@ -1,4 +1,4 @@
-"""The percentile spectrum: latency over the share of requests that were faster, on HdrHistogram's axis.
+"""Draw the percentile spectrum: latency over the share of requests that were faster, on HdrHistogram's axis.
 
 The axis is 1 / (1 - quantile), logarithmic: 90 %, 99 % and 99.9 % are equally far apart, so that the tail is readable.
 """
@@ -53,7 +53,10 @@ def spectrum(series: AllSeries) -> Iterator[Panel]:
 
 
 def curve(axes: Axes, values: Distribution, look: tuple[str, str], label: str, dash: str = "-") -> None:
-    """Draw one distribution; the line is thin where there are too few values for an interval."""
+    """Draw one latency distribution; the line is thin where too few values exist for a confidence interval.
+
+    `look` is the colour and the marker.
+    """
     colour, mark = look
     reach = float(np.log10(max(values.total, 10)))
     at = 1 - 10.0 ** -np.linspace(0.0, reach, _POINTS)
@@ -67,7 +70,7 @@ def curve(axes: Axes, values: Distribution, look: tuple[str, str], label: str, d
 
 
 def quantile_axis(axes: Axes, total: int) -> None:
-    """Give the x axis HdrHistogram's scale, as far as `total` values reach."""
+    """Set the x axis to HdrHistogram's percentile scale, up to the highest percentile that `total` values reach."""
     end = float(max(total, 10))
     axes.set_xscale("log")
     axes.set_xlim(1.0, end)
@@ -84,7 +87,7 @@ def _nines(at: Floats) -> Floats:
 
 
 def _differ(service: Distribution | None, response: Distribution) -> bool:
-    """Return whether the two curves differ; in the closed model they are the same."""
+    """Return whether service and response times differ; they are equal in the closed model."""
     return service is None or not (
         np.array_equal(service.low_ms, response.low_ms) and np.array_equal(service.counts, response.counts)
     )

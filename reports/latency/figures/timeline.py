@@ -1,4 +1,4 @@
-"""Latency over the run, with the stalls of the robot marked."""
+"""Draw latency over the run, with the robot's stalls marked."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ _STALL_COLOUR = "#F0E442"
 
 @dataclass(frozen=True, slots=True)
 class Stall:
-    """A period, counted from the start of the run, in which a request waited far longer than usual.
+    """A period of the run in which a request waited far longer than usual; times in seconds since the start.
 
     Attributes:
-        longest_ms: the longest response time in it; None if no request was answered.
+        longest_ms: longest response time in the period; None if no request was answered.
         series: operation, client, interface.
     """
 
@@ -31,9 +31,11 @@ class Stall:
 
 
 def stalls(result: Mapping[str, Any]) -> list[Stall]:
-    """Return intervals whose longest response took 20 times the usual time and over 20 ms, adjacent ones as one stall.
+    """Return the stalls: intervals whose longest response took 20 times the usual time and over 20 ms.
 
-    The usual time is the median of the intervals' medians. An interval in which every request failed counts as well.
+    The usual time is the median of the intervals' medians. An interval in which every request failed counts as well,
+    and
+    adjacent intervals are one stall.
     """
     found: list[Stall] = []
     for series in _timed(result):
@@ -136,7 +138,7 @@ def _draw(panel: Panel, series: Mapping[str, Any]) -> None:
 
 
 def _thinned(points: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Return at most a few hundred points: of each group the one with the longest request, so that stalls remain."""
+    """Return at most 240 points: of each group of neighbours the point with the longest request."""
     step = -(-len(points) // _MOST_POINTS) or 1
     groups = (points[start : start + step] for start in range(0, len(points), step))
     return [max(group, key=lambda point: point["max_ms"] or 0.0) for group in groups]
