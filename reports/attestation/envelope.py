@@ -16,7 +16,7 @@ from reports.attestation.statement import PAYLOAD_TYPE, PREDICATE_TYPE, STATEMEN
 from reports.errors import EnvelopeRefusedError, ResultMissingError, ResultUnreadableError
 
 ENVELOPE_NAME = "certificate.intoto.json"
-_MOST_OCTETS = 4 << 20
+_MOST_BYTES = 4 << 20
 """A certificate has some kilobytes; a larger file is not parsed."""
 
 
@@ -54,7 +54,7 @@ def read_envelope(path: Path) -> bytes:
     """
     try:
         with path.open("rb") as file:
-            return file.read(_MOST_OCTETS + 1)
+            return file.read(_MOST_BYTES + 1)
     except FileNotFoundError as error:
         raise ResultMissingError(f"{path}: no such file") from error
     except OSError as error:
@@ -67,8 +67,8 @@ def open_envelope(octets: bytes) -> Opened:
     Raises:
         EnvelopeRefusedError: the envelope is larger than 4 MiB, malformed, or not as `signature.seal` writes envelopes.
     """
-    if len(octets) > _MOST_OCTETS:
-        raise EnvelopeRefusedError(f"not a certificate: it has more than {_MOST_OCTETS} octets")
+    if len(octets) > _MOST_BYTES:
+        raise EnvelopeRefusedError(f"not a certificate: the file is larger than {_MOST_BYTES} bytes")
     try:
         envelope = msgspec.json.decode(octets, type=_Envelope)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:

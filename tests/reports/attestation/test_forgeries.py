@@ -85,7 +85,7 @@ ENVELOPES = [
     ("truncated file", cut(500), "not an envelope"),
     ("empty file", cut(0), "not an envelope"),
     ("nested file", lambda desk: desk.envelope.write_text("[" * 100_000), "not an envelope"),
-    ("huge file", lambda desk: desk.envelope.write_text(" " * (5 << 20)), "octets"),
+    ("huge file", lambda desk: desk.envelope.write_text(" " * (5 << 20)), "bytes"),
 ]
 
 

@@ -1,0 +1,60 @@
+"""Rules on deliveries that the robot must reject: none of them may reach ROS."""
+
+from collections.abc import Iterator
+from http import HTTPStatus
+
+from conformance.packs.table1.robot.delivery import Delivery
+from conformance.packs.table1.scenarios.invalid_deliveries import CORRECT, InvalidDeliveries, invalid_deliveries
+from conformance.scenarios.rule import Case, Note, Outcome, rule
+from conformance.transport.exchange import SAFE_METHODS
+
+
+@rule("strict-input/delivery-refused", on=(invalid_deliveries,))
+def delivery_refused(trace: InvalidDeliveries) -> Iterator[Outcome]:
+    """Judge that the robot rejects invalid deliveries, and that neither they nor other methods make a message."""
+    for exchange in trace.invalid:
+        holds = exchange.response.status >= HTTPStatus.BAD_REQUEST
+        yield Case(holds, exchange, "a status of 400 or above for an invalid delivery")
+    if not _shown(trace):
+        reason = trace.unseen or "no valid delivery was seen to arrive"
+        yield Note(f"judged by the responses alone: {reason}")
+        return
+    seen = trace.seen or ()
+    for one in trace.by_method:
+        accepted = one.exchange.response.ok and one.method not in SAFE_METHODS
+        expected = f"no DeliveryRequestMsg on ROS after {one.method}: only PUT starts a delivery"
+        yield Case(one.delivery not in seen or accepted, one.exchange, expected, cause=one.method)
+    known = {trace.last, trace.no_format, *(one.delivery for one in trace.by_method)}
+    unknown = [one for one in seen if one not in known]
+    # The robot may have other clients: a single delivery that resembles none of the suite's may be theirs.
+    found = [one for one in unknown if _resembles(one)] or (unknown if len(unknown) > 1 else [])
+    accepted_first = next((one for one in trace.invalid if one.response.ok), trace.invalid[-1])
+    observed = f"{len(found)} messages, among them {found[0]}" if found else ""
+    yield Case(not found, accepted_first, "no message for an invalid delivery", observed)
+
+
+@rule("http/not-acceptable-undone", on=(invalid_deliveries,))
+def not_acceptable_delivery(trace: InvalidDeliveries) -> Iterator[Outcome]:
+    """Judge that a delivery that the robot answered 406 makes no message."""
+    if _shown(trace) and trace.answer is not None and trace.answer.response.status == HTTPStatus.NOT_ACCEPTABLE:
+        arrived = trace.no_format in (trace.seen or ())
+        yield Case(not arrived, trace.answer, "no message for a delivery that is answered 406", "a message")
+
+
+@rule("equivalence/delivery-rest", on=(invalid_deliveries,))
+def accepted_delivery(trace: InvalidDeliveries) -> Iterator[Outcome]:
+    """Judge that a delivery whose Accept header excludes all formats arrives if the robot accepts it."""
+    if _shown(trace) and trace.answer is not None and trace.answer.response.ok:
+        arrived = trace.no_format in (trace.seen or ())
+        yield Case(arrived, trace.answer, "a message for a delivery that is accepted", "no message")
+
+
+def _shown(trace: InvalidDeliveries) -> bool:
+    """Return whether arrivals were observed, which the last valid delivery proves."""
+    return trace.seen is not None and trace.last in trace.seen
+
+
+def _resembles(delivery: Delivery) -> bool:
+    """Return whether a delivery may come from an invalid request, in which one value was wrong."""
+    same = sum(value == float(sent) for value, sent in zip(delivery[1:], CORRECT[1:], strict=True))
+    return same >= len(CORRECT) // 2
