@@ -58,7 +58,9 @@ class RosArgumentsError(ValueError):
 
 
 class RosRuntime:
-    """One ROS context with its nodes. One thread runs all their callbacks, except for nodes that are created ``apart``.
+    """One ROS context with its nodes.
+
+    One thread runs the callbacks of all nodes, except for nodes created with ``apart``, which have their own thread.
 
     Args:
         domain_id: The ROS domain, 0 to 101; None takes ROS_DOMAIN_ID from the environment.

@@ -25,7 +25,7 @@ _UNFROZEN = "unfrozen"
 
 
 class RequirementSetError(TomlFileError):
-    """Raised for a requirement set that does not exist or is invalid; the message names it."""
+    """Raised for a requirement set that does not exist or is invalid; the message has the set's name."""
 
 
 class Frozen(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

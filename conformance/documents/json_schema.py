@@ -171,7 +171,10 @@ class Shape:
         return _described(error, where) if error is not None else ""
 
     def broken_rule(self, value: Any) -> tuple[str, bool]:
-        """Return the keyword that ``value`` violates first, and whether the value itself or only a part of it does."""
+        """Return the schema keyword that ``value`` violates, and True if the value itself violates it, not only a member.
+
+        For a valid value, return an empty keyword and False.
+        """
         error = self._first_error(value)
         return ("", False) if error is None else (str(error.validator), not error.absolute_path)
 

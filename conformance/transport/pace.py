@@ -21,7 +21,7 @@ def time_to_arrive(octets: int) -> float:
 
 
 class Pace:
-    """The response times of a robot so far.
+    """The usual response time of a robot, and the sum of the delays beyond it.
 
     Attributes:
         usual_s: the usual response time, s.

@@ -64,7 +64,7 @@ def rounded(value: float | None) -> float | None:
 
 
 def rounded_interval(interval: Interval | None) -> list[float] | None:
-    """Return an interval, rounded likewise."""
+    """Return an interval as [lower, upper], both rounded to nanoseconds."""
     return None if interval is None else [round(bound, _DIGITS) for bound in interval]
 
 

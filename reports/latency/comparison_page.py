@@ -62,7 +62,7 @@ def table(comparison: Comparison) -> str:
 
 
 def comparison_html(comparison: Comparison, names: tuple[str, str]) -> str:
-    """Return the comparison of two latency results as an HTML page; `names` are the paths of the two files."""
+    """Return the comparison as an HTML page; `names` are the names of the old and the new file."""
     pictures = {"ratios": _ratios(comparison.changes), "change": change(comparison.old_series, comparison.new_series)}
     return html_page("compare.html.j2", pictures=pictures, **_values(comparison, names))
 

@@ -90,7 +90,9 @@ def read_exchange(exchange: Exchange) -> SoapResponse:
 
 
 def send(service: SoapService, message: Node | bytes | str, **how: Any) -> SoapResponse:
-    """Send an Envelope, or a document as it is, and read the answer; ``how`` is as SoapService.post() has it.
+    """Send a message to a SOAP service and return the response; ``how`` has the options of SoapService.post().
+
+    A Node is an Envelope and is written as XML; bytes and text are sent unchanged.
 
     Raises:
         NoAnswerError: no HTTP response came.

@@ -118,7 +118,10 @@ def _judge_too_large(api: RestInterface, judge: Judge, call: Call, fields: tuple
 
 @pytest.mark.requirement("http/chunked", "http/chunk-forms")
 def test_chunked_content(api: RestInterface, judge: Judge) -> None:
-    """Send content in chunks of one byte, of a few, and in one; 64 KiB as well; and with extensions and trailers."""
+    """Send valid content in chunks: of one byte, of a few bytes, in one chunk, 64 KiB, with extensions and trailers.
+
+    The robot must accept each as it accepts the same content with Content-Length.
+    """
     for call in _valid(api, judge, ("http/chunked",)):
         large = _padded(call, TAKEN_OCTETS)
         for body, size in (

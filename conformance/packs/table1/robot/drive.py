@@ -211,7 +211,7 @@ class Drive:
                 return holds, str(windows.middle(seen)) if seen else ""
 
     def keep(self, seconds: float) -> None:
-        """Look repeatedly for the given time, s."""
+        """Read pose and velocity repeatedly for the given time, s, without sending commands."""
         until = self.clock.now() + seconds
         while self.clock.now() < until:
             self.look()

@@ -1,6 +1,6 @@
-"""Judge every plain GET of the robot's state in a run, whichever check sends it.
+"""Judge every GET of the robot's state in a run, whichever check sends it.
 
-A fault that shows in one of fifty responses is found by reading often; observing counts all reads of all checks.
+A fault in one of fifty responses is found only by reading often, so the reads of all checks count.
 """
 
 import math
