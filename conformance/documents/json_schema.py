@@ -171,7 +171,7 @@ class Shape:
         return _described(error, where) if error is not None else ""
 
     def broken_rule(self, value: Any) -> tuple[str, bool]:
-        """Return the schema keyword that ``value`` violates, and True if the value itself violates it, not only a member.
+        """Return the violated schema keyword, and True if ``value`` itself violates it, and not only a member.
 
         For a valid value, return an empty keyword and False.
         """
