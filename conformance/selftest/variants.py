@@ -85,6 +85,9 @@ def _prefixed(request: Request, forward: Forward) -> Response:
     """Add the path prefix to the server URL in the OpenAPI description."""
     response = forward(request)
     if request.side == "rest" and request.path.endswith("/openapi.json"):
+        if request.method == "HEAD":
+            # The length of the description before the prefix was added.
+            response.drop("Content-Length")
         value = parsed(response.body)
         if isinstance(value, dict):
             response.body = json.dumps({**value, "servers": [{"url": _PREFIX}]}).encode()
