@@ -34,8 +34,7 @@ class Table:
         """Return a function that adds a row: ``row(name, requirements, says, **settings)``.
 
         Requirements are one or several ids without the class; one of another class has its class before it. ``common``
-        are
-        attributes of Mutant that all these rows share.
+        are attributes of Mutant that all these rows share.
         """
 
         def row(name: str, requirements: str | tuple[str, ...], says: str, **settings: Any) -> Row:

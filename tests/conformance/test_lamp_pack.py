@@ -144,3 +144,10 @@ def test_mutants_by_rule_are_made_for_the_pack(tmp_path):
     done = roaas(*command)
     assert done.exit_code in {0, 1}, done.output
     assert re.search(r"Mutants by rule killed: [1-4] of [1-4]", done.output), done.output
+
+
+def test_each_of_its_own_mutants_is_killed(tmp_path):
+    command = ["selftest", "--contract", LAMP, "--faults", "lamp-*", "--seeds", "1", "--no-variants", "--no-compare"]
+    done = roaas(*command, "--parallel", "1", "--out", tmp_path / "selftest")
+    assert done.exit_code == 0, done.output
+    assert "5 of 5 mutants killed" in done.output

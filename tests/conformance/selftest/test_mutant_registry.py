@@ -64,12 +64,17 @@ def test_a_disagreement_is_told(monkeypatch):
 LAMP = Contract.load(ROOT / "examples" / "lamp")
 
 
-def test_a_folder_packs_checks_are_found_by_file_and_it_needs_no_mutants():
+def test_a_folder_packs_checks_are_found_by_file():
     assert coverage.checks_by_requirement(LAMP)["lamp/fades"] == ("test_lamp::fades",)
     assert coverage.disagreements(LAMP) == []
     page = coverage.page(LAMP)
     assert "## lamp" in page
     assert "mutants by rule" in page
+
+
+def test_a_pack_needs_no_mutants(monkeypatch):
+    monkeypatch.setattr(coverage, "self_test_of", lambda _: SelfTest())
+    assert coverage.disagreements(LAMP) == []
 
 
 def test_a_pack_that_has_mutants_has_one_for_each_of_its_own_requirements(monkeypatch):
