@@ -4,8 +4,6 @@ The rooms are the packages conformance, loadtests, reference_robot and reports. 
 is used, so that ``roaas certify`` needs neither ROS nor Locust.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,18 +1,14 @@
 """The hooks through which a contract pack describes its device to the generic suite; the defaults move nothing."""
 
-from __future__ import annotations
-
+from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
-
-    from conformance.contract.pack import Contract
-    from conformance.documents.wsdl import Operation
-    from conformance.documents.xml_node import Node
-    from conformance.transport.exchange import Listener
-    from conformance.verdict.run import Run
+from conformance.contract.pack import Contract
+from conformance.documents.wsdl import Operation
+from conformance.documents.xml_node import Node
+from conformance.transport.exchange import Listener
+from conformance.verdict.run import Run
 
 # A RestInterface, a SoapService and a Question: their modules import this one.
 Rest = Any

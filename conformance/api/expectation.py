@@ -1,7 +1,5 @@
 """Judge one response by one requirement: each method judges one case and words the finding."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Unanswered

@@ -1,13 +1,11 @@
 """``roaas certify --fleet``: certify several robots, write a page, return one exit code."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import datetime as dt
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 from click.core import ParameterSource
@@ -17,10 +15,7 @@ from conformance.commandline.terminal import inert
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
 from conformance.fleet.fleet_file import TIME_LIMIT_S, FleetError, load_fleet, refuse_same_identity
-from conformance.fleet.member_run import Outcome
-
-if TYPE_CHECKING:
-    from conformance.fleet.member_run import MemberResult
+from conformance.fleet.member_run import MemberResult, Outcome
 
 PARALLEL = 4
 # Options that hold for each robot of a fleet; what else there is belongs to one robot, and into the file.

@@ -1,7 +1,5 @@
 """``roaas replay``: send a finding's requests again and report whether the finding still occurs."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,18 +1,14 @@
 """``roaas selftest --generated``: judge a sample of generated mutants instead of the hand-written ones."""
 
-from __future__ import annotations
-
 import fnmatch
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from conformance.cli.selftest_progress import Progress, compare
-
-if TYPE_CHECKING:
-    from conformance.contract.pack import Contract
-    from conformance.selftest.generated.mutant import GeneratedMutant
-    from conformance.selftest.report import Report
+from conformance.contract.pack import Contract
+from conformance.selftest.generated.mutant import GeneratedMutant
+from conformance.selftest.report import Report
 
 
 def chosen_mutants(contract: Contract, options: dict[str, Any]) -> list[GeneratedMutant]:

@@ -1,13 +1,9 @@
 """Commands that write a result file."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
 import click
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 class CommandResult(NamedTuple):

@@ -1,17 +1,10 @@
 """The attributes of requirements (level, origin, prerequisites), and conformance classes."""
 
-from __future__ import annotations
-
+from collections.abc import Collection
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
-from conformance.contract.interfaces import EVERY
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
-
-    from conformance.contract.interfaces import Interface
+from conformance.contract.interfaces import EVERY, Interface
 
 #: The profile that every pack has: all of its classes.
 FULL = "full"

@@ -1,7 +1,5 @@
 """The conformance classes and requirements that apply to any web API."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import msgspec

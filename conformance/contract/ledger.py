@@ -1,18 +1,13 @@
 """The requirement ledger: each requirement with its class, level, text, source and origin."""
 
-from __future__ import annotations
-
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import msgspec
 
 from conformance.contract.classes import CauseKind, Level, Origin, Prerequisite
 from conformance.contract.toml_file import Text, TomlFileError, fit, read_tables
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable
-    from pathlib import Path
 
 
 class LedgerError(TomlFileError):

@@ -1,17 +1,12 @@
 """Find a contract pack: by folder, by the name of a built-in pack, or by an installed package's entry point."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import ModuleType
 
 from conformance.contract.toml_file import TomlFileError
-
-if TYPE_CHECKING:
-    from types import ModuleType
 
 #: The group of entry points by which an installed package offers a pack.
 ENTRY_POINTS = "roaas.packs"

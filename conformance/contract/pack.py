@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import Any
 
 import msgspec
 import yaml
@@ -24,9 +25,6 @@ from conformance.contract.ledger import LedgerError, Requirement, load_ledger
 from conformance.contract.locating import GENERIC_RULES, MANIFEST, ContractError, folder_of, module_of
 from conformance.contract.sections import TEXT_NAME, Section, cited_in, sections_of
 from conformance.contract.toml_file import Text, read_toml
-
-if TYPE_CHECKING:
-    from types import ModuleType
 
 #: The pack that is used where none is named.
 DEFAULT_PACK = "table1"

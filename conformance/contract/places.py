@@ -3,17 +3,13 @@
 TOML parsers discard line numbers, so the two files are searched as text.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from conformance.contract.generic import LEDGER
 from conformance.contract.locating import GENERIC_RULES
-
-if TYPE_CHECKING:
-    from conformance.contract.pack import Contract
+from conformance.contract.pack import Contract
 
 _TABLE = re.compile(r'^\s*\[\s*"?([\w-]+)"?\s*\.\s*"?([\w-]+)"?\s*\]', re.MULTILINE)
 _CLAIMS = re.compile(r"^\s*\[\s*claims\s*\]", re.MULTILINE)

@@ -3,23 +3,17 @@
 ``sets/NAME.toml`` of a pack lists id, level and text digest of each requirement. A published set never changes.
 """
 
-from __future__ import annotations
-
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 
 from conformance.contract.classes import Level
+from conformance.contract.ledger import Requirement
+from conformance.contract.pack import Contract
 from conformance.contract.toml_file import Text, TomlFileError, read_toml
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from conformance.contract.ledger import Requirement
-    from conformance.contract.pack import Contract
 
 _UNFROZEN = "unfrozen"
 

@@ -1,12 +1,8 @@
 """The sections of a contract's text, by the anchors that requirements cite (``contract.md#goals``)."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, NamedTuple
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
+from collections.abc import Iterable
+from typing import NamedTuple
 
 TEXT_NAME = "contract.md"
 _HEADING = re.compile(r"^#{1,6} +(?P<title>.+?) *$", re.MULTILINE)

@@ -4,21 +4,17 @@ The type of a file is a frozen ``msgspec.Struct`` that forbids unknown fields. m
 speak of JSON paths, this module writes its own: file, table, key, offending value, and what is allowed.
 """
 
-from __future__ import annotations
-
 import datetime as dt
 import json
 import re
 import sys
 import tomllib
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
 
 import msgspec
 from msgspec import Meta, inspect
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 _Shape = TypeVar("_Shape")
 

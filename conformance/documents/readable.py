@@ -1,7 +1,5 @@
 """Check whether a JSON or XML body can be parsed."""
 
-from __future__ import annotations
-
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, is_xml
 

@@ -1,12 +1,10 @@
 """One certification: connect to the robot, run the checks, derive the verdicts, write the result."""
 
-from __future__ import annotations
-
 import datetime as dt
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, TextIO
 
 import pytest
 
@@ -17,17 +15,13 @@ from conformance.engine.planning import pytest_options
 from conformance.engine.progress import Progress
 from conformance.engine.resending import look_again
 from conformance.engine.result import result_document, write_result
+from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.scenario import Recordings
 from conformance.scenarios.stored import write_traces
 from conformance.verdict.baseline import Expectation, accepted_until, apply_baseline
-from conformance.verdict.causes import by_cause
-from conformance.verdict.verdicts import Overall, class_verdicts, overall, score, verdict_of
-
-if TYPE_CHECKING:
-    from conformance.engine.robot_under_test import RobotUnderTest
-    from conformance.verdict.causes import Cause
-    from conformance.verdict.run import Run
-    from conformance.verdict.verdicts import Verdict
+from conformance.verdict.causes import Cause, by_cause
+from conformance.verdict.run import Run
+from conformance.verdict.verdicts import Overall, Verdict, class_verdicts, overall, score, verdict_of
 
 
 @dataclass(frozen=True)

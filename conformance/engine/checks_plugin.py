@@ -1,36 +1,31 @@
 """The pytest plugin that runs the checks on a robot: selection, order, fixtures, and evidence from exceptions."""
 
-from __future__ import annotations
-
+from collections.abc import Callable, Generator
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, TypeVar
+from pathlib import Path
+from typing import Any, TypeVar
 
 import pytest
 
+from conformance.api.interfaces import Interfaces
+from conformance.api.rest.interface import RestInterface
+from conformance.api.soap.callable_services import SoapServices
+from conformance.api.soap.service import SoapService
 from conformance.contract.classes import Level
 from conformance.contract.interfaces import Interface
 from conformance.contract.ledger import expanded
+from conformance.contract.pack import Contract
+from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.plan import Step, ordered
 from conformance.scenarios.scenario import Recordings
 from conformance.scenarios.stage import STAGES, Stage
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
-    from pathlib import Path
-
-    from conformance.api.interfaces import Interfaces
-    from conformance.api.rest.interface import RestInterface
-    from conformance.api.soap.callable_services import SoapServices
-    from conformance.api.soap.service import SoapService
-    from conformance.contract.pack import Contract
-    from conformance.engine.robot_under_test import RobotUnderTest
-    from conformance.statement.statement import Statement
-    from conformance.transport.client import Connection, HttpClient
-    from conformance.verdict.effort import Effort
-    from conformance.verdict.evidence import Judge
-    from conformance.verdict.explorer import Explorer
-    from conformance.verdict.finding import Finding
-    from conformance.verdict.run import Run
+from conformance.statement.statement import Statement
+from conformance.transport.client import Connection, HttpClient
+from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Judge
+from conformance.verdict.explorer import Explorer
+from conformance.verdict.finding import Finding
+from conformance.verdict.run import Run
 
 _NO_ADDRESS = "the robot's {} interface has no address"
 _Interface = TypeVar("_Interface")

@@ -1,24 +1,19 @@
 """``roaas certify --init``: write a first statement from the robot's descriptions."""
 
-from __future__ import annotations
-
 import json
 import sys
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from conformance.contract.interfaces import Interface
+from conformance.contract.pack import Contract
 from conformance.contract.toml_file import basic_string
 from conformance.engine.pytest_run import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.statement.statement import Statement
+from conformance.transport.client import HttpClient
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.run import Run
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from conformance.contract.pack import Contract
-    from conformance.statement.statement import Statement
-    from conformance.transport.client import HttpClient
 
 _TEMPLATE = """\
 # Implementation conformance statement: what the vendor says of the robot, and what it is then judged by.

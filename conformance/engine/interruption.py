@@ -4,18 +4,13 @@ Python raises KeyboardInterrupt wherever the main thread happens to be. In a fin
 are ignored, the exception is lost; the recorded flag is not. It is checked before each check and at the end.
 """
 
-from __future__ import annotations
-
 import signal
 import threading
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from types import FrameType
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from types import FrameType
-
-    from conformance.verdict.run import Run
+from conformance.verdict.run import Run
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 

@@ -4,21 +4,15 @@ A result file may come from anybody. So the bytes of the requests are examined, 
 about them is trusted. A request that is not provably harmless may move the robot.
 """
 
-from __future__ import annotations
-
 import re
+from collections.abc import Iterable, Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 from urllib.parse import urlsplit
 
 from conformance.contract.pack import Contract
 from conformance.engine.resending import read_request
-from conformance.transport.exchange import SAFE_METHODS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from conformance.transport.exchange import Request
+from conformance.transport.exchange import SAFE_METHODS, Request
 
 # Servers differ in where they see one request end and the next one begin, so a method that writes counts wherever it
 # stands; and some take the method from a field (X-HTTP-Method-Override).

@@ -1,18 +1,13 @@
 """``roaas certify --plan``: the order of scenarios and checks, without sending anything."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from conformance.engine.checks_plugin import ChecksPlugin, is_check
+from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.plan import Step, told
-
-if TYPE_CHECKING:
-    from conformance.engine.robot_under_test import RobotUnderTest
 
 _SUITE = Path(__file__).parents[1]
 _UNUSED = ("terminal", "cacheprovider", "logging", "junitxml", "unraisableexception", "threadexception")

@@ -3,17 +3,11 @@
 It imports the suite only if there is a check to run.
 """
 
-from __future__ import annotations
+import pytest
 
-from typing import TYPE_CHECKING
-
+from conformance.contract.pack import Contract
 from conformance.engine.checks_plugin import ChecksPlugin
-
-if TYPE_CHECKING:
-    import pytest
-
-    from conformance.contract.pack import Contract
-    from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.engine.robot_under_test import RobotUnderTest
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

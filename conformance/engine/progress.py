@@ -1,19 +1,14 @@
 """Progress of a run, as lines of text."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING, TextIO
+from collections.abc import Iterator
+from typing import TextIO
 
 import pytest
 
 from conformance.contract.classes import Level
+from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.stage import STAGES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from conformance.engine.robot_under_test import RobotUnderTest
 
 # A line at least this often, s.
 _OFTEN_S = 2.0

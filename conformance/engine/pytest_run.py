@@ -1,9 +1,6 @@
 """Make a robot from pytest's options, for ``pytest -p roaas_pytest --pyargs conformance`` in another project."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 import pytest
@@ -11,13 +8,10 @@ import pytest
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.statement.statement import StatementError, empty_statement, load_statement
+from conformance.statement.statement import Endpoints, StatementError, empty_statement, load_statement
 from conformance.transport.client import Connection
 from conformance.verdict.effort import EFFORTS, Effort
 from conformance.verdict.run import Run
-
-if TYPE_CHECKING:
-    from conformance.statement.statement import Endpoints
 
 
 def robot_from_options(config: pytest.Config) -> RobotUnderTest:

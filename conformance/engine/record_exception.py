@@ -1,19 +1,13 @@
 """Turn an exception in a check into evidence: the robot failed, the robot is gone, or the suite could not judge."""
 
-from __future__ import annotations
-
 import traceback
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.evidence import RefutedError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from conformance.verdict.finding import Finding
-    from conformance.verdict.run import Run
+from conformance.verdict.finding import Finding
+from conformance.verdict.run import Run
 
 
 def record_exception(

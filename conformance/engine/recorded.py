@@ -1,19 +1,14 @@
 """``roaas replay --recorded``: judge the recorded traces of a run again, without sending anything."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from conformance.engine.planning import collected
+from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.rule import Rule, record
+from conformance.scenarios.scenario import Scenario
 from conformance.scenarios.stored import TRACES_NAME, read_traces
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from conformance.engine.robot_under_test import RobotUnderTest
-    from conformance.scenarios.scenario import Scenario
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,13 @@
 """Check whether a finding still occurs: send its requests again, or run the checks of its requirement again."""
 
-from __future__ import annotations
-
 import tempfile
 import time
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.observers import Observer
@@ -17,17 +16,11 @@ from conformance.engine.certification import certify
 from conformance.engine.pytest_run import connection_of
 from conformance.engine.resending import is_same, read_request, send_again
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.statement.statement import empty_statement
+from conformance.statement.statement import Statement, empty_statement
 from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import Exchange, NoAnswer, Response, Unanswered
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Response, Unanswered
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
-
-    from conformance.statement.statement import Statement
-    from conformance.transport.exchange import Attempt, Request
 
 # A pause between two requests is kept, as what is judged may be what comes after it; never longer than this, s.
 _LONGEST_PAUSE_S = 10.0

@@ -1,31 +1,32 @@
 """Store requests in result.json, send them again, and count how often a failure occurs again."""
 
-from __future__ import annotations
-
 import base64
 import re
 import time
 import zlib
+from collections.abc import Sequence
 from contextlib import closing
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import urlsplit
 
+from conformance.api.rest.interface import RestInterface
 from conformance.documents.readable import unreadable
 from conformance.transport import raw
-from conformance.transport.client import HttpClient
-from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener, NoAnswerError, Request
-from conformance.verdict.finding import Again
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from conformance.api.rest.interface import RestInterface
-    from conformance.transport.client import Connection
-    from conformance.transport.exchange import Attempt, Response, Unanswered
-    from conformance.verdict.evidence import Judge
-    from conformance.verdict.finding import Finding, Sent
-    from conformance.verdict.run import Run
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import (
+    SAFE_METHODS,
+    Attempt,
+    Exchange,
+    Listener,
+    NoAnswerError,
+    Request,
+    Response,
+    Unanswered,
+)
+from conformance.verdict.evidence import Judge
+from conformance.verdict.finding import Again, Finding, Sent
+from conformance.verdict.run import Run
 
 # Octets of one request in a result, compressed; and as they are sent: twice the contract's limit and a half.
 _MOST = 64 * 1024

@@ -1,30 +1,23 @@
 """The content of result.json (format roaas-result/1)."""
 
-from __future__ import annotations
-
+import datetime as dt
 import json
 import platform
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 from msgspec.structs import asdict
 
 from conformance.commandline.atomic_write import write_atomically
 from conformance.contract.interfaces import Interface
 from conformance.engine.resending import written
+from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.engine.suite import contract_digests, installed, suite_digest, suite_version
-from conformance.transport.exchange import Unanswered
-from conformance.verdict.verdicts import overall, views
-
-if TYPE_CHECKING:
-    import datetime as dt
-    from collections.abc import Mapping
-    from pathlib import Path
-
-    from conformance.engine.robot_under_test import RobotUnderTest
-    from conformance.transport.exchange import Attempt
-    from conformance.verdict.causes import Cause
-    from conformance.verdict.finding import Finding
-    from conformance.verdict.verdicts import ClassValue, Verdict
+from conformance.transport.exchange import Attempt, Unanswered
+from conformance.verdict.causes import Cause
+from conformance.verdict.finding import Finding
+from conformance.verdict.verdicts import ClassValue, Verdict, overall, views
 
 RESULT_FORMAT = "roaas-result/1"
 # As much of a body as a reader looks at; its length is always told.

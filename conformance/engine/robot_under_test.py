@@ -1,29 +1,23 @@
 """The robot of a run: opens its interfaces and checks whether they respond."""
 
-from __future__ import annotations
-
 import statistics
 import threading
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TextIO
 
 from conformance.api.device import Device, device_of
+from conformance.api.interfaces import Interfaces
 from conformance.api.rest.interface import RestInterface, plain_path
+from conformance.api.soap.callable_services import SoapServices
 from conformance.contract.interfaces import Interface
 from conformance.engine.resending import Recorder
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from typing import TextIO
-
-    from conformance.api.interfaces import Interfaces
-    from conformance.api.soap.callable_services import SoapServices
-    from conformance.verdict.run import Run
+from conformance.verdict.run import Run
 
 # How long a robot that stopped answering is given to come back before the rest of the run is called off, s.
 _GRACE_S = 3.0

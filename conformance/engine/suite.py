@@ -1,7 +1,5 @@
 """The identity of the suite: version, digests, and the contract packs it knows."""
 
-from __future__ import annotations
-
 import hashlib
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path

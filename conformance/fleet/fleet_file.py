@@ -1,7 +1,5 @@
 """The fleet file FLEET.toml: the robots, and how each is certified."""
 
-from __future__ import annotations
-
 import re
 from collections import defaultdict
 from pathlib import Path

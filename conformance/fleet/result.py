@@ -1,21 +1,17 @@
 """The content of fleet.json (format roaas-fleet/1), and the fleet's exit code."""
 
-from __future__ import annotations
-
+import datetime as dt
 import json
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 from conformance.commandline.atomic_write import write_atomically
 from conformance.commandline.exit_codes import ExitCode
 from conformance.engine.result import rfc3339
 from conformance.engine.suite import suite_version
 from conformance.fleet.member_run import EXIT_CODES, MemberResult
-
-if TYPE_CHECKING:
-    import datetime as dt
-    from collections.abc import Sequence
-    from pathlib import Path
 
 FLEET_FORMAT = "roaas-fleet/1"
 FLEET_NAME = "fleet.json"

@@ -1,18 +1,14 @@
 """Run the certifications of a fleet concurrently. Ctrl-C ends all of them and keeps their results."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import signal
 import time
-from typing import TYPE_CHECKING, TextIO
+from collections.abc import Callable, Iterator, Sequence
+from typing import TextIO
 
 from conformance.commandline.terminal import inert
 from conformance.fleet.member_run import MemberResult, MemberRun, Outcome, Stop
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
 
 # Who runs is told this often, s.
 _OFTEN_S = 10.0

@@ -1,7 +1,5 @@
 """Building blocks of mutants: conditions that choose requests and responses, and edits of them."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import re

@@ -10,8 +10,6 @@ starts::
 The suite then generates mutants from the pack's descriptions. Everything else has a default.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

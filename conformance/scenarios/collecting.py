@@ -1,17 +1,13 @@
 """The pytest plugin that collects rules as checks: each plays its scenario once per run and judges the trace."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from conformance.scenarios.rule import Rule, record
 from conformance.scenarios.scenario import Recordings, Scenario
 from conformance.scenarios.stage import Need
-
-if TYPE_CHECKING:
-    from conformance.verdict.evidence import Judge
+from conformance.verdict.evidence import Judge
 
 
 class RulesPlugin:

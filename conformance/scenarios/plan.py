@@ -1,7 +1,5 @@
 """The order of scenarios and checks in a run. It does not depend on file names."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 

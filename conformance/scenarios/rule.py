@@ -1,16 +1,13 @@
 """Rules: functions that judge a scenario's trace, without sending requests."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from conformance.scenarios.scenario import Scenario
-    from conformance.transport.exchange import Attempt
-    from conformance.verdict.evidence import Judge
+from conformance.scenarios.scenario import Scenario
+from conformance.transport.exchange import Attempt
+from conformance.verdict.evidence import Judge
 
 
 @dataclass(frozen=True)

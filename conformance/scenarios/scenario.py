@@ -1,7 +1,5 @@
 """Scenarios: functions that operate a device and return a trace, without judging it."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field

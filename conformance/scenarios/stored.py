@@ -4,19 +4,15 @@ The file is gzipped JSON (RFC 1952): one object with the traces by scenario. The
 type of its trace; msgspec encodes and decodes.
 """
 
-from __future__ import annotations
-
 import gzip
 import typing
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 
 import msgspec
 
 from conformance.scenarios.scenario import Recording, Recordings, Scenario
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from pathlib import Path
 
 TRACES_NAME = "traces.json.gz"
 _FAST = 1

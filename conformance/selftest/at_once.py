@@ -1,7 +1,5 @@
 """Judge several devices in parallel threads; each result is reported when it is ready, and Ctrl-C stops all of them."""
 
-from __future__ import annotations
-
 import multiprocessing
 import threading
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """A/A controls: good devices, over many seeds and in many circumstances. Each failure is a false positive."""
 
-from __future__ import annotations
-
 import contextlib
 import tempfile
 import threading

@@ -1,7 +1,5 @@
 """Start the good devices of a self-test as separate processes, and stop them."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re

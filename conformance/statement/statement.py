@@ -1,18 +1,13 @@
 """The implementation conformance statement: what a vendor declares about a device, and what it is judged by."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any, Self
+from pathlib import Path
+from typing import Any, Self
 
 import msgspec
 
 from conformance.contract.interfaces import Interface
+from conformance.contract.pack import Contract
 from conformance.contract.toml_file import Positive, Text, TomlFileError, read_toml
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from conformance.contract.pack import Contract
 
 
 class StatementError(TomlFileError):

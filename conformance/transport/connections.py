@@ -4,22 +4,17 @@ They send target, headers and their order exactly as given. h11 parses responses
 framing. Why no common HTTP client is used: docs/design.md.
 """
 
-from __future__ import annotations
-
 import select
 import socket
 import ssl
 import time
-from typing import TYPE_CHECKING, Final
+from pathlib import Path
+from typing import Final
 
 import h11
 
+from conformance.transport.deadline import Deadline
 from conformance.transport.exchange import IDEMPOTENT_METHODS, Response
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from conformance.transport.deadline import Deadline
 
 # An answer longer than this is no answer to any request of the contract, octets; nor is a longer header section.
 _MAX_ANSWER: Final = 32 * 1024 * 1024

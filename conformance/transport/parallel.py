@@ -1,7 +1,5 @@
 """Several concurrent clients: their requests are sent at the same moment, each on its own connection."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -1,19 +1,14 @@
 """A baseline: a file of expected failures, each with a reason and an expiry date."""
 
-from __future__ import annotations
-
 import datetime as dt
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import msgspec
 
 from conformance.contract.toml_file import Text, TomlFileError, read_toml
 from conformance.verdict.verdicts import Value, Verdict
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from pathlib import Path
 
 
 class BaselineError(TomlFileError):

@@ -15,20 +15,14 @@ All other requirements that met the cause are not tested.
 A raw request tests a rule of its own, so it shares a cause only if an ordinary request met that cause as well.
 """
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from conformance.contract.classes import CauseKind, Level
-
-if TYPE_CHECKING:
-    from collections.abc import Container, Iterable, Mapping
-
-    from conformance.contract.ledger import Requirement
-    from conformance.verdict.evidence import Evidence
-    from conformance.verdict.finding import Finding
+from conformance.contract.ledger import Requirement
+from conformance.verdict.evidence import Evidence
+from conformance.verdict.finding import Finding
 
 _LEVELS = tuple(Level)
 _KINDS = tuple(CauseKind)

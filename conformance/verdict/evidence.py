@@ -1,25 +1,17 @@
 """The judge, which collects the evidence of checks and observers for each requirement."""
 
-from __future__ import annotations
-
 import re
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from conformance.contract.classes import CauseKind
-from conformance.transport.exchange import NoAnswer, Unanswered
+from conformance.contract.ledger import Requirement
+from conformance.transport.exchange import Attempt, NoAnswer, Request, Unanswered
 from conformance.verdict.finding import Finding, Sent, causes_of, kind_of, observed_in, subject_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator
-
-    from conformance.contract.ledger import Requirement
-    from conformance.transport.exchange import Attempt, Request
 
 # Findings of one requirement that are kept: those that break its rule, and those whose cause others may meet as well.
 MAX_FINDINGS = 5

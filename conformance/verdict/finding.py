@@ -1,18 +1,13 @@
 """Findings, and their text: what the suite did, what it expected by which rule, and what it got."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 from http import HTTPStatus
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from conformance.contract.classes import CauseKind
 from conformance.documents.readable import unreadable
-from conformance.transport.exchange import Exchange, NoAnswer, Unanswered
-
-if TYPE_CHECKING:
-    from conformance.transport.exchange import Attempt, Request
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Unanswered
 
 _KINDS = {
     NoAnswer.REFUSED: CauseKind.NO_RESPONSE,

@@ -1,16 +1,9 @@
 """Observers: judge every exchange of a run, whichever check sent it."""
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from typing import TYPE_CHECKING
-
-from conformance.transport.exchange import Listener
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from conformance.transport.exchange import Exchange, Unanswered
-    from conformance.verdict.evidence import Judge
+from conformance.transport.exchange import Exchange, Listener, Unanswered
+from conformance.verdict.evidence import Judge
 
 
 class Observers(Listener):

@@ -1,19 +1,15 @@
 """The data of one run: the statement, what is judged and allowed, and the evidence so far."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
+from conformance.contract.requirement_sets import RequirementSet
 from conformance.statement.statement import Statement, empty_statement
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
-
-if TYPE_CHECKING:
-    from conformance.contract.interfaces import Interface
-    from conformance.contract.requirement_sets import RequirementSet
 
 
 def seed_of_nonce(nonce: str) -> int:

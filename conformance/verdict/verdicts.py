@@ -4,22 +4,15 @@ A failed MUST is a fail, a failed SHOULD a warning, a failed MAY information. No
 untested MUST, or without any judged case, is inconclusive.
 """
 
-from __future__ import annotations
-
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from conformance.contract.classes import Level, Prerequisite
-
-if TYPE_CHECKING:
-    from collections.abc import Container, Iterable, Mapping
-
-    from conformance.contract.ledger import Requirement
-    from conformance.verdict.evidence import Evidence
-    from conformance.verdict.finding import Finding
-
+from conformance.contract.ledger import Requirement
+from conformance.verdict.evidence import Evidence
+from conformance.verdict.finding import Finding
 
 # Why there is no verdict on what a robot does by itself, or does not.
 NOT_SEEN = "it was not seen in this run, so it is not judged"

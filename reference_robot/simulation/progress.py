@@ -1,7 +1,5 @@
 """Detection of a robot that gets no nearer to its goal."""
 
-from __future__ import annotations
-
 import math
 from typing import Final
 

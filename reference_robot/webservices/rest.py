@@ -1,7 +1,5 @@
 """The REST interface: finds the resource for a request (paper, ``ros-rs``)."""
 
-from __future__ import annotations
-
 from collections.abc import Awaitable, Callable, Iterable
 from typing import Final
 

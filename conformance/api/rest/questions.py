@@ -1,7 +1,5 @@
 """Questions whose responses can be told apart, so that a response that went to another client is noticed."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

@@ -1,22 +1,17 @@
 """What the generic suite asks this pack for: the statement's own tables, and the robot as a device."""
 
-from __future__ import annotations
-
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from conformance.api import device
+from conformance.documents.wsdl import Operation
+from conformance.documents.xml_node import Node
+from conformance.packs.table1.robot.clock import Clock
+from conformance.packs.table1.robot.examples import Examples
 from conformance.packs.table1.statement import Statement, StatementFile, said_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from conformance.documents.wsdl import Operation
-    from conformance.documents.xml_node import Node
-    from conformance.packs.table1.robot.clock import Clock
-    from conformance.packs.table1.robot.examples import Examples
-    from conformance.transport.exchange import Listener
+from conformance.transport.exchange import Listener
 
 _TEMPLATE = """
 [limits]

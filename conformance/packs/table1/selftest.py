@@ -1,7 +1,5 @@
 """What the self-test needs of this pack: its good robots, its mutants, and what only the contract knows of both."""
 
-from __future__ import annotations
-
 import contextlib
 import sys
 import threading

@@ -12,17 +12,13 @@ name = "courier over REST"
 ```
 """
 
-from __future__ import annotations
-
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import msgspec
 
 from conformance.contract.toml_file import Positive, TomlFileError, read_toml
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 class Operation(StrEnum):

@@ -3,15 +3,14 @@
 The suite judges each request by its bytes: valid ones must get a declared status, invalid ones 4xx.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 from hypothesis.errors import Unsatisfiable
 
 from conformance.api.expectation import expect
 from conformance.api.rest.applicable import allowed
+from conformance.api.rest.generated import Target
 from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.motion_guard import MotionGuard
@@ -21,9 +20,6 @@ from conformance.documents.openapi import operations_of
 from conformance.transport.client import HttpClient
 from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
-
-if TYPE_CHECKING:
-    from conformance.api.rest.generated import Target
 
 pytestmark = pytest.mark.needs("rest")
 _IDS = ("http/declared-status", "http/declared-body", "http/no-server-error")

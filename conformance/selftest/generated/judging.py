@@ -1,7 +1,5 @@
 """Judge generated mutants by the verdict of a certification of the classes most likely to kill them."""
 
-from __future__ import annotations
-
 import re
 import threading
 from collections.abc import Callable, Iterable, Iterator

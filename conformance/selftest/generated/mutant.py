@@ -1,7 +1,5 @@
 """A generated mutant, the modes that decide which exchanges it alters, and the changes of single fields."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass

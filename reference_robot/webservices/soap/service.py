@@ -1,7 +1,5 @@
 """A SOAP service: dispatches a message to its operation and returns the response."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Awaitable, Callable, Iterable
 from functools import partial

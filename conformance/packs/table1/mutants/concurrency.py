@@ -1,7 +1,5 @@
 """Mutants that are wrong only while several clients send requests concurrently."""
 
-from __future__ import annotations
-
 import json
 import threading
 import time

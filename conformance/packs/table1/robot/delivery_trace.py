@@ -1,7 +1,5 @@
 """Records of deliveries that were sent and of the messages that arrived, as data that rules can judge."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from http import HTTPStatus

@@ -1,7 +1,5 @@
 """Records of goals that were sent and of what the robot then showed, as data that rules can judge without a robot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

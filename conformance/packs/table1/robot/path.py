@@ -12,17 +12,14 @@ import itertools
 import math
 import operator
 from bisect import bisect_left
+from collections.abc import Callable, Sequence
 from statistics import median
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
+from conformance.packs.table1.limits import Noise
 from conformance.packs.table1.robot.geometry import wrapped
+from conformance.packs.table1.robot.robot import Odometry, Velocity
 from conformance.scenarios.rule import Case
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from conformance.packs.table1.limits import Noise
-    from conformance.packs.table1.robot.robot import Odometry, Velocity
 
 # Less than this is no drive to judge: m and rad.
 _SHORTEST: Final = 0.08

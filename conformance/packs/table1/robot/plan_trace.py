@@ -1,7 +1,5 @@
 """Records of plan requests and their responses, as data that rules can judge without a robot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from conformance.packs.table1.robot.geometry import Pose

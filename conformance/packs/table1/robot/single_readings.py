@@ -5,21 +5,17 @@ same values, and a velocity must lie between the odometry samples shortly before
 its velocity and lag one sample behind. A velocity outside them counts only when it happens repeatedly.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections import deque
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import msgspec
 
+from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.robot import FARTHEST, Velocity, is_near
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
-
-if TYPE_CHECKING:
-    from conformance.packs.table1.limits import Limits
-    from conformance.transport.exchange import Exchange
-    from conformance.verdict.evidence import Judge
+from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Judge
 
 Stamp = tuple[int, int]
 _SAMPLE: Final = "rest-resources/pose-sample"

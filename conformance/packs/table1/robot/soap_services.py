@@ -1,9 +1,8 @@
 """Send deliveries to the robot's SOAP services, and read its state from them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+
+from lxml import etree
 
 from conformance.api.soap.calls import call, read_exchange, send
 from conformance.api.soap.content import number_at
@@ -22,9 +21,6 @@ from conformance.packs.table1.robot.delivery_messages import NAMESPACE, delivery
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import Outgoing
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 # Where a robot may have a plan to, seen from where it is, m.
 _NEAR = ((0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5))

@@ -5,8 +5,6 @@ as long as it takes to settle. The suite makes all attempts first, one after ano
 robot moves, the suite repeats each attempt with a watch of its own, to learn which one moves the robot.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from http import HTTPStatus

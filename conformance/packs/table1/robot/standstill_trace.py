@@ -1,7 +1,5 @@
 """Records of a robot that must stay at rest, as data that rules can judge without a robot."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART
 from conformance.packs.table1.robot.letting_go import certain_s
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
-
-if TYPE_CHECKING:
-    from conformance.packs.table1.limits import Limits
 
 # Beyond any limit, or not to be actuated; and by the linear part alone.
 _BAD: Final = (Velocity(linear_x=-1e3), Velocity(linear_x=1e308, angular_z=-1e308), Velocity(angular_z=1e4))

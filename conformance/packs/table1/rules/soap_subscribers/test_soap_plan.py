@@ -1,13 +1,11 @@
 """GetPlan: a path from the robot to the requested pose in the requested frame, or a fault."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import pytest
+from lxml import etree
 
 from conformance.api.soap import content
 from conformance.api.soap.callable_services import SoapServices
@@ -23,9 +21,6 @@ from conformance.packs.table1.robot.plan import START_OFF
 from conformance.packs.table1.statement import said_of
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 pytestmark = [pytest.mark.phase("resting"), pytest.mark.needs("subscribers")]
 _PLAN = "soap-subscribers/plan"

@@ -1,10 +1,7 @@
 """The subscribers service: the readable resources of the paper's Table 1 over SOAP."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import pytest
+from lxml import etree
 
 from conformance.api.soap import content
 from conformance.api.soap.calls import SoapResponse, call, judge_answer, read_exchange, send
@@ -23,9 +20,6 @@ from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 pytestmark = [pytest.mark.phase("resting"), pytest.mark.needs("subscribers")]
 _VALID = "soap-subscribers/response-valid"
