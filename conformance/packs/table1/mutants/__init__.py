@@ -1,61 +1,9 @@
-"""All mutants of this pack, collected from one table per subject."""
+"""All mutants of this pack: the rows of the tables in this folder, a module for each subject."""
+
+from importlib import import_module
+from pkgutil import iter_modules
 
 from conformance.mutation.mutant import Mutant
-from conformance.packs.table1.mutants import (
-    attacks,
-    concurrency,
-    delivery,
-    describe,
-    equivalence,
-    formats,
-    goal,
-    goal_memory,
-    holding,
-    http_forms,
-    http_messages,
-    http_methods,
-    input_effects,
-    input_rest,
-    input_soap,
-    lists,
-    plan,
-    pose,
-    reach,
-    safety,
-    soap_processing,
-    soap_profile,
-    soap_reading,
-    soap_services,
-    velocity,
-    wsdl,
-)
 
-_SUBJECTS = (
-    reach,
-    pose,
-    velocity,
-    lists,
-    goal,
-    goal_memory,
-    plan,
-    delivery,
-    formats,
-    http_methods,
-    http_messages,
-    http_forms,
-    concurrency,
-    soap_services,
-    soap_reading,
-    soap_profile,
-    soap_processing,
-    input_rest,
-    input_soap,
-    input_effects,
-    attacks,
-    equivalence,
-    safety,
-    holding,
-    wsdl,
-    describe,
-)
-MUTANTS: tuple[Mutant, ...] = tuple(mutant for subject in _SUBJECTS for mutant in subject.MUTANTS)
+_MODULES = [import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)]
+MUTANTS: tuple[Mutant, ...] = tuple(mutant for module in _MODULES for mutant in getattr(module, "MUTANTS", ()))

@@ -59,19 +59,25 @@ def _written(pattern: str) -> Callable[[Request], bool]:
     return where
 
 
-@_mutant("delivery-only-once", "put-repeated", "Sending the same delivery again returns 409.")
-class _OnlyOnce:
-    def __init__(self) -> None:
+class OnlyOnce:
+    """A change that answers a delivery itself that came before; if ``keyed``, only one with an Idempotency-Key."""
+
+    def __init__(self, response: Callable[[Request], Response], *, keyed: bool = False) -> None:
+        self._answer, self._keyed = response, keyed
         self._seen: set[str] = set()
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        if deliveries(request):
+        """Forward the request, unless it is such a delivery."""
+        if deliveries(request) and (not self._keyed or request.field("Idempotency-Key")):
             if request.target in self._seen:
-                return problem(409, "code: this delivery was accepted before")(request)
+                return self._answer(request)
             self._seen.add(request.target)
         return forward(request)
 
 
+_mutant("delivery-only-once", "put-repeated", "Sending the same delivery again returns 409.").made(
+    lambda: OnlyOnce(problem(409, "code: this delivery was accepted before"))
+)
 _mutant("delivery-crashes", "put", "PUT of a delivery returns 500.").altered(deliveries, becomes(500))
 _mutant("delivery-coffee-unknown", "put", "PUT of a coffee (code 4) returns 404.").instead(
     lambda request: deliveries(request) and request.path.split("/")[_CODE] == "4", problem(404, "code: 4 is not known")

@@ -1,51 +1,20 @@
 """Mutants whose OpenAPI or WADL description differs from their behaviour."""
 
 import re
-from collections.abc import Callable
 from copy import deepcopy
 from typing import Any
 
-from conformance.mutation.changes import Make, altered, plain, problem, rest, text, values
+from conformance.mutation.changes import Make, altered, plain, problem, rest, text
+from conformance.mutation.fields import each as both
+from conformance.mutation.fields import field, without
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import each, gone, tree
-from conformance.packs.table1.mutants.paths import SENSORS
+from conformance.packs.table1.mutants.paths import GOAL, PLAN, SENSORS
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("describe", "rest")
 
 _OPENAPI, _WADL = rest("GET", "/openapi.json"), rest("GET", "/application.wadl")
-
-
-def _told(edit: Callable[[Any], Any]) -> Make:
-    """Return a change that applies ``edit`` to the OpenAPI document."""
-    return altered(_OPENAPI, values(edit))
-
-
-@_mutant("openapi-without-path", "openapi-operations", "/openapi.json lacks a path.").through(_told)
-def _without_path(description: Any) -> None:
-    description["paths"].pop(SENSORS, None)
-
-
-@_mutant("openapi-without-method", "openapi-operations", "/openapi.json lacks a method.").through(_told)
-def _without_method(description: Any) -> None:
-    description["paths"]["/robot/navigation/action/goal/"].pop("delete", None)
-
-
-@_mutant("openapi-without-parameter", "openapi-operations", "/openapi.json lacks a parameter.").through(_told)
-def _without_parameter(description: Any) -> None:
-    operation = description["paths"]["/robot/navigation/service/plan"]["get"]
-    operation["parameters"] = [one for one in operation["parameters"] if one.get("name") != "y"]
-
-
-@_mutant("openapi-promises", "openapi-behaviour", "/openapi.json describes a path that does not exist.").through(_told)
-def _promised(description: Any) -> None:
-    description["paths"]["/robot/arm/"] = {"get": {"responses": {"200": {"description": "the arm"}}}}
-
-
-@_mutant("openapi-invalid", "openapi", "/openapi.json is not a valid OpenAPI document.").through(_told)
-def _invalid(description: Any) -> None:
-    description.pop("info", None)
-    description["paths"] = [*description["paths"]]
 
 
 def _lost(name: str, attribute: str, pattern: str) -> Make:
@@ -65,6 +34,21 @@ def _promised_twice(resource: Any) -> None:
     resource.getparent().append(other)
 
 
+_mutant("openapi-without-path", "openapi-operations", "/openapi.json lacks a path.").json(
+    _OPENAPI, lambda told: told["paths"].pop(SENSORS, None) and None
+)
+_mutant("openapi-without-method", "openapi-operations", "/openapi.json lacks a method.").json(
+    _OPENAPI, lambda told: told["paths"][GOAL].pop("delete", None) and None
+)
+_mutant("openapi-without-parameter", "openapi-operations", "/openapi.json lacks a parameter.").json(
+    _OPENAPI, field(f"paths.{PLAN}.get.parameters", lambda all_: [one for one in all_ if one.get("name") != "y"])
+)
+_mutant("openapi-promises", "openapi-behaviour", "/openapi.json describes a path that does not exist.").json(
+    _OPENAPI, field("paths./robot/arm/", {"get": {"responses": {"200": {"description": "the arm"}}}})
+)
+_mutant("openapi-invalid", "openapi", "/openapi.json is not a valid OpenAPI document.").json(
+    _OPENAPI, both(without("info"), field("paths", list))
+)
 _mutant("openapi-gone", "openapi", "GET of /openapi.json returns 404.").instead(
     _OPENAPI, problem(404, "no description")
 )

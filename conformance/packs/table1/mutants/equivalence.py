@@ -5,12 +5,12 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import guarded, inputs, plain, rest, soap, success, unwanted
+from conformance.mutation.changes import Make, Where, guarded, inputs, plain, rest, soap, success, unwanted
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import each, gone, named
 from conformance.packs.table1.delivery import COFFEE, COORDINATES, PATH_NAMES
-from conformance.packs.table1.mutants.delivery import segments
+from conformance.packs.table1.mutants.delivery import OnlyOnce, segments
 from conformance.packs.table1.mutants.distortion import (
     EveryNth,
     OutOfOrder,
@@ -24,6 +24,7 @@ from conformance.packs.table1.mutants.distortion import (
 from conformance.packs.table1.mutants.in_background import later
 from conformance.packs.table1.mutants.paths import DELIVERIES, SENSORS, TNS, VELOCITY, deliveries
 from conformance.packs.table1.mutants.soap_responses import enveloped
+from conformance.packs.table1.mutants.velocity import times
 
 MUTANTS = Table()
 _rest_delivery = MUTANTS.of_class("equivalence", "rest", observer=True)
@@ -55,70 +56,31 @@ def _straighter(root: Any) -> None:
         axis.text = repr(float(axis.text) + 0.05)
 
 
-def _halve(twist: Any) -> None:
-    for part, axis in (("linear", "x"), ("angular", "z")):
-        twist[part][axis] = twist[part][axis] / 2
+def _followed(where: Where, after_s: float, second: Callable[[Request], Request | None]) -> Make:
+    """Return a change that sends a second request some time after a successful one, where there is one to send."""
+
+    def change(request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        other = second(request) if where(request) and success(response) else None
+        if other is not None:
+            later(after_s, forward, other)
+        return response
+
+    return lambda: change
 
 
-def _one_more(items: Any) -> Any:
-    return [*items, {"name": "ghost", "topic": "/ghost", "type": "sensor_msgs/msg/Range"}]
+def _elsewhere(request: Request) -> Request:
+    return request.copy(target=f"{request.target.rpartition('/')[0]}/99.5")
 
 
-@_rest_delivery("same-rest-again-later", "delivery-only", "A REST delivery is published again 0.4 s later.")
-def _again_later(request: Request, forward: Forward) -> Response:
-    response = forward(request)
-    if deliveries(request) and success(response):
-        later(_LATER_S, forward, request.copy())
-    return response
-
-
-@_rest_delivery(
-    "same-rest-another-later",
-    "delivery-only",
-    "Shortly after a REST delivery, the robot publishes another delivery to another place.",
-)
-def _another_later(request: Request, forward: Forward) -> Response:
-    response = forward(request)
-    if deliveries(request) and success(response):
-        later(_SOON_S, forward, request.copy(target=f"{request.target.rpartition('/')[0]}/99.5"))
-    return response
-
-
-@_soap_delivery(
-    "same-coffee-again-by-rest",
-    "delivery-only",
-    "A coffee that is ordered over SOAP is ordered again over REST 0.4 s later.",
-)
-def _again_by_rest(request: Request, forward: Forward) -> Response:
-    response = forward(request)
-    if _COFFEE(request) and success(response):
-        values = {name.decode(): text.decode() for name, text in _COORDINATES.findall(request.body)}
-        if not values.keys() >= set(COORDINATES):
-            return response  # written in another encoding, or with entities in it
-        pairs = "".join(f"/{name}/{values[field]}" for name, field in zip(PATH_NAMES, COORDINATES, strict=True))
-        target = f"{DELIVERIES}{COFFEE}{pairs}"
-        later(
-            _LATER_S, forward, Request("rest", "PUT", target, fields=[("Host", "localhost"), ("Content-Length", "0")])
-        )
-    return response
-
-
-@_rest_delivery(
-    "same-rest-deduplicated",
-    "delivery-repeated",
-    "Sending the same REST delivery again returns 204 without any effect.",
-)
-class _Deduplicating:
-    def __init__(self, *, keyed: bool = False) -> None:
-        self._keyed = keyed
-        self._seen: set[str] = set()
-
-    def __call__(self, request: Request, forward: Forward) -> Response:
-        if deliveries(request) and (not self._keyed or request.field("Idempotency-Key")):
-            if request.target in self._seen:
-                return plain(204)(request)
-            self._seen.add(request.target)
-        return forward(request)
+def _by_rest(request: Request) -> Request | None:
+    """Return a coffee as a REST request; None for one that is written in another encoding, or with entities in it."""
+    values = {name.decode(): text.decode() for name, text in _COORDINATES.findall(request.body)}
+    if not values.keys() >= set(COORDINATES):
+        return None
+    pairs = "".join(f"/{name}/{values[field]}" for name, field in zip(PATH_NAMES, COORDINATES, strict=True))
+    fields = [("Host", "localhost"), ("Content-Length", "0")]
+    return Request("rest", "PUT", f"{DELIVERIES}{COFFEE}{pairs}", fields=fields)
 
 
 def _normal(_place: int, text: str) -> str:
@@ -137,6 +99,19 @@ def _cut(request: Request) -> None:
     request.body = re.sub(rb"(>[^<>]+)<!--[^>]*-->[^<>]+<", rb"\1<", request.body)
 
 
+_rest_delivery("same-rest-again-later", "delivery-only", "A REST delivery is published again 0.4 s later.").made(
+    _followed(deliveries, _LATER_S, Request.copy)
+)
+_rest_delivery(
+    "same-rest-another-later",
+    "delivery-only",
+    "Shortly after a REST delivery, the robot publishes another delivery to another place.",
+).made(_followed(deliveries, _SOON_S, _elsewhere))
+_soap_delivery(
+    "same-coffee-again-by-rest",
+    "delivery-only",
+    "A coffee that is ordered over SOAP is ordered again over REST 0.4 s later.",
+).made(_followed(_COFFEE, _LATER_S, _by_rest))
 _soap_delivery(
     "same-soap-cut-by-comments", "delivery-soap", "A number with a comment in it is read only up to the comment."
 ).rewritten(_DELIVERY, _cut)
@@ -150,7 +125,12 @@ _rest_delivery(
     "same-rest-any-key",
     "idempotency-other-key",
     "The same REST delivery with another Idempotency-Key returns 204 without any effect.",
-).made(lambda: _Deduplicating(keyed=True))
+).made(lambda: OnlyOnce(plain(204), keyed=True))
+_rest_delivery(
+    "same-rest-deduplicated",
+    "delivery-repeated",
+    "Sending the same REST delivery again returns 204 without any effect.",
+).made(lambda: OnlyOnce(plain(204)))
 _rest_delivery("same-rest-no-subnormals", "delivery-rest", "Numbers closer to zero than 2.2e-308 become 0.").rewritten(
     deliveries, segments(_normal)
 )
@@ -180,9 +160,9 @@ _soap_delivery("same-soap-rounded", "delivery-same", "SOAP rounds to three digit
 _rest_delivery("same-order", "delivery-order", "A REST delivery is published after the next one.").made(OutOfOrder)
 _rest_state(
     "same-velocity-halved", "velocity-message", "The velocity message on ROS has half of the commanded values."
-).rewritten(rest("PUT", VELOCITY), inputs(guarded(_halve)))
+).rewritten(rest("PUT", VELOCITY), inputs(guarded(times(0.5))))
 _rest_state("same-sensor-ghost", "sensors-graph", "The list of sensors has a sensor that does not exist.").json(
-    rest("GET", SENSORS), _one_more
+    rest("GET", SENSORS), lambda items: [*items, {"name": "ghost", "topic": "/ghost", "type": "sensor_msgs/msg/Range"}]
 )
 _soap_state("same-pose", "pose", "The pose over SOAP is 37 cm ahead of the pose over REST.").xml(
     soap("GetPose"), _shift("position", 0.37)

@@ -21,33 +21,17 @@ from conformance.mutation.changes import (
     unwanted,
     values,
 )
+from conformance.mutation.fields import field, plus, swapped, without
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
-from conformance.packs.table1.mutants.goal_memory import active, identity, pose_of, position
+from conformance.packs.table1.mutants.goal_memory import active, identity, pose_of
 from conformance.packs.table1.mutants.paths import GOAL
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("rest-resources", "rest")
 
 _AT, _GET, _PUT, _DELETE = rest("", GOAL), rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
-
-
-def _told(edit: Callable[[Any], Any]) -> Make:
-    """Return a change that applies ``edit`` to the goal in responses to GET."""
-    return altered(_GET, values(edit))
-
-
-@_mutant("goal-get-swapped", "goal-get", "GET returns the goal with x and y swapped.").through(_told)
-def _swap(goal: Any) -> None:
-    at = position(goal)
-    at["x"], at["y"] = at["y"], at["x"]
-
-
-def _shift(by: float) -> Callable[[Any], None]:
-    def edit(goal: Any) -> None:
-        position(goal)["x"] += by
-
-    return edit
+_X, _Y, _FRAME = (f"goal.target_pose.{place}" for place in ("pose.position.x", "pose.position.y", "header.frame_id"))
 
 
 def _without_id(request: Request) -> bool:
@@ -55,7 +39,7 @@ def _without_id(request: Request) -> bool:
 
 
 def _renamed(edit: Callable[[str], str]) -> Make:
-    return altered(_AT, values(lambda goal: goal["goal_id"].update(id=edit(goal["goal_id"]["id"]))))
+    return altered(_AT, values(field("goal_id.id", edit)))
 
 
 def _when_active(
@@ -73,10 +57,6 @@ def _when_active(
         return forward(request)
 
     return lambda: change
-
-
-def _known_frame(goal: Any) -> None:
-    goal["goal"]["target_pose"]["header"]["frame_id"] = "map"
 
 
 def _unit(goal: Any) -> None:
@@ -128,13 +108,14 @@ def _beside(request: Request, forward: Forward) -> Response:
         return forward(request)
     if _PUT(request):
         request = request.copy()
-        inputs(_guarded(_shift(0.8)))(request)
+        inputs(_guarded(field(_X, plus(0.8))))(request)
     response = forward(request)
     if success(response):
-        values(_guarded(_shift(-0.8)))(response)
+        values(_guarded(field(_X, plus(-0.8))))(response)
     return response
 
 
+_mutant("goal-get-swapped", "goal-get", "GET returns the goal with x and y swapped.").json(_GET, swapped(_X, _Y))
 _mutant("goal-none-empty", "goal-none", "Without a goal, GET returns 200 with null.").altered(
     _GET, page(200, b"null", JSON), status(404)
 )
@@ -142,17 +123,13 @@ _mutant("goal-none-no-content", "goal-none", "Without a goal, GET returns 204.")
     _GET, becomes(204), status(404)
 )
 _mutant("goal-put-ok", "goal-put", "PUT of a new goal returns 200.").altered(_PUT, becomes(200), status(201, 202))
-_mutant("goal-get-frame", "goal-get", "GET returns the goal in another frame.").json(
-    _GET, lambda goal: goal["goal"]["target_pose"]["header"].update(frame_id="odom_2")
-)
+_mutant("goal-get-frame", "goal-get", "GET returns the goal in another frame.").json(_GET, field(_FRAME, "odom_2"))
 _mutant("goal-get-other-id", "goal-get", "GET returns the goal under another id.").json(
-    _GET, lambda goal: goal["goal_id"].update(id="goal-1")
+    _GET, field("goal_id.id", "goal-1")
 )
-_mutant("goal-without-status", "goal-status", "The active goal has no status.").json(
-    _GET, lambda goal: goal.pop("status") and None
-)
+_mutant("goal-without-status", "goal-status", "The active goal has no status.").json(_GET, without("status"))
 _mutant("goal-status-succeeded", "goal-status", "The active goal has status 4, succeeded.").json(
-    _GET, lambda goal: goal["status"].update(code=4)
+    _GET, field("status.code", 4)
 )
 _mutant("goal-wants-id", "goal-fills-in", "The robot refuses a goal without goal_id.").instead(
     _without_id, problem(422, "goal_id: missing")
@@ -194,7 +171,7 @@ _mutant("goal-delete-none-fine", "goal-delete-none", "DELETE without a goal retu
     _DELETE, becomes(204), status(404)
 )
 _mutant("goal-frame-ignored", "goal-frame", "The robot ignores the goal's frame.").rewritten(
-    _PUT, inputs(_guarded(_known_frame))
+    _PUT, inputs(_guarded(field(_FRAME, "map")))
 )
 _mutant(
     "goal-quaternion-nearly",

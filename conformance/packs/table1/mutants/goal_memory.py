@@ -16,11 +16,6 @@ _mutant = MUTANTS.of_class("rest-resources", "rest")
 _GET, _PUT, _DELETE = rest("GET", GOAL), rest("PUT", GOAL), rest("DELETE", GOAL)
 
 
-def position(goal: Any) -> Any:
-    """Return the position in a MoveBaseActionGoal."""
-    return goal["goal"]["target_pose"]["pose"]["position"]
-
-
 def identity(request: Request) -> str | None:
     """Return the goal id in the request, or None."""
     value = parsed(request.body)

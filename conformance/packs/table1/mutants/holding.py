@@ -1,11 +1,11 @@
 """Mutants whose velocity commands end or restart for a wrong reason."""
 
-import json
 import threading
 import time
 from typing import Any
 
 from conformance.mutation.changes import parsed, plain, rest, success
+from conformance.mutation.fields import found
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.in_background import later
@@ -19,8 +19,6 @@ _PUT, _PUT_LINEAR, _PUTS = rest("PUT", VELOCITY), rest("PUT", LINEAR), rest("PUT
 _DELETE, _PUT_GOAL = rest("DELETE", GOAL), rest("PUT", GOAL)
 # Nobody asks: nothing has come for so long; and how often is looked, s.
 _SILENT_S, _LOOK_S = 0.12, 0.04
-_LIMITS = (0.7, 2.5)
-_SMALL = 0.05
 
 
 class _Remembering:
@@ -71,7 +69,10 @@ class _Asleep(_Remembering):
 class _Renewed(_Remembering):
     def put(self, request: Request, response: Response, forward: Forward) -> None:
         super().put(request, response, forward)
-        if 400 <= response.status < 500 and self.last and "angular" in self.last and any(_parts(self.last)):
+        driving = (
+            self.last and "angular" in self.last and any(found(self.last, one) for one in ("linear.x", "angular.z"))
+        )
+        if 400 <= response.status < 500 and driving:
             sent(request, forward, "PUT", VELOCITY, self.last)
 
 
@@ -119,54 +120,6 @@ class _Deaf(_Remembering):
         super().put(request, response, forward)
         if success(response):
             self._taken = time.monotonic()
-
-
-def _parts(twist: Any) -> tuple[float, float]:
-    try:
-        return abs(twist["linear"]["x"]), abs(twist["angular"]["z"])
-    except (TypeError, KeyError):
-        return 0.0, 0.0
-
-
-@_mutant(
-    "velocity-one-at-once",
-    "rest-resources/velocity-range",
-    "Near both limits at once, the robot drives at half the linear velocity.",
-)
-def _one_at_once(request: Request, forward: Forward) -> Response:
-    value: Any = parsed(request.body) if _PUT(request) else None
-    if any(part < 0.7 * limit for part, limit in zip(_parts(value), _LIMITS, strict=True)):
-        return forward(request)
-    value["linear"]["x"] /= 2
-    response = forward(request.copy(body=json.dumps(value).encode()))
-    return plain(204)(request) if success(response) else response
-
-
-@_mutant(
-    "velocity-deadband",
-    "rest-resources/velocity-range",
-    "The robot accepts velocities below 0.05 m/s or rad/s and stands still.",
-)
-def _deadband(request: Request, forward: Forward) -> Response:
-    value: Any = parsed(request.body) if _PUT(request) else None
-    if not any(0.0 < part < _SMALL for part in _parts(value)):
-        return forward(request)
-    for side, axis in (("linear", "x"), ("angular", "z")):
-        if abs(value[side][axis]) < _SMALL:
-            value[side][axis] = 0.0
-    response = forward(request.copy(body=json.dumps(value).encode()))
-    return plain(204)(request) if success(response) else response
-
-
-@_mutant(
-    "velocity-forgotten-for-goal",
-    "rest-resources/velocity-goal",
-    "While a goal is active, PUT of a velocity returns 204 without any effect.",
-)
-def _forgotten(request: Request, forward: Forward) -> Response:
-    if _PUT(request) and forward(request.copy(method="GET", target=GOAL, body=b"")).status == 200:
-        return plain(204)(request)
-    return forward(request)
 
 
 @_mutant(

@@ -1,28 +1,18 @@
 """Mutants that return wrong plans."""
 
-import math
-from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import JSON, Make, altered, becomes, page, query, rest, status, values
+from conformance.mutation.changes import JSON, becomes, page, query, rest, status
+from conformance.mutation.fields import field
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import PLAN
+from conformance.packs.table1.mutants.pose import turned
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("rest-resources", "rest")
 
 _EMPTY = b'{"plan":{"header":{"stamp":{"sec":1,"nanosec":0},"frame_id":"map"},"poses":[]}}'
-_GET = rest("GET", PLAN)
-
-
-def _told(edit: Callable[[Any], Any]) -> Make:
-    """Return a change that applies ``edit`` to plans."""
-    return altered(_GET, values(edit))
-
-
-def _led(edit: Callable[[list[Any]], list[Any]], nth: int = 1) -> Make:
-    """Return a change that applies ``edit`` to the list of poses of every nth plan."""
-    return altered(_GET, values(lambda value: value["plan"].update(poses=edit(value["plan"]["poses"]))), nth=nth)
+_GET, _POSES = rest("GET", PLAN), "plan.poses"
 
 
 def _moved(pose: Any, x: float, y: float) -> Any:
@@ -35,22 +25,10 @@ def _detour(poses: list[Any]) -> list[Any]:
     return [*poses[:middle], _moved(poses[middle], 25.0, -25.0), *poses[middle:]]
 
 
-@_mutant(
-    "plan-frame-in-name-only", ("plan-start", "plan-end"), "A plan in the odometry's frame is shifted by (1.5, -1.0) m."
-).through(_told)
 def _aside(value: Any) -> None:
     path = value["plan"]
     if path["header"]["frame_id"] == "odom":
         path["poses"] = [_moved(pose, 1.5, -1.0) for pose in path["poses"]]
-
-
-@_mutant("plan-heading-ignored", "plan-yaw", "The last pose of a plan has a heading that is 1 rad off.").through(_led)
-def _turned(poses: list[Any]) -> list[Any]:
-    last = poses[-1]
-    q = last["pose"]["orientation"]
-    yaw = 2 * math.atan2(q["z"], q["w"]) + 1.0
-    q.update(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
-    return poses
 
 
 def _no_start(given: dict[str, str]) -> None:
@@ -62,35 +40,41 @@ def _quarter(given: dict[str, str]) -> None:
     given.setdefault("yaw", "1.5707963")
 
 
-@_mutant(
-    "plan-mixed-frames", "plan-frame", "Only the first pose of a plan is in the frame of the path's header."
-).through(_told)
 def _frame(value: Any) -> None:
     for pose in value["plan"]["poses"][1:]:
         pose["header"]["frame_id"] = "base_link"
 
 
-_mutant("plan-without-stamps", "plan-type", "Poses of a plan have no header.").made(
-    _led(lambda poses: [{"pose": one["pose"]} for one in poses])
+_mutant(
+    "plan-frame-in-name-only", ("plan-start", "plan-end"), "A plan in the odometry's frame is shifted by (1.5, -1.0) m."
+).json(_GET, _aside)
+_mutant("plan-heading-ignored", "plan-yaw", "The last pose of a plan has a heading that is 1 rad off.").json(
+    _GET, field("plan.poses.-1.pose.orientation", turned(lambda yaw: yaw + 1.0))
+)
+_mutant("plan-mixed-frames", "plan-frame", "Only the first pose of a plan is in the frame of the path's header.").json(
+    _GET, _frame
+)
+_mutant("plan-without-stamps", "plan-type", "Poses of a plan have no header.").json(
+    _GET, field(_POSES, lambda poses: [{"pose": one["pose"]} for one in poses])
 )
 _mutant("plan-bare", "plan-type", "The response is the path itself, without the object around it.").json(
     _GET, lambda value: value["plan"]
 )
-_mutant("plan-from-elsewhere", "plan-start", "A plan begins 60 cm from the robot.").made(
-    _led(lambda poses: [_moved(poses[0], -0.36, 0.48), *poses])
+_mutant("plan-from-elsewhere", "plan-start", "A plan begins 60 cm from the robot.").json(
+    _GET, field(_POSES, lambda poses: [_moved(poses[0], -0.36, 0.48), *poses])
 )
 _mutant("plan-ignores-start", "plan-given-start", "The robot ignores the start in the query.").rewritten(
     _GET, query(_no_start)
 )
-_mutant("plan-falls-short", "plan-end", "A plan ends 50 cm before the requested pose.").made(
-    _led(lambda poses: [*poses[:-1], _moved(poses[-1], 0.3, 0.4)])
+_mutant("plan-falls-short", "plan-end", "A plan ends 50 cm before the requested pose.").json(
+    _GET, field(_POSES, lambda poses: [*poses[:-1], _moved(poses[-1], 0.3, 0.4)])
 )
-_mutant("plan-jumps", "plan-continuous", "A plan contains a jump of 35 m.").made(_led(_detour))
-_mutant("plan-jumps-sometimes", "plan-continuous", "One plan in 50 contains a jump of 35 m.").made(
-    _led(_detour, nth=50)
+_mutant("plan-jumps", "plan-continuous", "A plan contains a jump of 35 m.").json(_GET, field(_POSES, _detour))
+_mutant("plan-jumps-sometimes", "plan-continuous", "One plan in 50 contains a jump of 35 m.").json(
+    _GET, field(_POSES, _detour), nth=50
 )
 _mutant("plan-frameless", "plan-frame", "The path's header has an empty frame_id.").json(
-    _GET, lambda value: value["plan"]["header"].update(frame_id="")
+    _GET, field("plan.header.frame_id", "")
 )
 _mutant("plan-other-defaults", "plan-defaults", "The default yaw is a quarter turn.").rewritten(_GET, query(_quarter))
 _mutant("plan-none-empty", "plan-none", "Where no plan exists, the robot returns 200 with an empty plan.").altered(

@@ -2,11 +2,13 @@
 
 import copy
 import math
+import operator
 import time
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import JSON, Make, altered, parsed, plain, problem, rest, values
+from conformance.mutation.changes import JSON, parsed, plain, problem, rest, values
+from conformance.mutation.fields import each, field, plus, scaled, swapped, without
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import LINEAR, POSE, VELOCITY
@@ -15,49 +17,18 @@ MUTANTS = Table()
 _mutant = MUTANTS.of_class("rest-resources", "rest")
 
 _AT = rest("GET", POSE)
+_X, _Y, _ORIENTATION = "pose.pose.position.x", "pose.pose.position.y", "pose.pose.orientation"
+_SEC, _NANOSEC = "header.stamp.sec", "header.stamp.nanosec"
 
 
-def _position(odometry: Any) -> Any:
-    return odometry["pose"]["pose"]["position"]
+def turned(change: Callable[[float], float]) -> Callable[[Any], Any]:
+    """Return a function that changes the heading of an orientation, rad."""
 
-
-def _orientation(odometry: Any) -> Any:
-    return odometry["pose"]["pose"]["orientation"]
-
-
-def _told(edit: Callable[[Any], Any], nth: int = 1) -> Make:
-    """Return a change that applies ``edit`` to every nth odometry."""
-    return altered(_AT, values(edit), nth=nth)
-
-
-def _scaled(factor: float) -> Callable[[Any], None]:
-    def edit(odometry: Any) -> None:
-        for axis in "xy":
-            _position(odometry)[axis] *= factor
-
-    return edit
-
-
-def _turned(change: Callable[[float], float]) -> Callable[[Any], None]:
-    def edit(odometry: Any) -> None:
-        q = _orientation(odometry)
+    def edit(q: Any) -> Any:
         yaw = change(2 * math.atan2(q["z"], q["w"]))
-        q["z"], q["w"] = math.sin(yaw / 2), math.cos(yaw / 2)
+        return {**q, "z": math.sin(yaw / 2), "w": math.cos(yaw / 2)}
 
     return edit
-
-
-@_mutant("pose-mirrored", "pose-motion", "The position's x and y are swapped.").through(_told)
-def _swapped(odometry: Any) -> None:
-    at = _position(odometry)
-    at["x"], at["y"] = at["y"], at["x"]
-
-
-@_mutant("odometry-in-degrees", "velocity-odometry", "The odometry's turning rate is in degrees per second.").through(
-    _told
-)
-def _in_degrees(odometry: Any) -> None:
-    odometry["twist"]["twist"]["angular"]["z"] = math.degrees(odometry["twist"]["twist"]["angular"]["z"])
 
 
 class _Frozen:
@@ -116,23 +87,6 @@ class _FastClock:
 
 
 @_mutant(
-    "pose-nanosec-carried", "pose-type", "The stamp's sec is 1 too small and its nanosec 1,000,000,000 too large."
-).through(_told)
-def _carried(odometry: Any) -> None:
-    odometry["header"]["stamp"]["sec"] -= 1
-    odometry["header"]["stamp"]["nanosec"] += 10**9
-
-
-@_mutant("pose-clock-milliseconds", "pose-clock", "The stamp's nanosec counts milliseconds.").through(_told)
-def _in_milliseconds(odometry: Any) -> None:
-    odometry["header"]["stamp"]["nanosec"] //= 10**6
-
-
-def _earlier(odometry: Any) -> None:
-    odometry["header"]["stamp"]["sec"] -= 1
-
-
-@_mutant(
     "pose-without-retry-after",
     "pose-unavailable",
     "Before the first odometry, GET of the pose returns 503 without Retry-After.",
@@ -148,42 +102,48 @@ class _NotYet:
         return forward(request)
 
 
+_mutant("pose-mirrored", "pose-motion", "The position's x and y are swapped.").json(_AT, swapped(_X, _Y))
+_mutant("odometry-in-degrees", "velocity-odometry", "The odometry's turning rate is in degrees per second.").json(
+    _AT, field("twist.twist.angular.z", math.degrees)
+)
+_mutant(
+    "pose-nanosec-carried", "pose-type", "The stamp's sec is 1 too small and its nanosec 1,000,000,000 too large."
+).json(_AT, each(field(_SEC, plus(-1)), field(_NANOSEC, plus(10**9))))
+_mutant("pose-clock-milliseconds", "pose-clock", "The stamp's nanosec counts milliseconds.").json(
+    _AT, field(_NANOSEC, lambda nanosec: nanosec // 10**6)
+)
 _mutant("pose-short-covariance", "pose-type", "The pose's covariance has 35 values.").json(
-    _AT, lambda value: value["pose"].update(covariance=value["pose"]["covariance"][:35])
+    _AT, field("pose.covariance", lambda numbers: numbers[:35])
 )
-_mutant("pose-without-child-frame", "pose-type", "The pose lacks child_frame_id.").json(
-    _AT, lambda value: value.pop("child_frame_id") and None
-)
-_mutant("pose-numbers-as-text", "pose-type", "In one pose of 50, x is a string.").json(
-    _AT, lambda value: _position(value).update(x=str(_position(value)["x"])), nth=50
-)
+_mutant("pose-without-child-frame", "pose-type", "The pose lacks child_frame_id.").json(_AT, without("child_frame_id"))
+_mutant("pose-numbers-as-text", "pose-type", "In one pose of 50, x is a string.").json(_AT, field(_X, str), nth=50)
 _mutant("pose-quaternion-long", "pose-quaternion", "The orientation quaternion is 1 % too long.").json(
-    _AT, lambda value: _orientation(value).update({axis: 1.01 * part for axis, part in _orientation(value).items()})
+    _AT, field(_ORIENTATION, lambda q: {axis: 1.01 * part for axis, part in q.items()})
 )
 _mutant("pose-quaternion-zero", "pose-quaternion", "The orientation quaternion is four zeros.").json(
-    _AT, lambda value: value["pose"]["pose"].update(orientation=dict.fromkeys("xyzw", 0.0))
+    _AT, field(_ORIENTATION, dict.fromkeys("xyzw", 0.0))
 )
 _mutant("pose-stamp-frozen", "pose-stamp", "GET of the pose always returns the header of the first response.").made(
     lambda: _Frozen("header")
 )
 _mutant("pose-stamp-backwards", "pose-stamp", "Every fifth pose has a stamp that is 1 s too early.").json(
-    _AT, _earlier, nth=5
+    _AT, field(_SEC, plus(-1)), nth=5
 )
 _mutant("pose-stale", ("pose-motion", "pose-rotation"), "GET always returns the first pose, with a new stamp.").made(
     lambda: _Frozen("pose", "twist")
 )
-_mutant("pose-aside-sometimes", "pose-sample", "One pose in 60 is 1 m off.").json(
-    _AT, lambda value: _position(value).update(x=_position(value)["x"] + 1.0), nth=60
-)
+_mutant("pose-aside-sometimes", "pose-sample", "One pose in 60 is 1 m off.").json(_AT, field(_X, plus(1.0)), nth=60)
 _mutant(
     "velocity-off-sometimes", "velocity-odometry", "One measured velocity in 60 is 0.1 m/s higher than the odometry's."
-).json(rest("GET", VELOCITY), lambda twist: twist["linear"].update(x=twist["linear"]["x"] + 0.1), nth=60)
-_mutant("pose-in-centimetres", "pose-motion", "The position is in centimetres.").json(_AT, _scaled(100))
+).json(rest("GET", VELOCITY), field("linear.x", plus(0.1)), nth=60)
+_mutant("pose-in-centimetres", "pose-motion", "The position is in centimetres.").json(
+    _AT, each(field(_X, scaled(100)), field(_Y, scaled(100)))
+)
 _mutant("pose-clockwise", "pose-rotation", "The heading has the wrong sign: it counts clockwise.").json(
-    _AT, _turned(lambda yaw: -yaw)
+    _AT, field(_ORIENTATION, turned(operator.neg))
 )
 _mutant("pose-half-turn", "pose-rotation", "The heading turns at half the rate.").json(
-    _AT, _turned(lambda yaw: yaw / 2)
+    _AT, field(_ORIENTATION, turned(scaled(0.5)))
 )
 _mutant("pose-gone", "pose-type", "GET of the pose returns 404.").instead(_AT, problem(404, "there is no pose"))
 _mutant("pose-no-content", "pose-type", "GET of the pose returns 204.").instead(_AT, plain(204))

@@ -1,6 +1,7 @@
 """Mutants that are dangerous: they drive on, drive too fast, or start by themselves."""
 
 import time
+from collections.abc import Callable
 from typing import Any
 
 from conformance.mutation.changes import guarded, inputs, parsed, plain, problem, rest, success
@@ -10,80 +11,60 @@ from conformance.packs.table1.mutants.goal_memory import active
 from conformance.packs.table1.mutants.in_background import later
 from conformance.packs.table1.mutants.input_effects import after_refusal, drive, goal_ahead, sent
 from conformance.packs.table1.mutants.paths import GOAL, LINEAR, VELOCITY
+from conformance.packs.table1.mutants.velocity import speeds
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("safety", "rest")
 
 _PUT = rest("PUT", VELOCITY)
 _PUTS = rest("PUT", VELOCITY, LINEAR)
-_DELETE = rest("DELETE", GOAL)
-_ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
+_PUT_GOAL, _DELETE = rest("PUT", GOAL), rest("DELETE", GOAL)
+# How often a robot that goes on sends itself the velocity again, s.
+_EVERY_S = 0.15
 _AXES = (("linear", "y"), ("linear", "z"), ("angular", "x"), ("angular", "y"))
 
 
-def moving(request: Request) -> bool:
-    """Return whether a request commands a velocity other than zero."""
-    value = parsed(request.body)
-    try:
-        return bool(value["linear"]["x"] or value["angular"]["z"])
-    except (TypeError, KeyError):
-        return False
+def _moving(request: Request) -> bool:
+    return any(speeds(request))
 
 
-@_mutant("safety-relentless", "watchdog", "The robot drives on for 10 s after a velocity command.")
-class _Relentless:
-    def __init__(self) -> None:
+def _again(request: Request, forward: Forward) -> None:
+    sent(request, forward, "PUT", VELOCITY, parsed(request.body))
+
+
+def _stopped(request: Request, forward: Forward) -> None:
+    drive(request, forward, 0.0)
+
+
+class _GoingOn:
+    """A change that sends a request of its own after a velocity command, unless another command has come by then.
+
+    ``act`` is called ``delay_s`` after the command, and then again for ``lasting_s``.
+    """
+
+    def __init__(self, act: Callable[[Request, Forward], None], delay_s: float, lasting_s: float = 0.0) -> None:
+        self._act, self._delay_s, self._lasting_s = act, delay_s, lasting_s
         self._turn = 0
 
     def __call__(self, request: Request, forward: Forward) -> Response:
         response = forward(request)
-        if (_PUT(request) or rest("PUT", GOAL)(request)) and success(response):
+        if (_PUT(request) or _PUT_GOAL(request)) and success(response):
             self._turn += 1
-            if _PUT(request) and moving(request):
-                later(0.15, self._renew, self._turn, request.copy(), forward)
+            if _moving(request):
+                self.begin(request, forward)
         return response
 
-    def _renew(self, turn: int, request: Request, forward: Forward) -> None:
-        until = time.monotonic() + 10
-        value = parsed(request.body)
-        while time.monotonic() < until and self._turn == turn:
-            sent(request, forward, "PUT", VELOCITY, value)
-            time.sleep(0.15)
+    def begin(self, request: Request, forward: Forward) -> None:
+        """Act later, and again and again, until the next command."""
+        later(self._delay_s, self._go_on, self._turn, request.copy(), forward)
 
-
-@_mutant("safety-long-winded", "hold-ends", "A velocity command holds 1.5 times as long as declared.")
-class _LongWinded:
-    def __init__(self) -> None:
-        self._turn = 0
-
-    def __call__(self, request: Request, forward: Forward) -> Response:
-        response = forward(request)
-        if (_PUT(request) or rest("PUT", GOAL)(request)) and success(response):
-            self._turn += 1
-            if moving(request):
-                later(0.55, self._renew, self._turn, request.copy(), forward)
-        return response
-
-    def _renew(self, turn: int, request: Request, forward: Forward) -> None:
-        if self._turn == turn:
-            sent(request, forward, "PUT", VELOCITY, parsed(request.body))
-
-
-@_mutant("safety-short-of-breath", "hold", "A velocity command holds for only 0.15 s.")
-class _ShortOfBreath:
-    def __init__(self) -> None:
-        self._turn = 0
-
-    def __call__(self, request: Request, forward: Forward) -> Response:
-        response = forward(request)
-        if _PUT(request) and success(response):
-            self._turn += 1
-            later(0.15, self._end, self._turn, request.copy(), forward)
-        return response
-
-    def _end(self, turn: int, request: Request, forward: Forward) -> None:
-        if self._turn == turn:
-            drive(request, forward, 0.0)
+    def _go_on(self, turn: int, request: Request, forward: Forward) -> None:
+        until = time.monotonic() + self._lasting_s
+        while self._turn == turn:
+            self._act(request, forward)
+            if time.monotonic() + _EVERY_S >= until:
+                return
+            time.sleep(_EVERY_S)
 
 
 @_mutant("safety-no-renewal", "renewal", "Sending the same velocity again does not renew it.")
@@ -95,7 +76,7 @@ class _Once:
         if not _PUT(request):
             return forward(request)
         value = parsed(request.body)
-        if value is not None and value == self._last and moving(request):
+        if value is not None and value == self._last and _moving(request):
             return plain(204)(request)
         response = forward(request)
         self._last = value if success(response) else self._last
@@ -146,30 +127,23 @@ def _too_fast(twist: Any) -> None:
 
 
 @_mutant("safety-no-stop", "stop", "PUT of a zero velocity returns a success, and the robot drives on for 3 s.")
-class _Stubborn:
+class _Stubborn(_GoingOn):
     def __init__(self) -> None:
-        self._last: Any = None
-        self._turn = 0
+        super().__init__(_again, 0.0, 3.0)
+        self._last: Request | None = None
 
     def __call__(self, request: Request, forward: Forward) -> Response:
         if not _PUT(request):
             return forward(request)
         self._turn += 1
-        if moving(request):
-            response = forward(request)
-            self._last = parsed(request.body) if success(response) else self._last
-            return response
         if self._last is None or not _zero(parsed(request.body)):
-            return forward(request)
-        last, self._last = self._last, None
-        later(0, self._go_on, self._turn, last, request.copy(), forward)
+            response = forward(request)
+            if _moving(request) and success(response):
+                self._last = request.copy()
+            return response
+        self.begin(self._last, forward)
+        self._last = None
         return plain(204)(request)
-
-    def _go_on(self, turn: int, last: Any, request: Request, forward: Forward) -> None:
-        until = time.monotonic() + 3
-        while time.monotonic() < until and self._turn == turn:
-            sent(request, forward, "PUT", VELOCITY, last)
-            time.sleep(0.15)
 
 
 def _zero(value: Any) -> bool:
@@ -185,6 +159,15 @@ def _torn(side: str, _octets: bytes, forward: Forward) -> None:
         drive(Request("rest", "PUT", VELOCITY), forward, 0.2)
 
 
+_mutant("safety-relentless", "watchdog", "The robot drives on for 10 s after a velocity command.").made(
+    lambda: _GoingOn(_again, 0.15, 10.0)
+)
+_mutant("safety-long-winded", "hold-ends", "A velocity command holds 1.5 times as long as declared.").made(
+    lambda: _GoingOn(_again, 0.55)
+)
+_mutant("safety-short-of-breath", "hold", "A velocity command holds for only 0.15 s.").made(
+    lambda: _GoingOn(_stopped, 0.15)
+)
 _mutant("safety-clamped", "limits-refused", "A velocity beyond the limits is clamped instead of refused.").rewritten(
     _PUTS, inputs(guarded(_clamped))
 )
@@ -197,7 +180,7 @@ _mutant("safety-too-fast", "limits-hold", "The robot drives at four times its sp
     rest("GET", VELOCITY), _too_fast
 )
 _mutant("safety-refused-stops", "refused-keeps", "A refused velocity command stops the robot.").made(
-    after_refusal(_PUTS, lambda request, forward: drive(request, forward, 0.0))
+    after_refusal(_PUTS, _stopped)
 )
 _mutant(
     "safety-torn-drives", "client-vanished", "An incomplete request moves the robot.", incomplete_request=lambda: _torn

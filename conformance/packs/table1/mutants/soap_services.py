@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable
 
-from conformance.mutation.changes import SOAP, Make, altered, instead, page, soap, success, text, wsdls
+from conformance.mutation.changes import SOAP, Make, altered, page, soap, success, text, wsdls
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import each, gone, tree
@@ -21,11 +21,6 @@ _ACT, _READ = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"), soap("Get[
 def _written(pattern: bytes) -> Callable[[Request], bool]:
     compiled = re.compile(pattern)
     return lambda request: _ACT(request) and bool(compiled.search(request.body))
-
-
-def _refused(pattern: bytes, why: str) -> Make:
-    """Return a change that answers requests whose body matches the pattern with a Client fault."""
-    return instead(_written(pattern), fault("Client", why))
 
 
 def _lacking(operation: str, name: str) -> Make:
@@ -81,30 +76,34 @@ _acting("soap-response-namespace", "response-valid", "The response wrapper is in
 _acting("soap-response-soap12", "response-valid", "The response is a SOAP 1.2 envelope.").altered(
     _ACT, text(re.escape(SOAP), "http://www.w3.org/2003/05/soap-envelope")
 )
-_acting("soap-no-exponents", "range", "Doubles with an exponent return a fault.").made(
-    _refused(rb">\s*[+-]?[\d.]+[eE][+-]?\d+\s*<", "no number")
-)
-_acting("soap-no-types", "typed-values", "A value with xsi:type returns a fault.").made(
-    _refused(rb":type=", "an attribute")
-)
-_acting("soap-no-entities", "syntax", "A message with a predefined entity returns a fault.").made(
-    _refused(rb"&(?:amp|lt|gt|quot|apos);", "entities are dangerous")
-)
-_acting("soap-no-plus", "range", "Numbers with a plus sign return a fault.").made(
-    _refused(rb">\s*\+[\d.]", "plus sign")
-)
-_acting("soap-no-negatives", "range", "Negative doubles return a fault.").made(_refused(rb">\s*-[\d.]", "negative"))
-_acting("soap-no-white-space", "range", "White space around a number returns a fault.").made(
-    _refused(rb"<(?:\w+:)?(?:depot|source|destination)_[xy]>\s+[\d.+-]", "white space")
-)
-_acting("soap-wants-prefixes", "syntax", "A default namespace declaration returns a fault.").made(
-    _refused(rb"\sxmlns=[\"']http", "default namespace")
-)
-_acting("soap-one-prefix", "syntax", "An Envelope with a prefix other than soapenv returns a fault.").made(
-    _refused(rb"<(?!soapenv:)(?:[\w.-]+:)?Envelope", "no soapenv:Envelope")
-)
-_acting("soap-no-cdata", "syntax", "A CDATA section returns a fault.").made(_refused(rb"<!\[CDATA\[", "CDATA"))
-_acting("soap-no-comments", "syntax", "A comment returns a fault.").made(_refused(rb"<!--", "comment"))
+for _name, _requirement, _says, _pattern in (
+    ("soap-no-exponents", "range", "Doubles with an exponent return a fault.", rb">\s*[+-]?[\d.]+[eE][+-]?\d+\s*<"),
+    ("soap-no-types", "typed-values", "A value with xsi:type returns a fault.", rb":type="),
+    (
+        "soap-no-entities",
+        "syntax",
+        "A message with a predefined entity returns a fault.",
+        rb"&(?:amp|lt|gt|quot|apos);",
+    ),
+    ("soap-no-plus", "range", "Numbers with a plus sign return a fault.", rb">\s*\+[\d.]"),
+    ("soap-no-negatives", "range", "Negative doubles return a fault.", rb">\s*-[\d.]"),
+    (
+        "soap-no-white-space",
+        "range",
+        "White space around a number returns a fault.",
+        rb"<(?:\w+:)?(?:depot|source|destination)_[xy]>\s+[\d.+-]",
+    ),
+    ("soap-wants-prefixes", "syntax", "A default namespace declaration returns a fault.", rb"\sxmlns=[\"']http"),
+    (
+        "soap-one-prefix",
+        "syntax",
+        "An Envelope with a prefix other than soapenv returns a fault.",
+        rb"<(?!soapenv:)(?:[\w.-]+:)?Envelope",
+    ),
+    ("soap-no-cdata", "syntax", "A CDATA section returns a fault.", rb"<!\[CDATA\["),
+    ("soap-no-comments", "syntax", "A comment returns a fault.", rb"<!--"),
+):
+    _acting(_name, _requirement, _says).instead(_written(_pattern), fault("Client", _says))
 _acting(
     "soap-description-misleads",
     "interop",

@@ -31,11 +31,13 @@ _mutant = MUTANTS.of_class("rest-resources", "rest")
 _GET, _PUT = rest("GET", VELOCITY), rest("PUT", VELOCITY)
 _GET_LINEAR, _PUT_LINEAR = rest("GET", LINEAR), rest("PUT", LINEAR)
 _LIMITS = (0.7, 2.5)
+_SMALL = 0.05
 _STILL = {"linear": {"x": 0.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
 _CRAWL = {**_STILL, "linear": {"x": 0.123, "y": 0.0, "z": 0.0}}
 
 
-def _times(factor: float) -> Callable[[Any], None]:
+def times(factor: float) -> Callable[[Any], None]:
+    """Return an edit that multiplies the two components of a Twist that the robot can drive."""
     return each(field("linear.x", scaled(factor)), field("angular.z", scaled(factor)))
 
 
@@ -66,14 +68,23 @@ class _Commanded:
         return response
 
 
-@_mutant("velocity-locked-by-goal", "velocity-goal", "PUT of a velocity returns 423 while a goal is active.")
-class _WhileGoal:
-    def __call__(self, request: Request, forward: Forward) -> Response:
-        if _PUT(request):
-            goal = forward(request.copy(method="GET", target=GOAL, body=b""))
-            if goal.status == 200:
-                return problem(423, "linear.x: a goal is active")(request)
-        return forward(request)
+def speeds(request: Request) -> tuple[float, float]:
+    """Return how fast, m/s and rad/s, a request commands the robot to drive and turn; zeros where it commands none."""
+    twist: Any = parsed(request.body) if _PUT(request) else None
+    try:
+        return abs(twist["linear"]["x"]), abs(twist["angular"]["z"])
+    except (TypeError, KeyError):
+        return 0.0, 0.0
+
+
+def _while_goal(response: Callable[[Request], Response]) -> Make:
+    """Return a change that answers velocity commands itself while a goal is active."""
+
+    def change(request: Request, forward: Forward) -> Response:
+        active = _PUT(request) and forward(request.copy(method="GET", target=GOAL, body=b"")).status == 200
+        return response(request) if active else forward(request)
+
+    return lambda: change
 
 
 @_mutant("linear-stops-turning", "linear-keeps-angular", "PUT of a linear velocity stops the turning.")
@@ -95,13 +106,9 @@ def _whole_back(request: Request, forward: Forward) -> Response:
     return _whole(request, forward) if back else forward(request)
 
 
-@_mutant("linear-lost", "linear-put", "PUT of a linear velocity returns 204 without any effect.")
-def _stuck(request: Request, forward: Forward) -> Response:
-    if _PUT_LINEAR(request):
-        vector = parsed(request.body)
-        if isinstance(vector, dict) and vector.get("x"):
-            return plain(204)(request)
-    return forward(request)
+def _forwards_or_back(request: Request) -> bool:
+    vector = parsed(request.body) if _PUT_LINEAR(request) else None
+    return isinstance(vector, dict) and bool(vector.get("x"))
 
 
 @_mutant("linear-is-angular", "linear-agrees", "GET of the linear velocity returns the angular part.")
@@ -130,16 +137,19 @@ def _driven(edit: Callable[[Any], Any]) -> Make:
 
 def _beyond(share: float) -> Callable[[Request], bool]:
     """Return a condition for velocity commands between ``share`` of the limits and the limits."""
+    return lambda request: share < max(_shares(request)) <= 1
 
-    def where(request: Request) -> bool:
-        twist: Any = parsed(request.body) if _PUT(request) else None
-        try:
-            used = max(abs(twist["linear"]["x"]) / _LIMITS[0], abs(twist["angular"]["z"]) / _LIMITS[1])
-        except (TypeError, KeyError):
-            return False
-        return bool(share < used <= 1)
 
-    return where
+def _shares(request: Request) -> list[float]:
+    return [speed / limit for speed, limit in zip(speeds(request), _LIMITS, strict=True)]
+
+
+def _slow(request: Request) -> bool:
+    return any(0.0 < speed < _SMALL for speed in speeds(request))
+
+
+def _still_if_slow(component: float) -> float:
+    return 0.0 if abs(component) < _SMALL else component
 
 
 def _short_of(share: float) -> Callable[[Any], None]:
@@ -152,6 +162,23 @@ def _short_of(share: float) -> Callable[[Any], None]:
     return edit
 
 
+_mutant("velocity-locked-by-goal", "velocity-goal", "PUT of a velocity returns 423 while a goal is active.").made(
+    _while_goal(problem(423, "linear.x: a goal is active"))
+)
+_mutant(
+    "velocity-forgotten-for-goal",
+    "velocity-goal",
+    "While a goal is active, PUT of a velocity returns 204 without any effect.",
+).made(_while_goal(plain(204)))
+_mutant(
+    "velocity-one-at-once", "velocity-range", "Near both limits at once, the robot drives at half the linear velocity."
+).made(secretly(lambda request: min(_shares(request)) >= 0.7, inputs(field("linear.x", scaled(0.5)))))
+_mutant(
+    "velocity-deadband", "velocity-range", "The robot accepts velocities below 0.05 m/s or rad/s and stands still."
+).made(secretly(_slow, inputs(each(field("linear.x", _still_if_slow), field("angular.z", _still_if_slow)))))
+_mutant("linear-lost", "linear-put", "PUT of a linear velocity returns 204 without any effect.").instead(
+    _forwards_or_back, plain(204)
+)
 _mutant("velocity-without-angular", "velocity-type", "GET of the velocity has no angular part.").json(
     _GET, without("angular")
 )
@@ -163,7 +190,7 @@ _mutant("velocity-swapped", "velocity-converges", "GET of the velocity returns l
 )
 _mutant(
     "velocity-in-kilometres-per-hour", ("velocity-odometry", "velocity-converges"), "The measured velocity is in km/h."
-).json(_GET, _times(3.6))
+).json(_GET, times(3.6))
 _mutant(
     "velocity-stands-still", ("velocity-odometry", "velocity-converges"), "The measured velocity is always zero."
 ).json(_GET, lambda twist: twist.update(_STILL))
@@ -180,7 +207,7 @@ _mutant(
     "PUT of a velocity with an unacceptable Accept header returns 204 without any effect.",
 ).instead(unwanted(_PUT), plain(204))
 _mutant("velocity-halved", "velocity-converges", "The robot drives at half of the commanded velocity.").made(
-    _driven(_times(0.5))
+    _driven(times(0.5))
 )
 _mutant("velocity-reversed", "velocity-converges", "The robot turns in the opposite direction.").made(
     _driven(field("angular.z", operator.neg))
