@@ -133,7 +133,11 @@ class FrontDoor:
         return known
 
 
-@click.command(cls=_Rooms, context_settings={"help_option_names": ["-h", "--help"], "obj": FrontDoor()})
+# All commands inherit how help is asked for and that it shows the defaults.
+_SETTINGS = {"help_option_names": ["-h", "--help"], "show_default": True, "obj": FrontDoor()}
+
+
+@click.command(cls=_Rooms, context_settings=_SETTINGS)
 @click.version_option(package_name="roaas", prog_name="roaas")
 def main() -> None:
     """Conformance and load tests for robots that are web services."""

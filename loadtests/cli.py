@@ -122,7 +122,6 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
     "--arrivals",
     type=click.Choice(["constant", "poisson"]),
     default="constant",
-    show_default=True,
     help="Open model: how requests are spaced.",
 )
 @click.option("--duration", "duration_s", type=float, help=f"Seconds to measure (default {DEFAULT_DURATION_S:g}).")
@@ -130,46 +129,32 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
     "--warmup", "warmup_s", type=float, help=f"Seconds of load beforehand, not counted (default {DEFAULT_WARMUP_S:g})."
 )
 @click.option("--timeout", "timeout_s", type=float, help="Deadline of one request, in seconds.")
-@click.option("--seed", type=int, default=1, show_default=True, help="Seed of schedule, payloads and intervals.")
+@click.option("--seed", type=int, default=1, help="Seed of schedule, payloads and intervals.")
 @click.option(
     "--repeat",
     type=click.IntRange(1, 100),
     default=1,
-    show_default=True,
     help="Repeat the duel N times over new connections; from 4 on, the intervals show how runs differ.",
     metavar="N",
 )
 @click.option(
     "--restart-command", metavar="CMD", help="Restart the robot with this command before each repeat (no shell)."
 )
-@click.option("--processes", type=click.IntRange(0, 256), default=1, show_default=True, help="Workers on this machine.")
+@click.option("--processes", type=click.IntRange(0, 256), default=1, help="Workers on this machine.")
 @click.option(
     "--expect-workers", "expect", type=click.IntRange(0, 1000), default=0, help="Workers in total, on all machines."
 )
-@click.option("--master-host", default="127.0.0.1", show_default=True, help="Where the master listens for workers.")
+@click.option("--master-host", default="127.0.0.1", help="Where the master listens for workers.")
 @click.option("--master-port", type=click.IntRange(0, 65535), default=0, help="Its port; 0 picks a free one.")
 @click.option("--web-port", type=click.IntRange(1, 65535), help="Show Locust's web UI on this port.")
-@click.option("--web-host", default="127.0.0.1", show_default=True, help="Where the web UI and the metrics listen.")
+@click.option("--web-host", default="127.0.0.1", help="Where the web UI and the metrics listen.")
 @click.option("--metrics-port", type=click.IntRange(1, 65535), help="Serve the histograms to Prometheus on this port.")
 @click.option("--steps", is_flag=True, help="Then raise the rate in steps until the robot breaks down.")
 @click.option("--step-rates", callback=_RATES, metavar="R,R,…", help="The rates of these steps.")
 @click.option("--knee", is_flag=True, help="Find the highest rate of REST, SOAP and both together, by bisection.")
-@click.option(
-    "--knee-searches",
-    type=click.IntRange(1, 50),
-    default=KNEE_SEARCHES,
-    show_default=True,
-    help="How often to search for it.",
-)
+@click.option("--knee-searches", type=click.IntRange(1, 50), default=KNEE_SEARCHES, help="How often to search for it.")
 @click.option("--connections", callback=_COUNTS, metavar="N,N,…", help="Then keep this many connections busy.")
-@click.option(
-    "--step-duration",
-    "step_s",
-    type=float,
-    default=STEP_S,
-    show_default=True,
-    help="Seconds of each step, for each interface.",
-)
+@click.option("--step-duration", "step_s", type=float, default=STEP_S, help="Seconds of each step, for each interface.")
 @click.option("--end-to-end", is_flag=True, help="Also measure the time until the robot's application has a delivery.")
 @click.option("--ros-domain-id", type=click.IntRange(0, 232), help="The robot's ROS domain, for --end-to-end.")
 @click.option("--thresholds", type=_FILE, help="TOML file of [[threshold]] tables.")
@@ -180,14 +165,12 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
 @click.option("--against-subscribers-wsdl", metavar="URL|FILE", help="WSDL of its subscribers service.")
 @click.option("--against-publishers-endpoint", metavar="URL", help="Address of that service, when no WSDL says.")
 @click.option("--against-subscribers-endpoint", metavar="URL", help="Address of that service, when no WSDL says.")
-@click.option(
-    "--tolerance", callback=_SHARE, default="5%", show_default=True, help="How much slower than the other it may be."
-)
+@click.option("--tolerance", callback=_SHARE, default="5%", help="How much slower than the other it may be.")
 @click.option("--allow-motion", is_flag=True, help="The robot may drive: measure deliveries too.")
 @click.option("--save", metavar="NAME", help="Store the result as a baseline of this name.")
 @click.option("--baseline", metavar="NAME", help="Compare with the latest result stored under this name.")
-@click.option("--baselines", type=_FILE, metavar="DIR", default=FOLDER, show_default=True, help="Folder of baselines.")
-@click.option("--out", metavar="DIR", default=DEFAULT_OUT, show_default=True, help="Folder for the results.")
+@click.option("--baselines", type=_FILE, metavar="DIR", default=FOLDER, help="Folder of baselines.")
+@click.option("--out", metavar="DIR", default=DEFAULT_OUT, help="Folder for the results.")
 def load(statement: Path | None, **options: Any) -> CommandResult:
     """Measure how fast a robot responds, and compare SOAP with REST.
 

@@ -27,25 +27,19 @@ _NEEDED: Final = {
 }
 
 
-@click.command(cls=RosCommand)
+@click.command(cls=RosCommand, context_settings={"show_default": True})
 @click.option("--config", type=_FILE, help="TOML file of names, limits and deadlines.")
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
+@click.option("--host", default="127.0.0.1", help="Address to listen on.")
 @click.option("--insecure", is_flag=True, help="Let every client that reaches --host drive the robot without a token.")
-@click.option("--rest-port", type=_PORT, default=7003, show_default=True, help="0 takes a free one.")
-@click.option("--soap-port", type=_PORT, default=5555, show_default=True, help="0 takes a free one.")
+@click.option("--rest-port", type=_PORT, default=7003, help="0 takes a free one.")
+@click.option("--soap-port", type=_PORT, default=5555, help="0 takes a free one.")
 @click.option(
-    "--domain-id",
-    type=click.IntRange(0, _HIGHEST_DOMAIN_ID),
-    envvar="ROS_DOMAIN_ID",
-    default=0,
-    show_default=True,
-    help="ROS domain.",
+    "--domain-id", type=click.IntRange(0, _HIGHEST_DOMAIN_ID), envvar="ROS_DOMAIN_ID", default=0, help="ROS domain."
 )
 @click.option(
     "--time-scale",
     type=click.FloatRange(0, min_open=True),
     default=1.0,
-    show_default=True,
     help="How many times faster the simulated robot moves.",
 )
 @click.option(
@@ -53,7 +47,7 @@ _NEEDED: Final = {
     is_flag=True,
     help="Simulate imperfections: slow odometry with noise and drift, wheels that slip, commands that arrive late.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="With --realistic: which imperfections.")
+@click.option("--seed", type=int, default=0, help="With --realistic: which imperfections.")
 @click.option("--token-file", type=_FILE, help="Require a bearer token from this file; scopes limit its use.")
 @click.option("--tls-cert", type=_FILE, help="Serve HTTPS with this certificate or chain (PEM).")
 @click.option("--tls-key", type=_FILE, help="Private key of the certificate (PEM).")

@@ -33,7 +33,7 @@ _FILE = click.Path(exists=True, dir_okay=False)
 _OBJECTS = 20_000
 
 
-@click.command(cls=ResultCommand, context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(cls=ResultCommand)
 @click.argument("statement", required=False, type=click.Path(dir_okay=False, path_type=Path))
 @click.option("--init", is_flag=True, help="Write a commented STATEMENT from the robot's descriptions; test nothing.")
 @click.option("--rest", metavar="URL", help="Base URL of the REST interface.")
@@ -48,7 +48,6 @@ _OBJECTS = 20_000
     "pack",
     metavar="PACK",
     default=DEFAULT_PACK,
-    show_default=True,
     help="Contract pack to test against: its name or folder.",
 )
 @click.option(
@@ -59,21 +58,12 @@ _OBJECTS = 20_000
 @click.option(
     "--allow-motion", is_flag=True, help="Allow the suite to move the robot; most of the contract needs that."
 )
-@click.option(
-    "--effort", type=click.Choice(EFFORTS), default="standard", show_default=True, help="How many cases to test."
-)
-@click.option(
-    "--minutes",
-    type=click.FloatRange(min=1),
-    default=10.0,
-    show_default=True,
-    help="Approximate duration of --effort deep.",
-)
+@click.option("--effort", type=click.Choice(EFFORTS), default="standard", help="How many cases to test.")
+@click.option("--minutes", type=click.FloatRange(min=1), default=10.0, help="Approximate duration of --effort deep.")
 @click.option(
     "--seed",
     type=click.IntRange(min=0),
     default=0,
-    show_default=True,
     help="Seed of all random choices: the same seed gives the same cases.",
 )
 @click.option("--nonce", metavar="TEXT", help="Text chosen by the relying party; the seed is derived from it.")
@@ -90,11 +80,7 @@ _OBJECTS = 20_000
 )
 @click.option("--token-file", type=_FILE, help="File with the bearer token to send.")
 @click.option(
-    "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=Path("out"),
-    show_default=True,
-    help="Folder for the results.",
+    "--out", type=click.Path(file_okay=False, path_type=Path), default=Path("out"), help="Folder for the results."
 )
 @click.option("--plan", is_flag=True, help="Print the scenarios and checks in their order; send nothing.")
 @click.option("--fleet", type=_FILE, metavar="FILE", help="Test several robots, each in its own process (TOML).")

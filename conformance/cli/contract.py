@@ -17,12 +17,7 @@ from conformance.contract.pack import DEFAULT_PACK, Contract
 
 #: ``--contract``, as the parameter ``pack``.
 contract_option = click.option(
-    "--contract",
-    "pack",
-    metavar="PACK",
-    default=DEFAULT_PACK,
-    show_default=True,
-    help="The contract pack: its name, or its folder.",
+    "--contract", "pack", metavar="PACK", default=DEFAULT_PACK, help="The contract pack: its name, or its folder."
 )
 
 
@@ -38,7 +33,7 @@ def loaded(pack: str) -> Contract:
         raise click.UsageError(str(error)) from error
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group()
 def contract() -> None:
     """The contract that a conforming robot keeps."""
 

@@ -17,7 +17,7 @@ _TIMEOUT_S = 10.0
 _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
 
 
-@click.command(cls=ResultCommand, context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(cls=ResultCommand)
 @click.argument("result", type=click.Path(exists=True, path_type=Path))
 @click.argument("requirement", required=False)
 @click.option("--allow-motion", is_flag=True, help="Allow the recorded requests to move the robot.")

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _SHORT = 15
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command()
 @contract_option
 @click.option(
     "--faults", "patterns", multiple=True, metavar="PATTERN", help="Only mutants whose names match (repeatable)."
@@ -36,17 +36,17 @@ _SHORT = 15
     "--target",
     metavar="NAME",
     default="",
+    show_default=False,
     help="The good device behind the mutants, by its name in the pack.  [default: the pack's first; with --generated, "
     "the one that starts fastest]",
 )
-@click.option("--seeds", type=click.IntRange(min=0), default=20, show_default=True, help="Seeds for each good device.")
+@click.option("--seeds", type=click.IntRange(min=0), default=20, help="Seeds for each good device.")
 @click.option("--short", is_flag=True, help="A dozen mutants and one seed, in less than a minute.")
 @click.option("--controls-only", is_flag=True, help="Only the good devices (A/A controls), and no mutants.")
 @click.option(
     "--effort",
     type=click.Choice(["quick", "standard"]),
     default="quick",
-    show_default=True,
     help="Effort of the first run; a survivor is tested again at standard.",
 )
 @click.option(
@@ -57,23 +57,20 @@ _SHORT = 15
     default=True,
     help="Judge good devices behind TLS, a prefix, a token and the like, and behind and on web servers.",
 )
-@click.option("--parallel", type=click.IntRange(min=1), default=2, show_default=True, help="Runs at once.")
-@click.option(
-    "--domain-id", type=click.IntRange(0, 100), default=80, show_default=True, help="First ROS domain to use."
-)
+@click.option("--parallel", type=click.IntRange(min=1), default=2, help="Runs at once.")
+@click.option("--domain-id", type=click.IntRange(0, 100), default=80, help="First ROS domain to use.")
 @click.option(
     "--generated",
     type=click.IntRange(min=1),
     metavar="N",
     help="Judge N mutants made by rule from the pack's descriptions, in place of those made by hand.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the sample of generated mutants.")
+@click.option("--seed", type=int, default=0, help="Seed of the sample of generated mutants.")
 @click.option("--list", "listed", is_flag=True, help="List the mutants, and run nothing.")
 @click.option(
     "--out",
     type=click.Path(file_okay=False, path_type=Path),
     default=Path("out/selftest"),
-    show_default=True,
     help="Folder for selftest.json and the matrix.",
 )
 @click.pass_context

@@ -26,12 +26,12 @@ from reference_robot.simulation.runner import Simulation
 _NICENESS: Final = 5  # the web services run first: on a real robot they share no processor with the motors
 
 
-@click.command(cls=RosCommand)
+@click.command(cls=RosCommand, context_settings={"show_default": True})
 @click.option("--domain-id", type=click.IntRange(0, 101), help="ROS domain; ROS_DOMAIN_ID by default.")
-@click.option("--time-scale", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True)
+@click.option("--time-scale", type=click.FloatRange(0, min_open=True), default=1.0)
 @click.option("--names", "names_file", type=click.Path(path_type=Path), help="TOML file of topic and action names.")
 @click.option("--realistic", is_flag=True, help="Simulate slipping wheels, noise and delays; --seed selects the robot.")
-@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--seed", type=int, default=0)
 def main(
     domain_id: int | None,
     time_scale: float,

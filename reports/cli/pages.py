@@ -43,7 +43,6 @@ def report(directory: Path, formats: tuple[str, ...]) -> None:
     "--threshold",
     type=click.FloatRange(min=0.0),
     default=5.0,
-    show_default=True,
     metavar="PERCENT",
     help="How much a quantile must change to count. A result's own noise counts instead where it is greater.",
 )
