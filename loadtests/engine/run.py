@@ -15,6 +15,7 @@ import locust  # patches the standard library, which has to come before our modu
 
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult
+from conformance.packs.table1.ros_process import ProbeError
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Robot
 from loadtests.clients.wsdl import WsdlError, with_addresses
@@ -30,7 +31,6 @@ from loadtests.measuring.preflight import preflight
 from loadtests.measuring.restart import start_anew
 from loadtests.measuring.rising_load import RisingLoad
 from loadtests.measuring.robot_process import RobotProcess
-from loadtests.probe.client import ProbeError
 from loadtests.result.document import compose
 from loadtests.result.files import write
 from loadtests.result.outcome import Carried, Outcome, RunAborted

@@ -40,7 +40,7 @@ def test_the_probe_sees_each_message_bit_for_bit(domain_id):
     context, node, deliveries, velocities = publisher_pair(domain_id)
     probe = Probe(Ros(domain_id=domain_id))
     try:
-        probe.await_robot()
+        probe.await_ready()
         deliveries.publish(DeliveryRequestMsg(**_SENT._asdict()))
         twist = Twist()
         twist.linear.x, twist.angular.z = 0.1, -1 / 3
@@ -61,7 +61,7 @@ def test_the_probe_sees_each_message_bit_for_bit(domain_id):
 
 def test_a_domain_without_a_robot_is_told(domain_id):
     with pytest.raises(ProbeError, match="no ROS node is found"):
-        Probe(Ros(domain_id=domain_id)).await_robot()
+        Probe(Ros(domain_id=domain_id)).await_ready()
 
 
 def test_the_suite_loads_no_ros():

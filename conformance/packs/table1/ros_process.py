@@ -1,0 +1,131 @@
+"""A program of ours on the robot's ROS graph, in a process of its own, which is asked and answers in lines of JSON.
+
+So the suite and the load tests need no ROS themselves. Every wait has a deadline. In a process that gevent has patched,
+waiting blocks no other greenlet.
+"""
+
+import atexit
+import json
+import os
+import queue
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from typing import Any, Final
+
+# Importing rclpy and finding the robot on the graph takes seconds on a small machine, s.
+_START_S: Final = 30.0
+_ANSWER_S: Final = 5.0
+_END_S: Final = 3.0
+_LINES_KEPT: Final = 2000
+
+
+class ProbeError(Exception):
+    """The program cannot be used; the message says why."""
+
+
+class SilentError(ProbeError):
+    """The program says nothing in time."""
+
+
+class RosProcess:
+    """A started program; call await_ready() before anything else.
+
+    Args:
+        module: the program, as of ``python -m``.
+        options: its options, beside the domain.
+        domain_id: the robot's ROS domain.
+
+    Raises:
+        ProbeError: the process cannot be started.
+    """
+
+    def __init__(self, module: str, *options: str, domain_id: int | None) -> None:
+        # A robot that only looks on its own machine hears no multicast: without a word to it directly, the probe would
+        # wait seconds for its next announcement. Robots elsewhere are found as ever.
+        peers = ";".join(filter(None, [os.environ.get("ROS_STATIC_PEERS"), "127.0.0.1"]))
+        # Shared memory that killed processes left behind, or that a container does not share, swallows messages.
+        environment = {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"} | os.environ
+        environment |= {"ROS_DOMAIN_ID": str(domain_id), "ROS_STATIC_PEERS": peers}
+        try:
+            # In a session of its own: Ctrl-C is for its parent, which then ends it.
+            self._process = subprocess.Popen(  # noqa: S603 - our own program
+                [sys.executable, "-m", module, "--domain-id", str(domain_id), *options],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env=environment,
+                text=True,
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise ProbeError(f"it cannot be started: {error}") from error
+        self._lines: queue.Queue[str] = queue.Queue(_LINES_KEPT)
+        threading.Thread(target=self._listen, daemon=True, name="probe").start()
+        atexit.register(self.close)
+
+    def await_ready(self) -> None:
+        """Wait until the program has found the robot on the graph.
+
+        Raises:
+            ProbeError: ROS or the message package is missing, or nothing is there to be found.
+        """
+        try:
+            self.told(_START_S)
+        except ProbeError:
+            self.close()
+            raise
+
+    def ask(self, line: str) -> dict[str, Any]:
+        """Write a line, and return the answer.
+
+        Raises:
+            ProbeError: the program has ended, does not answer in time, or reports a problem.
+        """
+        try:
+            if self._process.stdin:
+                self._process.stdin.write(line + "\n")
+                self._process.stdin.flush()
+        except (OSError, ValueError) as error:
+            raise ProbeError(f"it has ended: {error}") from error
+        return self.told(_ANSWER_S)
+
+    def told(self, within_s: float) -> dict[str, Any]:
+        """Return what the program says next.
+
+        Raises:
+            SilentError: it says nothing in time.
+            ProbeError: it has ended, or reports a problem.
+        """
+        try:
+            line = self._lines.get(timeout=within_s)
+        except queue.Empty as error:
+            raise SilentError(f"it does not answer within {within_s:g} s") from error
+        try:
+            answer = json.loads(line)
+        except ValueError as error:
+            raise ProbeError(f"it has ended{f' and said {line.strip()!r}' if line else ''}") from error
+        if not isinstance(answer, dict) or "problem" in answer:
+            raise ProbeError(str(answer["problem"]) if isinstance(answer, dict) else "it answers nonsense")
+        return answer
+
+    def close(self) -> None:
+        """End the process."""
+        atexit.unregister(self.close)
+        with suppress(OSError, ValueError):
+            if self._process.stdin:
+                self._process.stdin.close()
+        try:
+            self._process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _listen(self) -> None:
+        if self._process.stdout:
+            for line in self._process.stdout:
+                with suppress(queue.Full):
+                    self._lines.put_nowait(line)
+        with suppress(queue.Full):
+            self._lines.put_nowait("")
