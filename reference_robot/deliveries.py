@@ -2,26 +2,22 @@
 
 import struct
 from operator import attrgetter
-from typing import Final, NamedTuple, Self
+from typing import Final, Self
 
 from mybot_delivery_app.msg import DeliveryRequestMsg
 from rclpy.serialization import deserialize_message
+
+from conformance.packs.table1.delivery import DeliveryFields
 
 # CDR (OMG DDS-RTPS 2.3, 10) of a DeliveryRequestMsg: encapsulation in little endian, int32, padding, six doubles.
 _CDR: Final = struct.Struct("<4si4x6d")
 _LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 
 
-class DeliveryRequest(NamedTuple):
-    """The fields of one DeliveryRequestMsg; coordinates are doubles in metres in the map frame."""
+class DeliveryRequest(DeliveryFields):
+    """The fields of one DeliveryRequestMsg, which packs and unpacks itself."""
 
-    message_code: int
-    depot_x: float
-    depot_y: float
-    destination_x: float
-    destination_y: float
-    source_x: float
-    source_y: float
+    __slots__ = ()
 
     def serialized(self) -> bytes:
         """Return the request as a serialized DeliveryRequestMsg (CDR, little endian).

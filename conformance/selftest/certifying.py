@@ -20,7 +20,6 @@ from conformance.engine.pytest_run import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.selftest.robots import Robot
 from conformance.statement.statement import Statement, empty_statement, load_statement
-from conformance.transport.exchange import Attempt
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 from conformance.verdict.run import Run
@@ -193,18 +192,7 @@ class _EnoughKnown(Judge):
         claimed = set(map(str, run.claims))
         self._enough = frozenset(id_ for id_ in enough if id_.split("/")[0] in claimed)
 
-    def check(
-        self,
-        requirement: str,
-        holds: bool,  # noqa: FBT001 - as Judge.check()
-        exchange: Attempt | None,
-        expected: str,
-        *,
-        found: str = "",
-        cause: str = "",
-        subject: str = "",
-    ) -> bool:
-        """Judge one case as Judge.check() does, and note whether the run already knows enough."""
-        if not holds and requirement in self._enough and not self._run.aborted:
+    def failed(self, requirement: str) -> None:
+        """Note whether the run already knows enough."""
+        if requirement in self._enough and not self._run.aborted:
             self._run.aborted = f"{requirement} has failed, which is enough to know"
-        return super().check(requirement, holds, exchange, expected, found=found, cause=cause, subject=subject)

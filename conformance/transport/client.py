@@ -106,6 +106,10 @@ class HttpClient:
         """Close all open connections."""
         self._connections.close()
 
+    def url(self, path: str) -> str:
+        """Return the URL of a path below the base URL, as requests have it."""
+        return f"{self.scheme}://{self.authority}{self.prefix}{path}"
+
     def send(
         self,
         method: str,
@@ -137,7 +141,7 @@ class HttpClient:
         if authorized and self.connection.token and not any(name.lower() == "authorization" for name, _ in fields):
             sent.append(("Authorization", f"Bearer {self.connection.token}"))
             shown += (("Authorization", "Bearer $ROAAS_TOKEN"),)
-        request = Request(method, f"{self.scheme}://{self.authority}{self.prefix}{path}", shown, body)
+        request = Request(method, self.url(path), shown, body)
         endpoint = request.endpoint
         if sum(time.monotonic() - at < _HANGS_WITHIN_S for at in self._hangs[endpoint]) >= _HANGS:
             hung = endpoint.replace(f"{self.scheme}://{self.authority}", "", 1)

@@ -47,8 +47,7 @@ class PartialRequest:
         octets = "\r\n".join(head).encode() + b"\r\n\r\n" + body
         if head_only is not None:
             octets = octets[:head_only]
-        url = f"{client.scheme}://{client.authority}{client.prefix}{path}"
-        self.request = Request(method, url, (), b"", f"{shown}\r\n\r\n".encode()[: len(octets)] + body)
+        self.request = Request(method, client.url(path), (), b"", f"{shown}\r\n\r\n".encode()[: len(octets)] + body)
         client.connection.take_slot(method)
         try:
             self._socket = socket.create_connection((client.host, client.port), client.connection.timeout_s)

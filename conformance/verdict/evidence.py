@@ -149,9 +149,13 @@ class Judge:
         evidence.cases += 1
         evidence.checks.add(self.check_name)
         if not holds:
+            self.failed(requirement)
             subject = subject or subject_of(exchange, self.check_name)
             self._found(evidence, requirement, exchange, expected, found, cause, subject)
         return holds
+
+    def failed(self, requirement: str) -> None:
+        """Do nothing; a judge that wants to know at once of a failed case overrides it."""
 
     def _found(
         self,

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Mapping
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from hypothesis import strategies as st
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.api.soap.forms import EXTREMES
-from conformance.packs.table1.delivery import COFFEE, COURIER, PATH_NAMES
+from conformance.packs.table1.delivery import COFFEE, COURIER, PATH_NAMES, DeliveryFields
 from conformance.packs.table1.robot.robot import DELIVERIES
 from conformance.transport.client import Headers
 from conformance.transport.exchange import Exchange
@@ -23,16 +23,10 @@ _KNOWN: Final = (*EXTREMES["double"], 76.02, 41.35, 60.633, 2.2250738585072009e-
 _ONLY_DIGITS: Final = 1e15
 
 
-class Delivery(NamedTuple):
-    """The values of one delivery (mybot_delivery_app/DeliveryRequestMsg); coordinates in metres."""
+class Delivery(DeliveryFields):
+    """The values of one delivery."""
 
-    message_code: int
-    depot_x: float
-    depot_y: float
-    destination_x: float
-    destination_y: float
-    source_x: float
-    source_y: float
+    __slots__ = ()
 
     @classmethod
     def of(cls, request: Mapping[str, Any]) -> Delivery:

@@ -12,7 +12,7 @@ from conformance.packs.table1.robot.message_shapes import TWIST, VECTOR3, read_a
 from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import Velocity, is_near
 from conformance.packs.table1.robot.windows import SEVERAL, middle, newest, shown, velocities
-from conformance.scenarios.rule import Case, NotTested, Outcome
+from conformance.scenarios.rule import Case, NotTested, Outcome, record
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
@@ -32,18 +32,7 @@ _WAY: Final = (f"{_RESOURCES}/pose-motion", f"{_RESOURCES}/pose-rotation")
 def judge_drive(judge: Judge, trace: Trace, limits: Limits, *, way: bool = False) -> None:
     """Judge a trace by all requirements on driving; ``way``: also whether the pose followed the velocity."""
     for requirement, outcome in every_outcome(trace, limits, way=way):
-        match outcome:
-            case Case():
-                judge.check(
-                    requirement,
-                    outcome.holds,
-                    outcome.exchange,
-                    outcome.expected,
-                    found=outcome.observed,
-                    cause=outcome.cause,
-                )
-            case NotTested():
-                judge.skip(requirement, outcome.reason)
+        record(judge, requirement, [outcome])
 
 
 def outcomes(requirement: str, trace: Trace, limits: Limits) -> Iterator[Outcome]:

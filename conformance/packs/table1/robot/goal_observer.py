@@ -34,9 +34,7 @@ class GoalObserver(Listener):
 
     def __init__(self, api: RestInterface) -> None:
         self._judge = api.run.judge
-        rest = api.client
-        # As HttpClient writes the URLs of its requests.
-        self._url = f"{rest.scheme}://{rest.authority}{rest.prefix}{GOAL_PATH}"
+        self._url = api.client.url(GOAL_PATH)
         # What was shown last before something was asked of the goal, and since then.
         self._before: Shown | None = None
         self._since: list[Shown] = []

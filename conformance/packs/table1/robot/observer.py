@@ -63,10 +63,7 @@ class Observer(Listener):
     def __init__(self, api: RestInterface, clock: Clock) -> None:
         self._api = api
         self._clock = clock
-        rest = api.client
-        # As HttpClient writes the URLs of its requests.
-        base = f"{rest.scheme}://{rest.authority}{rest.prefix}"
-        self._readings = {base + path: (path, *reading) for path, reading in _READINGS.items()}
+        self._readings = {api.client.url(path): (path, *reading) for path, reading in _READINGS.items()}
         self._last_stamp: tuple[int, int] | None = None
         self._last_received = 0.0
         # When the odometry had a stamp that it had not before, and what told a velocity although there was no odometry.

@@ -207,18 +207,29 @@ def _longest_unbroken(trace: Sequence[Odometry]) -> slice:
     return max((slice(one, two) for one, two in itertools.pairwise(ends)), key=lambda part: part.stop - part.start)
 
 
+def _agrees(
+    sums: Sequence[_Sums],
+    course: Callable[[_Sum], float],
+    part: Callable[[_Miss], float],
+    room: Callable[[_Sum], float],
+) -> bool:
+    """Return whether by one clock the median window or the whole course misses by no more than it may."""
+    return any(
+        min(one.middle_miss([course(each) for each in one.each], part), part(one.whole_miss)) <= room(one.each[-1])
+        for one in sums
+    )
+
+
 def _way(sums: Sequence[_Sums], noise: Noise) -> Case | None:
     if not sums:
         return None
-    misses = []
-    for one in sums:
-        whole = one.each[-1]
-        window = one.middle_miss([each.length for each in one.each], lambda miss: miss.way)
-        room = _SHARE * whole.length + _OFF + whole.off + _NOISES * noise.position_m
-        misses.append(min(window, one.whole_miss.way) - room)
+
+    def room(whole: _Sum) -> float:
+        return _SHARE * whole.length + _OFF + whole.off + _NOISES * noise.position_m
+
     (first, *_, last), whole = sums[0].trace, sums[0].each[-1]
     return Case(
-        any(miss <= 0 for miss in misses),
+        _agrees(sums, operator.attrgetter("length"), operator.attrgetter("way"), room),
         last.exchange,
         f"a displacement of ({whole.x:.3f}, {whole.y:.3f}) m, which is what the velocity adds up to",
         observed=f"the pose moved by ({last.pose.x - first.pose.x:.3f}, {last.pose.y - first.pose.y:.3f}) m",
@@ -229,15 +240,13 @@ def _way(sums: Sequence[_Sums], noise: Noise) -> Case | None:
 def _turn(sums: Sequence[_Sums], noise: Noise) -> Case | None:
     if not sums:
         return None
-    misses = []
-    for one in sums:
-        whole = one.each[-1]
-        window = one.middle_miss([each.turned for each in one.each], lambda miss: miss.turn)
-        room = _SHARE * whole.turned + _OFF_TURN + whole.off_turn + _NOISES * noise.heading_rad
-        misses.append(min(window, one.whole_miss.turn) - room)
+
+    def room(whole: _Sum) -> float:
+        return _SHARE * whole.turned + _OFF_TURN + whole.off_turn + _NOISES * noise.heading_rad
+
     whole = sums[0].each[-1]
     return Case(
-        any(miss <= 0 for miss in misses),
+        _agrees(sums, operator.attrgetter("turned"), operator.attrgetter("turn"), room),
         sums[0].trace[-1].exchange,
         f"a turn of {whole.turn:.3f} rad, which is what the angular velocity adds up to",
         observed=f"the heading turned by {whole.turn + whole.turn_error:.3f} rad",

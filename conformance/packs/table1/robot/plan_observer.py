@@ -32,9 +32,7 @@ class PlanObserver(Listener):
 
     def __init__(self, api: RestInterface) -> None:
         self._judge = api.run.judge
-        rest = api.client
-        # As HttpClient writes the URLs of its requests.
-        self._url = f"{rest.scheme}://{rest.authority}{rest.prefix}{PLAN}?"
+        self._url = api.client.url(f"{PLAN}?")
 
     def answered(self, exchange: Exchange) -> None:
         """Judge one exchange if it is a plan."""
