@@ -48,44 +48,38 @@ def _long(message: _Message, _age: float) -> None:
         orientation[axis] *= 1.004
 
 
-class _Late:
-    """What was read some time ago."""
+class _Late(Body):
+    """A body that reports readings of ``late_s`` ago."""
 
-    def __init__(self, late_s: float) -> None:
-        self._late_s = late_s
+    late_s = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
         self._read: deque[tuple[float, _Message]] = deque()
 
-    def of(self, message: _Message) -> _Message:
+    def _of_then(self, message: _Message) -> _Message:
         """Store the current message, and return the one of some time ago."""
         now = time.time()
         self._read.append((now, message))
-        while len(self._read) > 1 and self._read[1][0] < now - self._late_s:
+        while len(self._read) > 1 and self._read[1][0] < now - self.late_s:
             self._read.popleft()
         return self._read[0][1]
 
 
-class _LateOdometry(Body):
-    """A body that reports its pose of 0.7 s ago."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._late = _Late(0.7)
+class _LateOdometry(_Late):
+    late_s = 0.7
 
     def odometry(self) -> _Message:
         """Return the odometry of 0.7 s ago."""
-        return self._late.of(super().odometry())
+        return self._of_then(super().odometry())
 
 
-class _LateVelocity(Body):
-    """A body that reports its velocity of half a second ago."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._late = _Late(0.5)
+class _LateVelocity(_Late):
+    late_s = 0.5
 
     def velocity(self) -> _Message:
         """Return the velocity of half a second ago."""
-        return self._late.of(super().velocity())
+        return self._of_then(super().velocity())
 
 
 class _CommandedVelocity(Body):
