@@ -11,7 +11,7 @@ from conformance.documents.json_schema import Shape
 from conformance.documents.representation import from_element
 from conformance.packs.table1.robot.agreement import Slack, disagreement, stamp_of
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST
-from conformance.packs.table1.robot.robot import FARTHEST, POSE, VELOCITY, Robot
+from conformance.packs.table1.robot.robot import FARTHEST, GOAL_PATH, POSE, VELOCITY, Robot
 from conformance.packs.table1.robot.soap_services import ask, returned
 from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
@@ -31,7 +31,7 @@ class StateRead:
     """A state that was read over SOAP, and over REST before and after it.
 
     Attributes:
-        name: "pose" or "velocity".
+        name: "pose", "velocity" or "goal".
         exchange: request and response over SOAP.
         broken: what would not be right a moment later either; empty if nothing.
         differs: where SOAP's value is not between those of REST; empty if nowhere.
@@ -45,7 +45,8 @@ class StateRead:
     @property
     def cases(self) -> Iterator[Case]:
         """Yield the readings as judged cases."""
-        expected = f"what GET {STATES[self.name][0]} gives just before and after"
+        path = GOAL_PATH if self.name == "goal" else STATES[self.name][0]
+        expected = f"what GET {path} gives just before and after"
         for problem in (self.broken, self.differs) if self.broken else (self.differs,):
             cause = problem.split(" is ", maxsplit=1)[0].split("[", maxsplit=1)[0]
             yield Case(not problem, self.exchange, expected, problem, cause)
@@ -116,14 +117,20 @@ def compare(
         subscribers: its SOAP service.
         name: "pose" or "velocity".
         renew: called before each try to keep the state as it is.
-
-    Returns:
-        The last readings, and those before in which something is wrong for good.
     """
+
+    def tries() -> Iterator[StateRead | None]:
+        for apart_s in (0.0, robot.sample_s, robot.sample_s):
+            renew()
+            yield read_state(robot, subscribers, name, apart_s)
+
+    return agreed(tries())
+
+
+def agreed(tries: Iterable[StateRead | None]) -> list[StateRead]:
+    """Return the first try without a difference, or else the last one, and what is wrong for good in those before."""
     reads: list[StateRead] = []
-    for apart_s in (0.0, robot.sample_s, robot.sample_s):
-        renew()
-        read = read_state(robot, subscribers, name, apart_s)
+    for read in tries:
         reads = for_good(reads)
         reads += [] if read is None else [read]
         if read is None or not read.differs:

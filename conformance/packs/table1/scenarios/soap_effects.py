@@ -47,19 +47,6 @@ class Misunderstood:
     answers: tuple[tuple[Exchange, int | None], ...] = ()
 
 
-@dataclass(frozen=True)
-class GoalBySoap:
-    """What GetGoal shows while a goal is active that was PUT over REST.
-
-    Attributes:
-        exchange: the last GetGoal.
-        shown: the goal's id that it shows, or None.
-    """
-
-    exchange: Exchange
-    shown: str | None
-
-
 @scenario(needs={Need.PUBLISHERS, Need.MOTION}, leaves=Leaves.UNTOUCHED, stage=Stage.ACTING)
 def misunderstood(interfaces: Interfaces, effort: Effort) -> Misunderstood:
     """Send deliveries with a header block that no robot understands, and read the list of deliveries."""
@@ -84,8 +71,11 @@ def misunderstood(interfaces: Interfaces, effort: Effort) -> Misunderstood:
 
 # Without permission to move the robot, GetGoal is judged elsewhere, by whatever goal the robot has.
 @scenario(needs={Need.SUBSCRIBERS})
-def goal_by_soap(interfaces: Interfaces) -> tuple[GoalBySoap, ...]:
-    """PUT a goal over REST, and read it over SOAP; empty where that is not possible, or the goal has ended before."""
+def goal_by_soap(interfaces: Interfaces) -> tuple[tuple[Exchange, str | None], ...]:
+    """PUT a goal over REST; record the last GetGoal, and the id that it shows.
+
+    Empty where no goal could be PUT, or the goal has ended before it could be seen.
+    """
     service, api = interfaces.soap.subscribers, interfaces.rest
     if service is None or api is None or not api.run.allow_motion or Interface.REST in api.run.unreachable:
         return ()
@@ -97,13 +87,13 @@ def goal_by_soap(interfaces: Interfaces) -> tuple[GoalBySoap, ...]:
     body = goal_body(here._replace(yaw=here.yaw + _TURN), robot.statement.motion.frame, GOAL_ID)
     if put_goal(robot, body).response.status not in NEW:
         return ()
-    reads: list[GoalBySoap] = []
+    reads: list[tuple[Exchange, str | None]] = []
 
     def shows() -> bool:
         answer = call_valid(service, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
         first = answer.first if answer.accepted else None
         shown = content.text_at(first, "goal_id", "id") if first is not None else None
-        reads.append(GoalBySoap(answer.exchange, shown))
+        reads.append((answer.exchange, shown))
         return shown == GOAL_ID
 
     # A short goal may have ended before anybody could see it; then REST does not show it either.

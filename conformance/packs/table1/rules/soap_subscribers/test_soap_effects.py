@@ -2,14 +2,9 @@
 
 from collections.abc import Iterator
 
-from conformance.packs.table1.scenarios.soap_effects import (
-    GOAL_ID,
-    GoalBySoap,
-    Misunderstood,
-    goal_by_soap,
-    misunderstood,
-)
+from conformance.packs.table1.scenarios.soap_effects import GOAL_ID, Misunderstood, goal_by_soap, misunderstood
 from conformance.scenarios.rule import Case, Note, Outcome, rule
+from conformance.transport.exchange import Exchange
 
 
 @rule("soap-basic-profile/R1025", on=(misunderstood,))
@@ -30,11 +25,11 @@ def fault_ends_processing(trace: Misunderstood) -> Iterator[Outcome]:
 
 
 @rule("soap-subscribers/goal", on=(goal_by_soap,))
-def goal_is_shown(trace: tuple[GoalBySoap, ...]) -> Iterator[Outcome]:
+def goal_is_shown(trace: tuple[tuple[Exchange, str | None], ...]) -> Iterator[Outcome]:
     """Judge that GetGoal shows the active goal."""
-    for one in trace:
+    for exchange, shown in trace:
         expected = f"the active goal, with goal_id.id {GOAL_ID!r}"
-        yield Case(one.shown == GOAL_ID, one.exchange, expected, f"goal_id.id {one.shown!r}")
+        yield Case(shown == GOAL_ID, exchange, expected, f"goal_id.id {shown!r}")
 
 
 def _no_effect(trace: Misunderstood) -> Iterator[Case]:
