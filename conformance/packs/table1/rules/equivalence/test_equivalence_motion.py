@@ -1,6 +1,6 @@
 """Rules on pose, velocity and goal over REST and SOAP, while the robot moves and when it has come to rest."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from conformance.packs.table1.robot.state_over_soap import StateRead
 from conformance.packs.table1.scenarios.interfaces_in_motion import goals_over_soap, interfaces_in_motion
@@ -14,8 +14,7 @@ def _same(name: str, scenario: Scenario) -> Rule:
     def judge(trace: tuple[StateRead, ...]) -> Iterator[Outcome]:
         return (case for one in trace if one.name == name for case in one.cases)
 
-    made: Callable[[Callable[..., Iterator[Outcome]]], Rule] = rule(f"equivalence/{name}", on=(scenario,))
-    return made(judge)
+    return rule(f"equivalence/{name}", on=(scenario,))(judge)
 
 
 pose = _same("pose", interfaces_in_motion)

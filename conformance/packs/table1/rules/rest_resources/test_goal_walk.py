@@ -1,6 +1,6 @@
 """Rules on random sequences of goal requests: the goal that was sent last must be the active one."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from conformance.packs.table1.robot.goal_trace import GoalStep
 from conformance.packs.table1.scenarios.goal_walk import goal_walk
@@ -13,8 +13,7 @@ def _judged(kind: str) -> Rule:
     def judge(trace: tuple[GoalStep, ...]) -> Iterator[Outcome]:
         return (step.case for step in trace if step.kind == kind)
 
-    made: Callable[[Callable[..., Iterator[Outcome]]], Rule] = rule(f"rest-resources/{kind}", on=(goal_walk,))
-    return made(judge)
+    return rule(f"rest-resources/{kind}", on=(goal_walk,))(judge)
 
 
 goal_put = _judged("goal-put")
