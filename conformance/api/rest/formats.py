@@ -92,18 +92,13 @@ def judge_same_values(
     """
     found, exchange = disagreements(api, call, media_types, renew)
     if exchange.response.ok:
-        judge_disagreement(api, call, found[0] if found else None, exchange)
+        expect(api.run.judge, "rest-formats/same-values", found[0].exchange if found else exchange).that(
+            not found,
+            f"the same values in all formats of {call.operation.template}",
+            found[0].description if found else "",
+            cause=call.operation.id,
+        )
     return exchange
-
-
-def judge_disagreement(api: RestInterface, call: Call, found: Disagreement | None, exchange: Exchange) -> None:
-    """Record whether the formats of a resource agree."""
-    expect(api.run.judge, "rest-formats/same-values", found.exchange if found else exchange).that(
-        found is None,
-        f"the same values in all formats of {call.operation.template}",
-        found.description if found else "",
-        cause=call.operation.id,
-    )
 
 
 def _snapshot(exchange: Exchange, media_type: str, schema: Schema) -> dict[str, Any] | None:

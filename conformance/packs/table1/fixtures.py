@@ -14,6 +14,7 @@ from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.robot.standstill import Standstill
 from conformance.packs.table1.robot.stopping import bring_to_rest
 from conformance.packs.table1.statement import said_of
+from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.run import Run
 
@@ -66,11 +67,15 @@ def _looked_at(_standstills: list[Standstill]) -> Iterator[None]:
 
 @pytest.fixture
 def robot(request: pytest.FixtureRequest, api: RestInterface, standstill: Standstill) -> Robot:
-    """Return the robot; for a check that moves the robot, at rest."""
+    """Return the robot; for a scenario that moves the robot, at rest.
+
+    Raises:
+        NotPossibleError: the robot cannot be brought to rest.
+    """
     if not request.node.get_closest_marker("motion") or standstill.lasts:
         return Robot(api)
     standstill.watch()
     reason = bring_to_rest(api)
     if reason:
-        pytest.skip(reason)
+        raise NotPossibleError(reason)
     return Robot(api)

@@ -12,9 +12,8 @@ from conformance.packs.table1.robot.message_shapes import TWIST, VECTOR3, read_a
 from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import Velocity, is_near
 from conformance.packs.table1.robot.windows import SEVERAL, middle, newest, shown, velocities
-from conformance.scenarios.rule import Case, NotTested, Outcome, record
+from conformance.scenarios.rule import Case, NotTested, Outcome
 from conformance.transport.exchange import Exchange
-from conformance.verdict.evidence import Judge
 
 # What was measured for so long alike is steady: readings of two resources may be compared, s.
 _STEADY_S: Final = 0.3
@@ -27,12 +26,6 @@ _RESOURCES: Final = "rest-resources"
 _AGREEMENT: Final = (f"{_RESOURCES}/velocity-odometry", f"{_RESOURCES}/linear-agrees")
 _LIMITS_HOLD: Final = "safety/limits-hold"
 _WAY: Final = (f"{_RESOURCES}/pose-motion", f"{_RESOURCES}/pose-rotation")
-
-
-def judge_drive(judge: Judge, trace: Trace, limits: Limits, *, way: bool = False) -> None:
-    """Judge a trace by all requirements on driving; ``way``: also whether the pose followed the velocity."""
-    for requirement, outcome in every_outcome(trace, limits, way=way):
-        record(judge, requirement, [outcome])
 
 
 def outcomes(requirement: str, trace: Trace, limits: Limits) -> Iterator[Outcome]:

@@ -1,12 +1,27 @@
 """Records of goals that were sent and of what the robot then showed, as data that rules can judge without a robot."""
 
 from dataclasses import dataclass
-from typing import Any
+from http import HTTPStatus
+from typing import Any, Final
 
 from conformance.packs.table1.robot.drive_trace import Trace
 from conformance.packs.table1.robot.geometry import Pose
+from conformance.packs.table1.robot.goal import CANCELLED, NEW, REPEATED
 from conformance.packs.table1.robot.plan import Start
+from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
+
+# The statuses that conform, and what is expected, for each kind of step.
+_STEPS: Final[dict[str, tuple[frozenset[int], str]]] = {
+    "goal-none": (frozenset({HTTPStatus.NOT_FOUND}), "404 without an active goal"),
+    "goal-get": (frozenset({HTTPStatus.OK}), "the active goal, as it was put"),
+    "goal-put": (NEW, "201 or 202 for a new goal"),
+    "goal-preempt": (frozenset({HTTPStatus.OK}), "the goal that was put last"),
+    "goal-repeat": (REPEATED, "200, 202 or 204 for the active goal"),
+    "goal-conflict": (frozenset({HTTPStatus.CONFLICT}), "409 for another pose under this id"),
+    "goal-delete": (CANCELLED, "204 for DELETE, then 404 for GET"),
+    "goal-delete-none-success": (CANCELLED | {HTTPStatus.NOT_FOUND}, "404 or 204"),
+}
 
 
 @dataclass(frozen=True)
@@ -166,3 +181,28 @@ class RefusedGoals:
     unit: tuple[SpecialGoal, ...] = ()
     unknown_frames: tuple[SpecialGoal, ...] = ()
     far: tuple[FarGoal, ...] = ()
+
+
+@dataclass(frozen=True)
+class GoalStep:
+    """One request of a random walk through the lives of goals.
+
+    Attributes:
+        kind: what is done, as the name of the requirement on the response.
+        exchange: the request and its response.
+        differs: where a goal that the robot shows now differs from the one that it must show; empty if nowhere.
+        ended: whether the goal may have ended before the request.
+    """
+
+    kind: str
+    exchange: Exchange
+    differs: str = ""
+    ended: bool = False
+
+    @property
+    def case(self) -> Case:
+        """Return the step as a judged case."""
+        statuses, expected = _STEPS[self.kind]
+        status = self.exchange.response.status
+        holds = not self.differs and (status in statuses or (self.ended and status == HTTPStatus.NOT_FOUND))
+        return Case(holds, self.exchange, expected, self.differs)

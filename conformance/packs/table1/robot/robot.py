@@ -121,7 +121,6 @@ class Robot:
     def __init__(self, api: RestInterface, clock: Clock = WALL_CLOCK) -> None:
         self.rest, self.clock = api.client, clock
         self._contract = api.run.contract
-        self.judge = api.run.judge
         self.statement = said_of(api.run)
         self.limits = self.statement.limits
         # A ceiling on the rate of requests makes a robot as slow as one that answers slowly.

@@ -1,6 +1,7 @@
 """Compare a state read over SOAP with readings of the same state over REST before and after it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import msgspec
@@ -10,8 +11,9 @@ from conformance.documents.json_schema import Shape
 from conformance.documents.representation import from_element
 from conformance.packs.table1.robot.agreement import Slack, disagreement, stamp_of
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST
-from conformance.packs.table1.robot.robot import FARTHEST, POSE, VELOCITY, Robot
+from conformance.packs.table1.robot.robot import FARTHEST, GOAL_PATH, POSE, VELOCITY, Robot
 from conformance.packs.table1.robot.soap_services import ask, returned
+from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
 
 _SLACK: Final = Slack()
@@ -24,6 +26,32 @@ STATES: Final[dict[str, tuple[str, str, Shape]]] = {
 }
 
 
+@dataclass(frozen=True)
+class StateRead:
+    """A state that was read over SOAP, and over REST before and after it.
+
+    Attributes:
+        name: "pose", "velocity" or "goal".
+        exchange: request and response over SOAP.
+        broken: what would not be right a moment later either; empty if nothing.
+        differs: where SOAP's value is not between those of REST; empty if nowhere.
+    """
+
+    name: str
+    exchange: Exchange
+    broken: str
+    differs: str
+
+    @property
+    def cases(self) -> Iterator[Case]:
+        """Yield the readings as judged cases."""
+        path = GOAL_PATH if self.name == "goal" else STATES[self.name][0]
+        expected = f"what GET {path} gives just before and after"
+        for problem in (self.broken, self.differs) if self.broken else (self.differs,):
+            cause = problem.split(" is ", maxsplit=1)[0].split("[", maxsplit=1)[0]
+            yield Case(not problem, self.exchange, expected, problem, cause)
+
+
 def answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
     """Return the value that a SOAP response returns, and what is wrong where it returns none."""
     found, problem = returned(exchange)
@@ -32,8 +60,8 @@ def answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
     return from_element(found[0], shape.schema), ""
 
 
-def difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float) -> tuple[str | None, Exchange]:
-    """Read a state over REST, SOAP and REST, ``apart_s`` apart; return where SOAP's value is not between the others.
+def read_state(robot: Robot, subscribers: SoapService, name: str, apart_s: float) -> StateRead | None:
+    """Read a state over REST, SOAP and REST, ``apart_s`` apart.
 
     Return None where REST has no value; the observers have judged that.
     """
@@ -45,16 +73,14 @@ def difference(robot: Robot, subscribers: SoapService, name: str, apart_s: float
     robot.clock.sleep(apart_s)
     after, _ = robot.read(path, shape)
     if before is None or after is None:
-        return None, exchange
+        return None
     broken = ""
     if not problem:
         broken = shape.problem(between) or restamped(between, before, after) or contradiction(between, before, after)
-    if broken:  # which is not right a moment later either
-        judge_difference(robot, name, broken, exchange)
     problem = problem or disagreement(before, between, after, _slack(robot))
     if not problem and name == "pose" and not stamp_of(before) <= stamp_of(between) <= stamp_of(after):
         problem = f"stamp {stamp_of(between)}, which is not between {stamp_of(before)} and {stamp_of(after)}"
-    return problem, exchange
+    return StateRead(name, exchange, broken, problem)
 
 
 def restamped(message: Any, *others: Any) -> str:
@@ -81,8 +107,10 @@ def _slack(robot: Robot) -> Slack:
     return Slack(_SLACK.absolute + FARTHEST * max(msgspec.structs.astuple(noise)), _SLACK.relative)
 
 
-def compare(robot: Robot, subscribers: SoapService, name: str, renew: Callable[[], object] = lambda: None) -> None:
-    """Judge whether REST and SOAP show the same state; repeat where one may lag an odometry message behind the other.
+def compare(
+    robot: Robot, subscribers: SoapService, name: str, renew: Callable[[], object] = lambda: None
+) -> list[StateRead]:
+    """Read a state over both interfaces, again where one may lag an odometry message behind the other.
 
     Args:
         robot: the robot over REST.
@@ -90,24 +118,26 @@ def compare(robot: Robot, subscribers: SoapService, name: str, renew: Callable[[
         name: "pose" or "velocity".
         renew: called before each try to keep the state as it is.
     """
-    if f"equivalence/{name}" in robot.judge.refuted():
-        return  # it costs three tries each time
-    for apart_s in (0.0, robot.sample_s, robot.sample_s):
-        renew()
-        problem, exchange = difference(robot, subscribers, name, apart_s)
-        if not problem:
+
+    def tries() -> Iterator[StateRead | None]:
+        for apart_s in (0.0, robot.sample_s, robot.sample_s):
+            renew()
+            yield read_state(robot, subscribers, name, apart_s)
+
+    return agreed(tries())
+
+
+def agreed(tries: Iterable[StateRead | None]) -> list[StateRead]:
+    """Return the first try without a difference, or else the last one, and what is wrong for good in those before."""
+    reads: list[StateRead] = []
+    for read in tries:
+        reads = for_good(reads)
+        reads += [] if read is None else [read]
+        if read is None or not read.differs:
             break
-    if problem is not None:
-        judge_difference(robot, name, problem, exchange)
+    return reads
 
 
-def judge_difference(robot: Robot, name: str, problem: str, exchange: Exchange) -> None:
-    """Judge one comparison, or the result of several."""
-    robot.judge.check(
-        f"equivalence/{name}",
-        not problem,
-        exchange,
-        f"what GET {STATES[name][0]} gives just before and after",
-        found=problem,
-        cause=problem.split(" is ", maxsplit=1)[0].split("[", maxsplit=1)[0],
-    )
+def for_good(reads: Iterable[StateRead]) -> list[StateRead]:
+    """Return what would not be right a moment later either, of readings that are repeated."""
+    return [replace(one, differs="") for one in reads if one.broken]

@@ -67,7 +67,7 @@ class _Player:
         first["goal_id"]["stamp"] = {"sec": 56, "nanosec": 78}
         # A velocity from before a goal is not taken up again when the goal is cancelled.
         robot.put_velocity(slow_turn(robot))
-        put = self._put(first, there)
+        put = put_new(robot, first, there)
         self.life = replace(self.life, first=put)
         if put.exchange.response.status not in NEW or (put.differs and not put.ended):
             return
@@ -99,14 +99,6 @@ class _Player:
         for _ in range(_TIMES):
             none = NoGoal(await_none(self.robot), self.robot.delete_goal())
             self.life = replace(self.life, none=(*self.life.none, none))
-
-    def _put(self, body: dict[str, Any], pose: Pose) -> Put:
-        """PUT a new goal, and wait until the robot shows it."""
-        exchange = put_goal(self.robot, body)
-        if exchange.response.status not in NEW | REPEATED:
-            return Put(exchange, body, None, exchange, "", ended=False)
-        goal, problem, read = await_goal(self.robot, body)
-        return Put(exchange, body, goal, read, problem, ended=goal is None and arrived(self.robot, pose))
 
     def _put_beside(self, body: dict[str, Any], active: dict[str, Any]) -> tuple[Put, bool]:
         """PUT a goal under the active goal's id; return the record, and whether the robot now shows no goal."""
@@ -144,7 +136,7 @@ class _Player:
 
     def _displace(self, body: dict[str, Any], pose: Pose) -> None:
         """PUT another goal, without an id, while one is active."""
-        second = self._put(body, pose)
+        second = put_new(self.robot, body, pose)
         renamed = None
         if second.exchange.response.status not in NEW | REPEATED:
             # Is it the missing id that is refused, or another goal?
@@ -159,6 +151,15 @@ class _Player:
             return False
         self.life = replace(self.life, cancelled=(*self.life.cancelled, cancelled))
         return True
+
+
+def put_new(robot: Robot, body: dict[str, Any], pose: Pose) -> Put:
+    """PUT a new goal, and wait until the robot shows it."""
+    exchange = put_goal(robot, body)
+    if exchange.response.status not in NEW | REPEATED:
+        return Put(exchange, body, None, exchange, "", ended=False)
+    goal, problem, read = await_goal(robot, body)
+    return Put(exchange, body, goal, read, problem, ended=goal is None and arrived(robot, pose))
 
 
 def cancel(robot: Robot) -> Cancelled:

@@ -2,7 +2,8 @@
 
 import pytest
 
-from conformance.packs.table1.robot.state_over_soap import contradiction, restamped
+from conformance.packs.table1.robot.state_over_soap import StateRead, agreed, contradiction, restamped
+from conformance.transport.exchange import Exchange, Request, Response
 
 
 def stamped(sec, nanosec):
@@ -29,3 +30,14 @@ def test_a_sample_that_rest_tells_alike_is_no_other_over_soap():
     # A pose of the moment under a stamp that is coarse, and another sample.
     assert not contradiction(second, first, second)
     assert not contradiction({**second, **stamped(5, 200)}, first, first)
+
+
+def test_of_several_tries_the_last_counts_and_what_is_wrong_for_good_in_those_before():
+    exchange = Exchange(Request("POST", "http://robot/"), Response(200, (), b"", 1.0))
+    lags, wrong, same = (
+        StateRead("pose", exchange, *texts) for texts in (("", "x is 1"), ("no x", "x is 1"), ("", ""))
+    )
+    assert agreed([lags, same, lags]) == [same]
+    assert agreed([lags, lags]) == [lags]
+    assert agreed([lags, None, lags]) == []
+    assert [[case.holds for case in one.cases] for one in agreed([wrong, same])] == [[False, True], [True]]

@@ -1,9 +1,13 @@
-"""Rules on goals that have to be refused, by traces made by hand."""
+"""Rules on goals, by traces made by hand."""
 
 import pytest
 
-from conformance.packs.table1.robot.goal_trace import FarGoal, RefusedGoals, SpecialGoal
+from conformance.packs.table1.robot.goal_trace import FarGoal, GoalStep, Put, RefusedGoals, SpecialGoal
+from conformance.packs.table1.rules.rest_resources import test_goal_ids as ids
 from conformance.packs.table1.rules.rest_resources import test_goal_refused as rules
+from conformance.packs.table1.rules.rest_resources import test_goal_walk as walk
+from conformance.packs.table1.rules.strict_input import test_refused_state as refused
+from conformance.packs.table1.scenarios.invalid_goals import InvalidGoal
 from conformance.transport.exchange import Exchange, Request, Response
 
 
@@ -38,3 +42,45 @@ def test_a_goal_outside_every_map_is_refused_or_ends(status, read, holds, observ
     far = FarGoal(_exchange(status), None if read is None else _exchange(read), 10.0)
     (case,) = rules.goal_unreachable.outcomes(RefusedGoals(far=(far,)), {}.__getitem__)
     assert (case.holds, case.observed) == (holds, observed)
+
+
+@pytest.mark.parametrize(
+    ("kind", "status", "differs", "ended", "holds"),
+    [
+        ("goal-put", 202, "", False, True),
+        ("goal-put", 200, "", False, False),
+        ("goal-conflict", 409, "", False, True),
+        ("goal-conflict", 204, "", False, False),
+        ("goal-get", 200, "position.x 1 for 2", False, False),
+        ("goal-delete", 204, "", False, True),
+        ("goal-delete", 204, "status 200", False, False),
+        ("goal-delete", 404, "", False, False),
+        ("goal-delete", 404, "", True, True),
+        ("goal-delete-none-success", 404, "", False, True),
+    ],
+)
+def test_a_step_of_a_walk_is_judged_by_the_rule_of_its_kind(kind, status, differs, ended, holds):
+    trace = (GoalStep(kind, _exchange(status), differs, ended),)
+    assert _holds(getattr(walk, kind.replace("-", "_")), trace) == [holds]
+    assert not _holds(walk.goal_none, trace)
+
+
+def test_a_goal_is_accepted_and_shown_under_its_id_unless_it_has_ended():
+    def put(status, differs="", *, ended=False):
+        return Put(_exchange(status), {"goal_id": {"id": "a"}}, None, _exchange(200), differs, ended)
+
+    assert _holds(ids.goal_id, (put(201), put(400), put(202, "goal_id.id b for a"))) == [True, False, True, True, False]
+    assert _holds(ids.goal_preempt, (put(201, "status 404", ended=True), put(422), put(201))) == [True]
+
+
+@pytest.mark.parametrize(
+    ("during", "differs", "expected"),
+    [
+        (False, "this goal as the active one", "no goal after PUT of one with an empty id"),
+        (True, "", "the goal that was active before PUT of one with an empty id"),
+    ],
+)
+def test_an_invalid_goal_changes_nothing(during, differs, expected):
+    trace = (InvalidGoal("an empty id", during, _exchange(400), differs),)
+    (case,) = refused.goal_refused.outcomes(trace, {}.__getitem__)
+    assert (case.holds, case.expected) == (not differs, expected)

@@ -6,13 +6,10 @@ import pytest
 
 from conformance.api.soap.service import SoapService
 from conformance.documents.json_schema import Shape
-from conformance.documents.representation import from_element, projected
-from conformance.observe.polling import poll
+from conformance.documents.representation import from_element
 from conformance.packs.table1.robot.agreement import Slack, disagreement, entries_of, unstamped
 from conformance.packs.table1.robot.geometry import Pose, pose_of
-from conformance.packs.table1.robot.goal import await_goal, await_none, goal_body, put_goal
-from conformance.packs.table1.robot.goals import choose_goals
-from conformance.packs.table1.robot.message_shapes import GET_PLAN, GOAL_AND_STATUS, ODOMETRY, TWIST
+from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, TWIST
 from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.packs.table1.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.packs.table1.robot.plan import plan_of, query, reachable
@@ -20,17 +17,14 @@ from conformance.packs.table1.robot.robot import POSE, SENSORS, SERVICES, Robot,
 from conformance.packs.table1.robot.single_readings import BesideOdometry
 from conformance.packs.table1.robot.soap_services import ask, returned
 from conformance.packs.table1.robot.state_over_soap import STATES, answered, compare
-from conformance.transport.exchange import Exchange
+from conformance.scenarios.rule import record
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest", "subscribers")
-_SLACK: Final = Slack()
 _SAME: Final = Slack(0.0, 0.0)
 # More than any tolerance that is asked for here, m.
 _END_OFF: Final = 0.3
-# Goals that displaced another one, of which each has to be out in the first answer after it.
-_GOALS: Final = 3
 # At standard effort: of a state that is out once in sixty answers, one pose is compared, and two velocities, for which
 # at most so many times as many are read.
 _POSES: Final = 200
@@ -42,11 +36,13 @@ _AHEAD: Final = 0.3
 
 @pytest.mark.phase("resting")
 @pytest.mark.requirement("equivalence/pose", "equivalence/velocity")
-def test_pose_and_velocity(robot: Robot, subscribers: SoapService, effort: Effort) -> None:
+def test_pose_and_velocity(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """Compare pose and velocity over REST and SOAP, whatever the robot is doing."""
     for turn in range(effort.cases(_POSES)):
         for name in STATES if turn < effort.cases(50) else ("pose",):
-            compare(robot, subscribers, name)
+            if f"equivalence/{name}" not in judge.refuted():  # it costs three tries each time
+                outcomes = (case for read in compare(robot, subscribers, name) for case in read.cases)
+                record(judge, f"equivalence/{name}", outcomes)
 
 
 @pytest.mark.phase("resting")
@@ -149,65 +145,3 @@ def _compare_plans(
         found=problem,
         cause=problem.split(" is ")[0].split("[")[0],
     )
-
-
-@pytest.mark.phase("motion")
-@pytest.mark.motion
-@pytest.mark.requirement("equivalence/goal")
-def test_goal(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
-    """Compare the active goal, or its absence, over REST and SOAP, including the first response after a change."""
-    _compare_goals(robot, subscribers, judge)
-    goals = choose_goals(robot, 1.5, 2)
-    late: list[tuple[str, Exchange]] = []
-    for index in range(effort.cases(10)):
-        body = goal_body(goals[index % 2], robot.statement.motion.frame, f"equal \u00e9 <&> {index}")
-        put_goal(robot, body)
-        await_goal(robot, body)
-        if len(late) == index - 1:
-            # Where SOAP's first answer was out each time so far, it gets the time that commands may take.
-            robot.clock.sleep(robot.settle_s if late else 0.0)
-            problem, exchange = _goal_difference(robot, subscribers)
-            late += [(problem, exchange)] if problem else []
-        for _ in range(3):
-            _compare_goals(robot, subscribers, judge)
-    if len(late) >= _GOALS:
-        judge.check(
-            "equivalence/goal", False, late[-1][1], "the goal that REST gives", found=late[-1][0], cause="first answer"
-        )
-    robot.delete_goal()
-    await_none(robot)
-    _compare_goals(robot, subscribers, judge)
-
-
-def _compare_goals(robot: Robot, subscribers: SoapService, judge: Judge) -> None:
-    """Compare the goals over both interfaces, allowing one to learn of a change after the other."""
-    patience = robot.patience(robot.settle_s)
-    for _ in poll(robot.clock, 0.05, lambda: patience.over):
-        problem, exchange = _goal_difference(robot, subscribers)
-        if not problem:
-            break
-    if problem is not None:
-        judge.check(
-            "equivalence/goal", not problem, exchange, "the goal that REST gives", found=problem, cause=problem[:20]
-        )
-
-
-def _goal_difference(robot: Robot, subscribers: SoapService) -> tuple[str | None, Exchange]:
-    """Return where SOAP's goal differs from REST's; None where REST's changed in the meantime."""
-    before, first = robot.goal()
-    exchange = ask(subscribers, "GetGoal")
-    found, problem = returned(exchange)
-    after, last = robot.goal()
-    statuses = {one.response.status for one in (first, last) if one.response}
-    if before is not None and after is not None and before["goal_id"]["id"] == after["goal_id"]["id"]:
-        between = from_element(found[0], GOAL_AND_STATUS.schema) if found else None
-        broken = "" if between is None else GOAL_AND_STATUS.problem(between)
-        if broken:  # which is not right a moment later either
-            robot.judge.check("equivalence/goal", False, exchange, "a complete goal, as REST gives it", found=broken)
-        shown = [projected(goal, GOAL_AND_STATUS.schema) for goal in (before, after)]
-        problem = problem or ("no goal" if between is None else disagreement(shown[0], between, shown[1], _SLACK))
-        return problem, exchange
-    if statuses == {404}:
-        # No goal: an empty response, or a fault.
-        return "a goal, where REST says that there is none" if found else "", exchange
-    return None, exchange

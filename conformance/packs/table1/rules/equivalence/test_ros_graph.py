@@ -1,5 +1,6 @@
-"""Checks that compare the interfaces with the robot's ROS graph."""
+"""Checks and rules that compare the interfaces with the robot's ROS graph."""
 
+from collections.abc import Iterator
 from typing import Final
 
 import pytest
@@ -7,9 +8,12 @@ import pytest
 from conformance.observe.polling import poll_for
 from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.packs.table1.robot.probe.client import Probe, ProbeError, RosProbe
-from conformance.packs.table1.robot.robot import SENSORS, STILL, Robot, Velocity
-from conformance.verdict.effort import Effort
+from conformance.packs.table1.robot.robot import SENSORS, Robot
+from conformance.packs.table1.scenarios.velocities_on_ros import OnRos, velocities_on_ros
+from conformance.packs.table1.statement import said_of
+from conformance.scenarios.rule import Case, Outcome, rule
 from conformance.verdict.evidence import Judge
+from conformance.verdict.run import Run
 
 pytestmark = pytest.mark.needs("rest")
 # Types that only sensors publish, and what is made of their messages (a scan that was filtered): which of several
@@ -17,7 +21,6 @@ pytestmark = pytest.mark.needs("rest")
 _SENSOR_TYPES: Final = frozenset(
     f"sensor_msgs/msg/{name}" for name in ("LaserScan", "Imu", "Image", "PointCloud2", "Range", "NavSatFix")
 )
-_ARRIVES_S: Final = 2.0
 # A probe learns of a publisher some time after it has joined, on a busy machine seconds.
 _DISCOVERED_S: Final = 10.0
 
@@ -61,44 +64,14 @@ def test_sensors_are_on_the_graph(robot: Robot, seeing: Probe, judge: Judge) -> 
         )
 
 
-@pytest.mark.phase("motion")
-@pytest.mark.motion
-@pytest.mark.requirement("equivalence/velocity-message")
-def test_velocity_is_published(robot: Robot, seeing: Probe, judge: Judge, effort: Effort) -> None:
-    """Check that an accepted velocity is published on the velocity topic; the robot may smooth it."""
-    try:
-        seeing.velocities()
-        lost = 0
-        for index in range(effort.cases(12)):
-            share = (-1) ** index / (3 + index)
-            lost += not _judge_one(robot, seeing, judge, robot.share_of_limits(share, -share))
-            if lost > 1:
-                break
-        robot.put_velocity(STILL)
-    except ProbeError as error:
-        pytest.skip(str(error))
-
-
-def _judge_one(robot: Robot, seeing: Probe, judge: Judge, wanted: Velocity) -> bool:
-    exchange = robot.put_velocity(wanted)
-    if not exchange.response.ok:
-        return True
-    every_s = 0.4 * (robot.limits.hold_s or _ARRIVES_S)
-    renew_at = robot.clock.now() + every_s
-    seen: list[Velocity] = []
-    for _ in poll_for(robot.clock, 0.005, max(_ARRIVES_S, robot.settle_s)):
-        seen += seeing.velocities()
-        if any(robot.near(one, wanted) for one in seen):
-            break
-        # What is smoothed on its way may end before it has come all the way.
-        if robot.clock.now() > renew_at:
-            robot.put_velocity(wanted)
-            renew_at = robot.clock.now() + every_s
-    return judge.check(
-        "equivalence/velocity-message",
-        any(robot.near(one, wanted) for one in seen),
-        exchange,
-        f"a message with {wanted}, within the tolerance",
-        found=f"{len(seen)} messages, last {seen[-1]}" if seen else "no message",
-        cause="another message" if seen else "no message",
-    )
+@rule("equivalence/velocity-message", on=(velocities_on_ros,))
+def velocity_message(trace: tuple[OnRos, ...], run: Run) -> Iterator[Outcome]:
+    """Judge that an accepted velocity is published on the velocity topic; the robot may smooth it."""
+    for one in trace:
+        yield Case(
+            one.arrived(said_of(run).limits),
+            one.exchange,
+            f"a message with {one.wanted}, within the tolerance",
+            f"{len(one.seen)} messages, last {one.seen[-1]}" if one.seen else "no message",
+            "another message" if one.seen else "no message",
+        )

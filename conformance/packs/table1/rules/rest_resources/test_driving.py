@@ -1,6 +1,6 @@
 """Rules on drives: the robot accepts and reaches velocities, and its pose follows them."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from conformance.packs.table1.robot.drive_rules import outcomes
 from conformance.packs.table1.scenarios.straight import straight
@@ -20,8 +20,7 @@ def _shown(name: str, *scenarios: Scenario) -> Rule:
     def judge(trace: Driven, run: Run) -> Iterator[Outcome]:
         return outcomes(requirement, trace.drive, said_of(run).limits)
 
-    made: Callable[[Callable[..., Iterator[Outcome]]], Rule] = rule(requirement, on=scenarios)
-    return made(judge)
+    return rule(requirement, on=scenarios)(judge)
 
 
 velocity_put = _shown("velocity-put", straight, velocity_walk)

@@ -1,32 +1,26 @@
-"""Random sequences of goal requests."""
+"""Rules on random sequences of goal requests: the goal that was sent last must be the active one."""
 
-import pytest
+from collections.abc import Iterator
 
-from conformance.packs.table1.robot.goal_walk import GoalMachine
-from conformance.packs.table1.robot.goals import choose_goals
-from conformance.packs.table1.robot.robot import Robot
-from conformance.packs.table1.robot.walk import Walk
-from conformance.verdict.effort import Effort
-from conformance.verdict.explorer import Explorer
-
-pytestmark = [pytest.mark.phase("motion"), pytest.mark.needs("rest"), pytest.mark.motion]
+from conformance.packs.table1.robot.goal_trace import GoalStep
+from conformance.packs.table1.scenarios.goal_walk import goal_walk
+from conformance.scenarios.rule import Outcome, Rule, rule
 
 
-@pytest.mark.requirement(
-    "rest-resources/goal-put",
-    "rest-resources/goal-get",
-    "rest-resources/goal-none",
-    "rest-resources/goal-repeat",
-    "rest-resources/goal-conflict",
-    "rest-resources/goal-preempt",
-    "rest-resources/goal-delete",
-    "rest-resources/goal-delete-none-success",
-)
-def test_goal_walk(robot: Robot, effort: Effort, explore: Explorer) -> None:
-    """Run the goal state machine: after every sequence of requests the goal sent last must be the active one."""
-    walk = Walk(robot, 0.4 * effort.budget_s)
-    poses = choose_goals(walk.robot, 1.5, 2)
-    explore.machine(lambda: GoalMachine(walk, poses), cases=20, steps=effort.cases(12))
-    explore.left_out(walk.left_out)
-    if walk.unreachable:
-        raise walk.unreachable
+def _judged(kind: str) -> Rule:
+    """Return a rule that judges one requirement by the steps of its kind."""
+
+    def judge(trace: tuple[GoalStep, ...]) -> Iterator[Outcome]:
+        return (step.case for step in trace if step.kind == kind)
+
+    return rule(f"rest-resources/{kind}", on=(goal_walk,))(judge)
+
+
+goal_put = _judged("goal-put")
+goal_get = _judged("goal-get")
+goal_none = _judged("goal-none")
+goal_repeat = _judged("goal-repeat")
+goal_conflict = _judged("goal-conflict")
+goal_preempt = _judged("goal-preempt")
+goal_delete = _judged("goal-delete")
+goal_delete_none_success = _judged("goal-delete-none-success")

@@ -2,8 +2,10 @@
 
 import pytest
 
-from conformance.packs.table1.robot.driving import driving
+from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.drive_rules import outcomes
 from conformance.packs.table1.robot.robot import POSE, Robot
+from conformance.scenarios.rule import record
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
@@ -78,10 +80,12 @@ def test_single_readings(robot: Robot, judge: Judge, effort: Effort) -> None:
     "rest-resources/linear-type",
     "rest-resources/linear-agrees",
 )
-def test_velocity_and_odometry(robot: Robot, effort: Effort) -> None:
-    """Read velocity, linear velocity and odometry; observer and drive judge whether they agree."""
+def test_velocity_and_odometry(robot: Robot, judge: Judge, effort: Effort) -> None:
+    """Read velocity, linear velocity and odometry: they must agree; the observer judges each response."""
     # Two readings agree where the odometry has been steady for a while: so look for that long at least.
-    with driving(robot) as drive:
-        drive.keep(0.4 * robot.watchfulness)
-        while len(drive.trace.turns) < effort.cases(60):
-            drive.look()
+    drive = Drive(robot)
+    drive.keep(0.4 * robot.watchfulness)
+    while len(drive.trace.turns) < effort.cases(60):
+        drive.look()
+    for id_ in (_BESIDE, "rest-resources/linear-agrees"):
+        record(judge, id_, outcomes(id_, drive.whole, robot.limits))

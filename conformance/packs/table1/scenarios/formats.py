@@ -1,0 +1,181 @@
+"""One state in XML, text and JSON: in motion, at rest elsewhere, for several goals and for several plans.
+
+At rest at the start most values are zero. A format that serves old values shows them first after a change; so the first
+reading after each change counts, and a fault must show after each of several changes. One difference may be an odometry
+sample that came between two reads.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+from conformance.api.rest.applicable import reads
+from conformance.api.rest.calls import JSON, Call
+from conformance.api.rest.formats import Disagreement, Found, disagreements, one_turn
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.validity import require_valid
+from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.goal import await_goal, await_none, goal_body, put_goal
+from conformance.packs.table1.robot.goals import choose_goals, make_room
+from conformance.packs.table1.robot.plan import reachable
+from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, PLAN, POSE, STILL, VELOCITY, Robot, Velocity
+from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.transport.exchange import Exchange
+from conformance.verdict.effort import Effort
+
+# First readings that are out after so many changes of one kind are no chance.
+_CHANGES: Final = 3
+#: An id that YAML takes for a number where it is not quoted.
+DIGITS: Final = "123"
+# Over a slow link, or a robot that arrives soon, a goal may be over when it is read.
+_TRIES: Final = 3
+
+
+@dataclass(frozen=True)
+class FormatsRead:
+    """A resource in all of its formats.
+
+    Attributes:
+        template, operation: path template and operation id of the resource.
+        exchange: the exchange whose response differs from JSON, or the last JSON exchange.
+        differs: the value in both formats; empty if all formats agree.
+    """
+
+    template: str
+    operation: str
+    exchange: Exchange
+    differs: str = ""
+
+    @classmethod
+    def of(cls, call: Call, exchange: Exchange, found: Disagreement | None = None) -> "FormatsRead":
+        """Return the record of readings, of which ``exchange`` is the last."""
+        operation = call.operation
+        if found is None:
+            return cls(operation.template, operation.id, exchange)
+        return cls(operation.template, operation.id, found.exchange, found.description)
+
+
+@scenario(needs={Need.REST, Need.MOTION})
+def formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> tuple[FormatsRead, ...]:
+    """Read pose and velocity in all formats while the robot drives an arc, and at rest after it."""
+    calls = [call for call in reads(api) if call.operation.template in {POSE, VELOCITY, LINEAR} and _others(call)]
+    if effort.name == "quick" or not calls:
+        return ()  # the formats are compared at rest in any case
+    make_room(robot)
+    drive = Drive(robot)
+    arc = robot.share_of_limits(0.3, -0.4)
+    compared: list[FormatsRead] = []
+    # What every first reading so far was out by, of each resource after each kind of change.
+    suspects: dict[tuple[str, bool], Found] = {}
+    for change in range(_CHANGES):
+        # There and back, which needs no more room.
+        moving = Velocity(*(-part if change % 2 else part for part in arc))
+        for wanted in (moving, STILL):
+            drive.command(wanted)
+            drive.reach(wanted)
+            robot.clock.sleep(robot.sample_s if change else 0.0)
+            for call in calls:
+                key = (call.operation.id, wanted == STILL)
+                drive.command(wanted)
+                found = one_turn(api, call, _others(call))[0]
+                before = suspects.get(key, {}) if change else found
+                suspects[key] = {place: item for place, item in found.items() if place in before}
+            for call in () if change else calls:
+                compared += _compared(api, call, partial(drive.command, wanted))
+        if not any(suspects.values()):
+            return tuple(compared)
+    by_id = {call.operation.id: call for call in calls}
+    left = ((by_id[id_], item) for (id_, _), found in suspects.items() for item in found.values())
+    return (*compared, *(FormatsRead.of(call, item.exchange, item) for call, item in left))
+
+
+@scenario(needs={Need.REST, Need.MOTION})
+def formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> tuple[FormatsRead, ...]:
+    """PUT several goals and read each in all formats, from the first reading on."""
+    call = _reader(api, GOAL_PATH)
+    if effort.name == "quick" or call is None:
+        return ()  # one goal is looked at in any case
+
+    def put() -> Iterator[Call]:
+        for number, pose in enumerate(choose_goals(robot, 1.5, 1 + _CHANGES)):
+            body = goal_body(pose, robot.statement.motion.frame, f"formats {number}")
+            put_goal(robot, body)
+            await_goal(robot, body)
+            # Where the goal before was out, this one gets the time that commands may take.
+            robot.clock.sleep(robot.settle_s if number > 1 else 0.0)
+            yield call
+
+    compared = _first(api, put())
+    robot.delete_goal()
+    await_none(robot)
+    return compared
+
+
+@scenario(needs={Need.REST, Need.MOTION})
+def goal_as_text(api: RestInterface, robot: Robot) -> tuple[Exchange, ...]:
+    """PUT a distant goal whose id is digits, and read it as text; empty where no goal is described as text."""
+    if "text/plain" not in _others(_reader(api, GOAL_PATH)):
+        return ()
+    body = goal_body(choose_goals(robot, 1.5, 1)[0], robot.statement.motion.frame, DIGITS)
+    for _ in range(_TRIES):
+        put_goal(robot, body)
+        await_goal(robot, body)
+        exchange = robot.rest.send("GET", GOAL_PATH, headers=(("Accept", "text/plain"),))
+        if exchange.response.ok:
+            robot.delete_goal()
+            await_none(robot)
+            return (exchange,)
+    raise NotPossibleError(f"a goal with the id {DIGITS} was never there when it was read")
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.RESTING)
+def formats_of_plans(api: RestInterface, robot: Robot, effort: Effort) -> tuple[FormatsRead, ...]:
+    """Request several plans and read each in all formats, from the first reading on."""
+    call = _reader(api, PLAN)
+    here = robot.map_pose()
+    if effort.name == "quick" or call is None or here is None:
+        return ()  # one plan is looked at in any case
+    goals = reachable(robot, here, max(1.0, robot.statement.motion.radius_m), 3)
+
+    def ask() -> Iterator[Call]:
+        for number in range(1 + _CHANGES if goals else 0):
+            goal, start = goals[number % len(goals)], goals[(number + 1) % len(goals)]
+            given = {"x": goal.x, "y": goal.y, "yaw": 0.3 * number}
+            given |= {"start_x": start.x, "start_y": start.y, "start_yaw": -0.4 * number}
+            asked = call
+            for name, value in given.items():
+                asked = asked.having(name, repr(value))
+            require_valid(api.run.contract, "GET", asked.path)
+            yield asked
+
+    return _first(api, ask())
+
+
+def _compared(api: RestInterface, call: Call, renew: Callable[[], object]) -> list[FormatsRead]:
+    """Read a resource in all formats until they agree, a few times; return nothing where it has no JSON."""
+    found, exchange = disagreements(api, call, _others(call), renew)
+    return [FormatsRead.of(call, exchange, found[0] if found else None)] if exchange.response.ok else []
+
+
+def _first(api: RestInterface, changes: Iterator[Call]) -> tuple[FormatsRead, ...]:
+    """Return the differences that the first reading after each change but the first shows, or that there is none."""
+    left: Found | None = None
+    for number, call in enumerate(changes):
+        found, exchange = one_turn(api, call, _others(call))
+        if number:
+            left = found if left is None else {place: item for place, item in found.items() if place in left}
+        if left == {}:
+            return (FormatsRead.of(call, exchange),) if exchange.response.ok else ()
+    return tuple(FormatsRead.of(call, item.exchange, item) for item in (left or {}).values())
+
+
+def _reader(api: RestInterface, template: str) -> Call | None:
+    """Return the GET of a resource that has several formats, or None."""
+    return next((call for call in reads(api) if call.operation.template == template and _others(call)), None)
+
+
+def _others(call: Call | None) -> list[str]:
+    """Return the formats of a resource other than JSON."""
+    return [name for name in call.operation.formats if name != JSON] if call else []

@@ -1,0 +1,119 @@
+"""Pose, velocity and goal over REST and over SOAP, while the robot moves and when it has come to rest.
+
+What SOAP told before a change may be what it tells first afterwards: so after each change the first reading counts. A
+good robot's may be out as well, by one odometry message that one interface has and the other has not yet: then
+everything is done again, and only what is out after each change is recorded.
+"""
+
+from dataclasses import replace
+from functools import partial
+from http import HTTPStatus
+from typing import Final
+
+from conformance.api.soap.service import SoapService
+from conformance.documents.representation import from_element, projected
+from conformance.observe.polling import poll
+from conformance.packs.table1.robot.agreement import Slack, disagreement
+from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.goal import await_goal, await_none, goal_body, put_goal
+from conformance.packs.table1.robot.goals import choose_goals, make_room
+from conformance.packs.table1.robot.message_shapes import GOAL_AND_STATUS
+from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
+from conformance.packs.table1.robot.soap_services import ask, returned
+from conformance.packs.table1.robot.state_over_soap import STATES, StateRead, agreed, compare, for_good, read_state
+from conformance.scenarios.scenario import scenario
+from conformance.scenarios.stage import Need
+from conformance.verdict.effort import Effort
+
+# First readings that are out after so many changes of one kind are no chance.
+_CHANGES: Final = 3
+# How often a state is compared that stays as it is.
+_TIMES: Final = 4
+# Goals that displaced another one, of which each has to be out in the first answer after it.
+_GOALS: Final = 3
+
+
+@scenario(needs={Need.REST, Need.SUBSCRIBERS, Need.MOTION})
+def interfaces_in_motion(robot: Robot, subscribers: SoapService) -> tuple[StateRead, ...]:
+    """Read pose and velocity on an arc, where each component that the robot has is not zero, and at rest after it."""
+    make_room(robot)
+    drive = Drive(robot)
+    arc = robot.share_of_limits(0.3, -0.4)
+    reads: list[StateRead] = []
+    # What every first reading so far was out by, of each state after each kind of change; None: not read yet.
+    suspects: dict[tuple[str, bool], StateRead | None] = {
+        (name, moves): None for name in STATES for moves in (True, False)
+    }
+    for change in range(_CHANGES):
+        # There and back, which needs no more room.
+        moving = Velocity(*(-part if change % 2 else part for part in arc))
+        for wanted in (moving, STILL):
+            drive.command(wanted)
+            drive.reach(wanted)
+            # The first time as soon as may be; then when both interfaces must have heard of it.
+            pause_s = robot.sample_s if change else 0.0
+            drive.clock.sleep(pause_s)
+            for name in [name for name, moves in suspects if moves == (wanted != STILL)]:
+                drive.command(wanted)
+                read = read_state(robot, subscribers, name, pause_s)
+                del suspects[name, wanted != STILL]
+                if read is not None:
+                    reads += for_good([read])
+                    suspects |= {(name, wanted != STILL): read} if read.differs else {}
+            for _ in range(0 if change else _TIMES if wanted == moving else 1):
+                for name in STATES:
+                    # A state that differs costs three tries each time.
+                    if not any(one.name == name and (one.broken or one.differs) for one in reads):
+                        reads += compare(robot, subscribers, name, partial(drive.command, wanted))
+        if not suspects:
+            break
+    return (*reads, *(replace(one, broken="") for one in suspects.values() if one is not None))
+
+
+@scenario(needs={Need.REST, Need.SUBSCRIBERS, Need.MOTION})
+def goals_over_soap(robot: Robot, subscribers: SoapService, effort: Effort) -> tuple[StateRead, ...]:
+    """Read the active goal, or its absence, over both interfaces, after each of several goals and without one."""
+    reads = _compare_goals(robot, subscribers)
+    goals = choose_goals(robot, 1.5, 2)
+    late: list[StateRead] = []
+    for index in range(effort.cases(10)):
+        body = goal_body(goals[index % 2], robot.statement.motion.frame, f"equal \u00e9 <&> {index}")
+        put_goal(robot, body)
+        await_goal(robot, body)
+        if len(late) == index - 1:
+            # Where SOAP's first answer was out each time so far, it gets the time that commands may take.
+            robot.clock.sleep(robot.settle_s if late else 0.0)
+            read = _read_goal(robot, subscribers)
+            if read is not None:
+                reads += for_good([read])
+                late += [replace(read, broken="")] if read.differs else []
+        for _ in range(3):
+            reads += _compare_goals(robot, subscribers)
+    reads += late[-1:] if len(late) >= _GOALS else []
+    robot.delete_goal()
+    await_none(robot)
+    return (*reads, *_compare_goals(robot, subscribers))
+
+
+def _compare_goals(robot: Robot, subscribers: SoapService) -> list[StateRead]:
+    """Read the goal over both interfaces until they agree, as one may learn of a change after the other."""
+    patience = robot.patience(robot.settle_s)
+    return agreed(_read_goal(robot, subscribers) for _ in poll(robot.clock, 0.05, lambda: patience.over))
+
+
+def _read_goal(robot: Robot, subscribers: SoapService) -> StateRead | None:
+    """Read the goal over REST, SOAP and REST; return None where it changed in the meantime."""
+    before, first = robot.goal()
+    exchange = ask(subscribers, "GetGoal")
+    found, problem = returned(exchange)
+    after, last = robot.goal()
+    if before is not None and after is not None and before["goal_id"]["id"] == after["goal_id"]["id"]:
+        between = from_element(found[0], GOAL_AND_STATUS.schema) if found else None
+        broken = "" if between is None else GOAL_AND_STATUS.problem(between)
+        shown = [projected(goal, GOAL_AND_STATUS.schema) for goal in (before, after)]
+        problem = problem or ("no goal" if between is None else disagreement(shown[0], between, shown[1], Slack()))
+        return StateRead("goal", exchange, broken, problem)
+    if first.response.status == last.response.status == HTTPStatus.NOT_FOUND:
+        # No goal: an empty response, or a fault.
+        return StateRead("goal", exchange, "", "a goal, where REST says that there is none" if found else "")
+    return None
