@@ -15,6 +15,7 @@ from conformance.packs.table1.robot.standstill import Standstill
 from conformance.packs.table1.robot.stopping import bring_to_rest
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.scenario import NotPossibleError
+from conformance.scenarios.stage import Stage
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.run import Run
 
@@ -75,7 +76,9 @@ def robot(request: pytest.FixtureRequest, api: RestInterface, standstill: Stands
     if not request.node.get_closest_marker("motion") or standstill.lasts:
         return Robot(api)
     standstill.watch()
-    reason = bring_to_rest(api)
+    phase = request.node.get_closest_marker("phase")
+    attempts = phase is not None and phase.args == (Stage.STANDSTILL,)
+    reason = standstill.begin() if attempts else bring_to_rest(api)
     if reason:
         raise NotPossibleError(reason)
     return Robot(api)

@@ -15,7 +15,7 @@ from conformance.observe.polling import poll
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import GOAL_PATH, STILL, Robot
 from conformance.packs.table1.robot.standstill_trace import Attempt, Rest, Standing
-from conformance.packs.table1.robot.stopping import bring_to_rest
+from conformance.packs.table1.robot.stopping import bring_to_rest, halt
 
 # How many times the tolerance a robot at rest may be off.
 _OFF = 2
@@ -55,6 +55,17 @@ class Standstill:
         self._waiting: list[_Waiting] = []
         # What moved while another check read the robot.
         self._moved: Rest | None = None
+
+    def begin(self) -> str:
+        """Bring the robot to rest before an attempt; return why it is not, or an empty text.
+
+        A robot that is still at rest may yet begin what it was told just before: it gets the time to do so.
+        """
+        robot = Robot(self._api, self._clock)
+        settled = self._api.client.connection.acted_at + robot.settle_s
+        halt(self._api)
+        self._clock.sleep(settled - self._clock.now())
+        return bring_to_rest(self._api)
 
     def attempted(
         self, requirement: str, after: str, repeat: Callable[[], Iterable[Rest]], *, seconds: float, goal: bool = False

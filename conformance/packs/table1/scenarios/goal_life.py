@@ -177,6 +177,10 @@ def cancel(robot: Robot) -> Cancelled:
         read = await_none(robot)
         gone = read.response.status == HTTPStatus.NOT_FOUND
     drive.reach(STILL, "safety/cancel", since=answered)
+    rests = [turn.velocity is None or robot.near(turn.velocity, STILL, 2) for turn in drive.trace.turns]
+    if all(rests) or not rests[-1]:
+        # It may yet begin what the goal had commanded, or be about to turn the other way: until it has had its time.
+        robot.clock.sleep(answered + robot.settle_s - robot.clock.now())
     return Cancelled(exchange, read, gone, drive.trace)
 
 
