@@ -27,6 +27,13 @@ _SINGLE = ("Content-Type", "Location", "Retry-After")
 _CONDITIONS = frozenset({"range", "if-none-match", "if-modified-since", "if-match", "if-unmodified-since"})
 _CONDITIONAL = frozenset({206, 304, 412, 416})
 _WELL_FRAMED = "well-framed HTTP"
+# Fields that contain one time and nothing else, in lower case, and the grammar of that time (RFC 9110 5.6.7).
+_TIMES = frozenset({"date", "last-modified"})
+_IMF_FIXDATE = re.compile(
+    r"(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun), \d{2} (?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec) \d{4} "
+    r"\d{2}:\d{2}:\d{2} GMT",
+    re.ASCII,
+)
 
 
 class Observer(Listener):
@@ -101,6 +108,11 @@ class Observer(Listener):
             date = answer.header("date")
             found = "no header field Date" if date is None else f"Date: {date}"
             expect(judge, "http/date", exchange).that(_is_date(date), "Date with the time of the response", found)
+        for name, value in answer.headers:
+            if name.lower() in _TIMES:
+                expected, found = f"{name} in the format Sun, 06 Nov 1994 08:49:37 GMT", f"{name}: {value}"
+                holds = _IMF_FIXDATE.fullmatch(value.strip()) is not None
+                expect(judge, "http/date-format", exchange).that(holds, expected, found, cause=name.lower())
 
     def _judge_json(self, exchange: Exchange, answer: Response) -> None:
         judge = self._api.run.judge

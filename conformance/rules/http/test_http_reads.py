@@ -19,6 +19,7 @@ _IN_ALL = 56
     "http/declared-body",
     "http/content-type",
     "http/date",
+    "http/date-format",
     "http/field-once",
     "http/framing",
     "http/json-finite",

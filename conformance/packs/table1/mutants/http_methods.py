@@ -205,3 +205,9 @@ _mutant("http-no-content-type-sometimes", "content-type", "One response in 50 ha
     rest("GET", POSE, VELOCITY), header("Content-Type", None), nth=50
 )
 _mutant("http-no-date", "date", "Responses have no Date.").altered(_ANY, header("Date", None), anything)
+_mutant("http-date-zone", "date-format", "Date ends with -0000 instead of GMT.").altered(
+    _ANY, lambda response: response.put("Date", (response.field("Date") or "").replace("GMT", "-0000")), anything
+)
+_mutant("http-date-old", "date-format", "One Date in 50 has the obsolete format of RFC 850.").altered(
+    rest("GET", POSE, VELOCITY), header("Date", "Sunday, 06-Nov-94 08:49:37 GMT"), nth=50
+)

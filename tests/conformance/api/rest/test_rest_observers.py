@@ -178,6 +178,25 @@ def test_formats_are_read_as_what_they_say_they_are():
     assert seen("GET", path, 200, text, b"x: 1\ny: 1\nz: 0", sent=wants_xml) == {"http/not-acceptable"}
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "holds"),
+    [
+        ("DATE", " Sun, 06 Nov 1994 08:49:37 GMT ", True),
+        ("Date", "Sun, 06 Nov 1994 08:49:37 -0000", False),
+        ("Date", "Sun, 6 Nov 1994 08:49:37 GMT", False),
+        ("Date", "Sunday, 06-Nov-94 08:49:37 GMT", False),
+        ("Date", "Sun Nov  6 08:49:37 1994", False),
+        ("last-modified", "Sun, 06 Nov 1994 08:49:37 GMT", True),
+        ("Last-Modified", "Sun, 06 Nov 1994 08:49:37 UTC", False),
+        ("Expires", "0", True),
+        ("Retry-After", "1", True),
+    ],
+)
+def test_the_format_of_a_time(name, value, holds):
+    found = seen("OPTIONS", "/robot/velocity/", 204, [(name, value)])
+    assert ("http/date-format" in found) is not holds
+
+
 def test_garbage_is_bad_framing():
     found = seen("GET", "/robot/pose/", None, problem="a response that is not HTTP: illegal status line")
     assert found == {"http/framing"}
