@@ -5,14 +5,13 @@ import json
 import signal
 import subprocess
 import sys
-import threading
 import time
 from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
 import pytest
+from toy_server import Handler, server_of
 
 from conformance.contract.pack import Contract
 from conformance.contract.requirement_sets import current, load_set
@@ -102,22 +101,20 @@ def test_a_plain_web_server_does_not_conform(tmp_path, web_server):
 
 
 def test_a_server_of_one_page_leaves_nothing_in_error(tmp_path):
-    class _Page(BaseHTTPRequestHandler):
-        def do_GET(self):
+    class _Page(Handler):
+        protocol_version = "HTTP/1.0"
+
+        def answer(self):
+            if self.command != "GET":
+                self.send_error(501)
+                return
             self.send_response(200)
             self.send_header("Content-Type", "text/html")
             self.end_headers()
             self.wfile.write(b"<html>welcome</html>")
 
-        def log_message(self, *_):
-            return
-
-    with ThreadingHTTPServer(("127.0.0.1", 0), _Page) as server:
-        server.handle_error = lambda *_: None  # clients that break off are no news
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        url = f"http://127.0.0.1:{server.server_port}"
-        done, result = _certify(tmp_path, "--rest", url, "--effort", "quick", "--class", "http")
-        server.shutdown()
+    with server_of(_Page, handle_error=lambda *_: None) as server:  # clients that break off are no news
+        done, result = _certify(tmp_path, "--rest", server.url, "--effort", "quick", "--class", "http")
     assert done.returncode == 1
     assert "error" not in {item["verdict"] for item in result["requirements"]}
 

@@ -2,12 +2,11 @@
 
 import base64
 import json
-import threading
 import zlib
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 from click.testing import CliRunner
+from toy_server import Handler, server_of
 
 from conformance.contract.pack import Contract
 from conformance.engine.permission import moves
@@ -17,20 +16,11 @@ from conformance.verdict.finding import Sent
 from roaas import main
 
 
-class _Robot(ThreadingHTTPServer):
+class _Handler(Handler):
     """Answers 500 to a GET that follows a PUT, until it is repaired."""
 
-    def __init__(self):
-        self.asked: list[tuple[str, str, bytes, str | None]] = []
-        self.repaired = False
-        super().__init__(("127.0.0.1", 0), _Handler)
-
-
-class _Handler(BaseHTTPRequestHandler):
-    server: _Robot
-
-    def _answer(self):
-        body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
+    def answer(self):
+        body = self.content()
         broken = self.command == "GET" and not self.server.repaired and self.server.asked[-1:] != []
         self.server.asked.append((self.command, self.path, body, self.headers.get("Authorization")))
         if self.path == "/robot/pose/":
@@ -42,20 +32,11 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_response(500 if broken else 204)
         self.end_headers()
 
-    do_GET = do_PUT = _answer  # noqa: N815 - http.server's names
-
-    def log_message(self, *_):
-        """Say nothing."""
-
 
 @pytest.fixture(name="robot")
 def _robot():
-    with _Robot() as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
-        thread.start()
+    with server_of(_Handler, asked=[], repaired=False) as server:
         yield server
-        server.shutdown()
-        thread.join()
 
 
 def _result(tmp_path, base, methods=("PUT", "GET")):
@@ -88,7 +69,7 @@ def _replay(*arguments):
 
 def test_a_finding_is_still_there_until_it_is_repaired(robot, tmp_path):
     (tmp_path / "token").write_text("sesame\n", encoding="utf-8")
-    result = _result(tmp_path, f"http://127.0.0.1:{robot.server_port}")
+    result = _result(tmp_path, robot.url)
     base = f"HTTP://127.0.0.1:{robot.server_port}/elsewhere"
     arguments = (result, "--allow-motion", "--token-file", str(tmp_path / "token"), "--token-for", base)
     there = _replay(*arguments)
@@ -100,7 +81,7 @@ def test_a_finding_is_still_there_until_it_is_repaired(robot, tmp_path):
 
 
 def test_what_an_answer_shows_by_itself_is_judged_as_in_the_run(robot, tmp_path):
-    base = f"http://127.0.0.1:{robot.server_port}"
+    base = robot.url
     request = Request("GET", f"{base}/robot/pose/", (("Host", "x"), ("Accept", "image/png")))
     failure = {
         "message": "Date: None",
@@ -132,7 +113,7 @@ def test_what_an_answer_shows_by_itself_is_judged_as_in_the_run(robot, tmp_path)
 
 
 def test_what_moves_the_robot_asks_first(robot, tmp_path):
-    refused = _replay(_result(tmp_path, f"http://127.0.0.1:{robot.server_port}"))
+    refused = _replay(_result(tmp_path, robot.url))
     assert (refused.exit_code, robot.asked) == (2, [])
     assert "--allow-motion" in refused.output
 
@@ -142,7 +123,7 @@ def test_what_moves_the_robot_asks_first(robot, tmp_path):
 )
 def test_the_token_goes_to_no_address_that_the_user_did_not_name(robot, tmp_path, others):
     (tmp_path / "token").write_text("sesame", encoding="utf-8")
-    result = _result(tmp_path, f"http://127.0.0.1:{robot.server_port}", ("GET",))
+    result = _result(tmp_path, robot.url, ("GET",))
     trusted = [part for url in others for part in ("--token-for", url.format(port=robot.server_port))]
     refused = _replay(result, "--token-file", str(tmp_path / "token"), *trusted)
     assert (refused.exit_code, robot.asked) == (2, [])
@@ -202,7 +183,7 @@ def test_a_sequence_that_no_run_wrote_is_refused(part):
 
 
 def test_a_bomb_in_a_result_is_wrong_usage(robot, tmp_path):
-    result = _result(tmp_path, f"http://127.0.0.1:{robot.server_port}", ("GET",))
+    result = _result(tmp_path, robot.url, ("GET",))
     document = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
     bomb = base64.b64encode(zlib.compress(bytes(60 * 1024 * 1024))).decode()
     document["requirements"][0]["failures"][0]["sequence"][0]["body"] = bomb

@@ -4,13 +4,13 @@ import contextlib
 import http.client
 import socket
 import ssl
-import threading
 import time
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.parse import urlsplit
 
 import pytest
+from toy_server import serving
 
 from conformance.mutation.changes import altered, becomes, header, instead, plain, rest, rewritten, values
 from conformance.mutation.messages import HangUpError, Response
@@ -21,39 +21,17 @@ from conformance.selftest.robots import Robot
 from conformance.selftest.variants import VARIANTS, certificate
 
 
-class Answering(BaseHTTPRequestHandler):
-    """Answers with what it was asked, and counts."""
-
-    protocol_version = "HTTP/1.1"
-    seen: list
-
-    def _do(self):
-        body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
-        self.seen.append((self.command, self.path, body))
-        port = self.server.server_port
-        got = b'{"x": 1, "at": "http://127.0.0.1:%d/here"}' % port if self.command == "GET" else body
-        self.send_response(200)
-        self.send_header("Content-Type", "application/json")
-        self.send_header("Content-Length", str(len(got)))
-        self.end_headers()
-        self.wfile.write(got)
-
-    do_GET = do_PUT = do_POST = _do  # noqa: N815 - http.server's names
-
-    def log_message(self, *_):
-        pass
-
-
 @pytest.fixture
 def robot():
-    handler = type("Handler", (Answering,), {"seen": []})
-    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True).start()
-    server.seen = handler.seen
-    server.url = f"http://127.0.0.1:{server.server_port}"
-    yield server
-    server.shutdown()
-    server.server_close()
+    """A robot that answers with what it was asked, and remembers."""
+    robot = SimpleNamespace(seen=[])
+
+    def answer(method, path, body):
+        robot.seen.append((method, path, body))
+        return 200, body if method != "GET" else b'{"x": 1, "at": "%s/here"}' % robot.url.encode()
+
+    with serving(answer) as robot.url:
+        yield robot
 
 
 @pytest.fixture

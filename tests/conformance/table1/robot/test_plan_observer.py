@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 import pytest
+from toy_messages import header, pose
 
 from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.robot.geometry import Pose
@@ -51,13 +52,10 @@ def test_what_is_no_leap(poses):
 def _seen(poses: list[Pose], *, path: str = "/robot/navigation/service/plan?x=1.0&y=2.0", **answer: object) -> Run:
     run = Run(statement=Statement())
     observer = PlanObserver(RestInterface(run, HttpClient(_BASE + "/", Connection())))
-    header = {"stamp": {"sec": 1, "nanosec": 0}, "frame_id": "map"}
-    turned = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
     there = [
-        {"header": header, "pose": {"position": {"x": one.x, "y": one.y, "z": 0.0}, "orientation": turned}}
-        for one in poses
+        {"header": header(), "pose": pose(one.x) | {"position": {"x": one.x, "y": one.y, "z": 0.0}}} for one in poses
     ]
-    body = json.dumps({"plan": {"header": header, "poses": there}}).encode()
+    body = json.dumps({"plan": {"header": header(), "poses": there}}).encode()
     response = replace(Response(200, (("Content-Type", "application/json"),), body, 1.0), **answer)
     observer.answered(Exchange(Request("GET", _BASE + path), response))
     return run

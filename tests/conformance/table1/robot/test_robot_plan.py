@@ -1,13 +1,12 @@
 """A path has to begin where the robot is, and one reading of its localisation may be out."""
 
 import pytest
+from toy_messages import exchange
 
 from conformance.packs.table1.robot.geometry import Pose, middle_of
 from conformance.packs.table1.robot.plan import Plan, start_of
-from conformance.transport.exchange import Exchange, Request, Response
 
 _HERE, _OUT = Pose(1.0, 2.0, 0.0), Pose(1.5, 2.5, 0.0)
-_EVIDENCE = Exchange(Request("GET", "http://robot/robot/pose/"), Response(200, (), b"", 1.0))
 
 
 class Localised:
@@ -36,7 +35,7 @@ def path(first: Pose) -> Plan:
 )
 def test_most_of_several_plans_tell(before, poses, plans, refuted):
     robot, (first, *others) = Localised(list(poses)), map(path, plans)
-    start = start_of(robot, first, before, _EVIDENCE, lambda: others.pop(0))
+    start = start_of(robot, first, before, exchange(), lambda: others.pop(0))
     assert start.case.holds is not refuted
 
 

@@ -1,12 +1,12 @@
 """Windows over made records: one sample that is out fails nobody, and an error of a tenth fails everybody."""
 
-import json
 import math
 import random
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from toy_messages import exchange
 
 from conformance.packs.table1.limits import DeclaredLimits, Limits, Noise
 from conformance.packs.table1.robot import windows
@@ -15,9 +15,8 @@ from conformance.packs.table1.robot.geometry import Pose, wrapped
 from conformance.packs.table1.robot.letting_go import LetGo
 from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import STILL, Odometry, Velocity
-from conformance.transport.exchange import Exchange, Request, Response
 
-_EXCHANGE = Exchange(Request("GET", "http://robot/"), Response(200, (), json.dumps({}).encode(), 1.0))
+_EXCHANGE = exchange()
 _NOISE = Noise(position_m=0.005, heading_rad=0.005, linear_m_s=0.01, angular_rad_s=0.02)
 _LIMITS = DeclaredLimits(
     linear_m_s=0.7, angular_rad_s=2.5, settle_s=0.6, hold_s=1.0, tolerance=0.05, tolerance_abs=0.01, noise=_NOISE
