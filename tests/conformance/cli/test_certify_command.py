@@ -48,8 +48,7 @@ def test_a_nonce_gives_the_seed_and_stands_in_the_result(tmp_path, closed_port):
 @pytest.mark.parametrize("wrong", [["--nonce", "a", "--seed", "1"], ["--nonce", " "], ["--nonce", "\n"]])
 def test_a_nonce_is_text_and_goes_without_a_seed(tmp_path, closed_port, wrong):
     done, result = _certify(tmp_path, "--rest", closed_port, *wrong)
-    assert done.returncode == 2
-    assert "--nonce" in done.stderr
+    assert (done.returncode, "--nonce" in done.stderr) == (2, True), done.stderr
     assert result is None
 
 
@@ -76,23 +75,20 @@ def test_a_certificate_is_signed_also_when_the_robot_was_not_reached(tmp_path, c
 def test_a_key_that_cannot_sign_is_told_before_the_run(tmp_path, closed_port):
     generate(tmp_path / "keys")
     done, result = _certify(tmp_path, "--rest", closed_port, "--sign", str(tmp_path / "keys" / PUBLIC_NAME))
-    assert done.returncode == 2
-    assert "not a private key" in done.stderr
+    assert (done.returncode, "not a private key" in done.stderr) == (2, True), done.stderr
     assert result is None
 
 
 def test_a_server_that_never_answers_is_not_reached(tmp_path, listening):
     url = listening(lambda connection: time.sleep(60) or connection)
     done, result = _certify(tmp_path, "--rest", url, "--timeout", "0.5")
-    assert done.returncode == 3
-    assert "no response within 0.5 s" in done.stderr
+    assert (done.returncode, "no response within 0.5 s" in done.stderr) == (3, True), done.stderr
     assert result["verdict"] == "inconclusive"
 
 
 def test_a_plain_web_server_does_not_conform(tmp_path, web_server):
     done, result = _certify(tmp_path, "--rest", web_server, "--effort", "quick")
-    assert done.returncode == 1
-    assert result["verdict"] == "not-conformant"
+    assert (done.returncode, result["verdict"]) == (1, "not-conformant")
     assert result["classes"]["rest-resources"] == "fail"
     failed = next(item for item in result["requirements"] if item["id"] == "rest-resources/pose-type")
     assert failed["failures"][0]["request"]["curl"].endswith("/robot/pose/")
@@ -122,8 +118,7 @@ def test_a_server_of_one_page_leaves_nothing_in_error(tmp_path):
 def test_a_claimed_class_without_its_interface_fails(tmp_path, web_server):
     _, result = _certify(tmp_path, "--rest", web_server, "--class", "soap-delivery")
     verdicts = {item["id"]: item["verdict"] for item in result["requirements"]}
-    assert verdicts["soap-delivery/reachable"] == "fail"
-    assert result["classes"]["soap-delivery"] == "fail"
+    assert (verdicts["soap-delivery/reachable"], result["classes"]["soap-delivery"]) == ("fail", "fail")
 
 
 @pytest.mark.parametrize(
@@ -139,8 +134,7 @@ def test_a_claimed_class_without_its_interface_fails(tmp_path, web_server):
 )
 def test_wrong_usage_is_told_by_name(tmp_path, arguments, named):
     done, result = _certify(tmp_path, *arguments)
-    assert done.returncode == 2
-    assert named in done.stderr
+    assert (done.returncode, named in done.stderr) == (2, True), done.stderr
     assert result is None
 
 
@@ -150,11 +144,9 @@ def test_a_first_statement_is_written_and_can_be_used(tmp_path, web_server):
     done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     done, result = _certify(tmp_path, str(statement), "--effort", "quick")
-    assert done.returncode == 1
-    assert result["target"]["rest"] == web_server
+    assert (done.returncode, result["target"]["rest"]) == (1, web_server)
     again = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
-    assert again.returncode == 2
-    assert "exists already" in again.stderr
+    assert (again.returncode, "exists already" in again.stderr) == (2, True), again.stderr
 
 
 @contextmanager
@@ -222,13 +214,11 @@ def test_the_suite_runs_in_somebody_elses_project(tmp_path):
         command = [sys.executable, "-m", "pytest", "-q", "-p", "roaas_pytest", "--pyargs", "conformance", "test_own.py"]
         command += ["--robot-rest", rest, "--robot-class", "rest-formats", "--robot-effort", "quick"]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 0, done.stdout
-    assert "passed" in done.stdout
+    assert (done.returncode, "passed" in done.stdout) == (0, True), done.stdout
 
 
 def test_a_frozen_set_is_what_a_run_is_scored_by(tmp_path, closed_port):
     _, result = _certify(tmp_path, "--rest", closed_port, "--requirements", "1.1")
     assert result["requirement_set"] == load_set(Contract.load(), "1.1").told
     done, _ = _certify(tmp_path, "--rest", closed_port, "--requirements", "0.9")
-    assert done.returncode == 2
-    assert "'0.9'" in done.stderr
+    assert (done.returncode, "'0.9'" in done.stderr) == (2, True), done.stderr

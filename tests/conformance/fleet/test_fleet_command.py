@@ -65,8 +65,7 @@ def test_each_robot_has_its_end_whatever_the_others_do(tmp_path, web_server, clo
     assert "missing.toml" in found["unusable"]["reason"]
     assert [robot["trusted"] for robot in found.values()] == [[]] * 4
     assert found["hangs"].get("classes", {}).get("rest-resources") != "pass", "an earlier run's result does not count"
-    assert found["poor"]["classes"]["rest-resources"] == "fail"
-    assert found["poor"]["robot"] == {"name": "poor"}
+    assert (found["poor"]["classes"]["rest-resources"], found["poor"]["robot"]) == ("fail", {"name": "poor"})
     for name, end in (("hangs", "given-up"), ("down", "unreachable"), ("poor", "not-conformant")):
         assert f"{name}: started" in done.stderr
         assert f"judged | {name}: {end}" in done.stderr

@@ -57,8 +57,7 @@ def test_a_full_statement(tmp_path):
     assert statement.endpoints.ca_file == str(tmp_path / "ca.pem")
     assert statement.claimed(CONTRACT) == ("rest-resources", "rest-delivery", "soap-delivery", "safety")
     assert (statement.limits.linear_m_s, statement.limits.hold_s, statement.limits.settle_s) == (1.0, 0.5, 2.0)
-    assert statement.motion.arena == (0.0, 0.0, 10.0, 5.0)
-    assert statement.ros.domain_id == 7
+    assert (statement.motion.arena, statement.ros.domain_id) == ((0.0, 0.0, 10.0, 5.0), 7)
     assert statement.load.max_rate == 100
     assert statement.load.thresholds == (Threshold(Operation.POSE, ApiStyle.REST, Quantile.P99, 5.0),)
 

@@ -131,8 +131,7 @@ def test_a_request_that_is_not_idempotent_and_was_read_is_not_sent_again(stale):
     client.send("GET", "/")
     with pytest.raises(NoAnswerError, match=r"closed the connection without a response$"):
         client.send("POST", "/", body=b"order")
-    assert server.seen == ["GET", "POST"]
-    assert client.connection.resent == 0
+    assert (server.seen, client.connection.resent) == (["GET", "POST"], 0)
 
 
 def test_a_connection_that_is_closed_again_is_told_with_the_response_before(stale):

@@ -2,6 +2,7 @@
 
 import re
 import socket
+from contextlib import closing
 
 import pytest
 
@@ -44,9 +45,9 @@ def _sent(listening, method: str, path: str, base: str = "", token: str | None =
     """The octets of one request, with HOST for the address that differs from run to run."""
     recorder = _Recorder(_NOTHING)
     url = listening(recorder)
-    client = HttpClient(url + base, Connection(token=token))
-    assert client.send(method, path, **options).response.status == 204
-    client.close()
+    with closing(HttpClient(url + base, Connection(token=token))) as client:
+        exchange = client.send(method, path, **options)
+    assert (exchange.response.status, exchange.request.url.endswith(base.rstrip("/") + path)) == (204, True)
     (octets,) = recorder.requests
     return octets.replace(url.removeprefix("http://").encode(), b"HOST")
 
@@ -150,8 +151,7 @@ def test_no_cookie_is_sent_back_and_no_content_is_decoded(listening):
     client = HttpClient(listening(recorder), Connection())
     for _ in range(2):
         assert client.send("GET", "/").response.body == b"abc"
-    assert len(set(recorder.requests)) == 1
-    assert len(recorder.requests) == 2
+    assert (len(set(recorder.requests)), len(recorder.requests)) == (1, 2)
 
 
 @pytest.mark.parametrize("size", [0, 12_000])

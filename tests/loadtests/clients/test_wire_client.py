@@ -169,11 +169,7 @@ def test_a_server_that_floods_an_idle_connection_does_not_keep_the_loop_busy():
     [
         "robot:7003",
         "ftp://robot",
-        "http://",
-        "http://robot:99999",
-        "http://robot:x",
-        "http://me:secret@robot",
-        "http://a b/",
+        *(f"http://{rest}" for rest in ("", "robot:99999", "robot:x", "me:secret@robot", "a b/")),
     ],
 )
 def test_urls_that_are_none(url):

@@ -74,8 +74,7 @@ def test_rest_and_soap_take_turns_in_random_abba_quartets():
         quartet = duel[index : index + 4]
         assert len({(segment.phase, segment.client) for segment in quartet}) == 1
         sides = [(segment.interface, segment.label) for segment in quartet]
-        assert sides[0] == sides[3]
-        assert sides[1] == sides[2]
+        assert (sides[0], sides[1]) == (sides[3], sides[2])
         assert sides[0] != sides[1]
         orders[sides[0]] += 1
         assert [segment.pair for segment in quartet] == [index // 2] * 2 + [index // 2 + 1] * 2
@@ -246,7 +245,6 @@ def test_a_generator_that_was_held_up_starts_nothing_in_segments_that_are_over()
     pacer.start(Schedule(plan, 0, 1), now_ns() - 10**9, open_model=False)
     with gevent.Timeout(30):
         pacer.done.wait()
-    assert crowd.taken == []
-    assert pacer.waiting == 3
+    assert (crowd.taken, pacer.waiting) == ([], 3)
     gevent.killall(crowd.greenlets)
     pacer.close()

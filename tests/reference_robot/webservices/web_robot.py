@@ -170,6 +170,14 @@ def running_robot(domain_id: int, *options: str, verify: ssl.SSLContext | bool =
             process.communicate(timeout=_PATIENCE)
 
 
+def problem(answer: httpx.Response, status: int) -> str:
+    """Assert that a response is a problem with this status, and when to try again after a 503; return its detail."""
+    assert answer.status_code == status, answer.text
+    assert (answer.headers["Content-Type"], answer.json()["status"]) == ("application/problem+json", status)
+    assert status != 503 or int(answer.headers["Retry-After"]) > 0
+    return answer.json()["detail"]
+
+
 def eventually(condition: Callable[[], Any]) -> Any:
     """Return the first true value of a condition; fail if it does not come."""
     give_up = time.monotonic() + _PATIENCE

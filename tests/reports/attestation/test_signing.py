@@ -57,8 +57,7 @@ def test_a_private_key_is_for_its_owner_and_never_overwritten(tmp_path):
     before = private.read_bytes()
     assert private.stat().st_mode & 0o777 == 0o600
     again = run(keygen, tmp_path / "keys")
-    assert again.exit_code == 2
-    assert str(private) in again.stderr
+    assert (again.exit_code, str(private) in again.stderr) == (2, True), again.stderr
     assert private.read_bytes() == before
 
 
@@ -160,17 +159,14 @@ def test_commands_from_key_to_verdict(desk, tmp_path):
     lenient = tmp_path / "policy.toml"
     lenient.write_text("max_age_days = 100000\n")
     accepted = run(verify, *arguments, "--policy", lenient, "--result", desk.folder)
-    assert accepted.exit_code == 0, accepted.output
-    assert "ACCEPTED" in accepted.stdout
+    assert (accepted.exit_code, "ACCEPTED" in accepted.stdout) == (0, True), accepted.stdout
     assert "the holder of this key vouches that this run took place" in " ".join(accepted.stdout.split())
     assert "Not proved: that the robot is genuine" in " ".join(accepted.stdout.split())
     refused = run(verify, *arguments, "--policy", lenient, "--nonce", "monday")
-    assert refused.exit_code == 1
-    assert "REFUSED by your policy: nonce" in refused.stdout
+    assert (refused.exit_code, "REFUSED by your policy: nonce" in refused.stdout) == (1, True), refused.stdout
     desk.edit(signatures=[])
     forged = run(verify, *arguments)
-    assert forged.exit_code == 1
-    assert "Nothing is proved" in forged.stdout
+    assert (forged.exit_code, "Nothing is proved" in forged.stdout) == (1, True), forged.stdout
 
 
 def test_what_cannot_be_read_is_no_verdict(desk, tmp_path):

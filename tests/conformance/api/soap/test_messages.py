@@ -64,19 +64,8 @@ def test_variants_of_the_contract_are_valid_and_finite(message):
 
 def test_mutations_are_of_every_kind_and_invalid_to_both():
     found = list(invalid_ones(mutations(ORDER, ordinary(ORDER, optional=True)), TYPES))
-    kinds = {mutant.kind for mutant in found}
-    assert kinds == {
-        "missing",
-        "unknown",
-        "duplicate",
-        "order",
-        "namespace",
-        "lexical",
-        "range",
-        "nil",
-        "non-finite",
-        "body",
-    }
+    kinds = {"missing", "unknown", "duplicate", "order", "namespace", "lexical", "range", "nil", "non-finite", "body"}
+    assert {mutant.kind for mutant in found} == kinds
     for mutant in found:
         if mutant.kind not in {"body", "non-finite"}:
             element = parse(mutant.made[0].written())
