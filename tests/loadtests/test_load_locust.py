@@ -12,6 +12,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 import yaml
+from processes import ended
 
 from loadtests.cli import load as load_command
 
@@ -26,19 +27,11 @@ locust.runners.WorkerRunner.connect_to_master = lambda runner: (connect(runner),
 """
 
 
-def ended(*command, **options):
-    return subprocess.run(command, capture_output=True, text=True, timeout=240, check=False, **options)
-
-
 def locust_until(reached, *options, folder):
     """Run Locust until what it prints says enough; returns that and its statistics in the end by name."""
-    process = subprocess.Popen(
-        [*LOCUST, "-t", "60s", *options, "--json-file", "found"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=folder,
-    )
+    command = [*LOCUST, "-t", "60s", *options, "--json-file", "found"]
+    outputs = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen(command, cwd=folder, **outputs)
     told = ""
     for line in process.stderr:
         told += line
@@ -69,8 +62,7 @@ def test_plain_locust_moves_nothing_unasked_and_says_when_it_cannot_begin(toy, t
         folder=tmp_path,
     )
     assert {name.split()[0] for name in entries} == {"pose"}, told
-    lost = ended(*LOCUST, "-u", "1", "-t", "2s", cwd=tmp_path)
-    assert "cannot begin: no endpoint" in lost.stderr
+    assert "cannot begin: no endpoint" in ended(*LOCUST, "-u", "1", "-t", "2s", cwd=tmp_path).stderr
 
 
 @pytest.mark.parametrize("habit", ["", DAWDLING], ids=["prompt", "dawdling"])

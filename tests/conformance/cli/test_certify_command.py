@@ -11,6 +11,7 @@ from urllib.error import HTTPError
 from urllib.request import urlopen
 
 import pytest
+from processes import ended, independent_robot
 from toy_server import Handler, server_of
 
 from conformance.contract.pack import Contract
@@ -25,7 +26,7 @@ _INDEPENDENT_ROBOTS = CONTRACT_DIR / "independent_robots"
 
 def _certify(tmp_path, *arguments):
     command = [sys.executable, "-m", "roaas", "certify", *arguments, "--out", str(tmp_path / "out")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    done = ended(*command)
     assert "Traceback" not in done.stdout + done.stderr
     result = tmp_path / "out" / "result.json"
     return done, json.loads(result.read_text(encoding="utf-8")) if result.exists() else None
@@ -141,28 +142,19 @@ def test_wrong_usage_is_told_by_name(tmp_path, arguments, named):
 def test_a_first_statement_is_written_and_can_be_used(tmp_path, web_server):
     statement = tmp_path / "robot.toml"
     command = [sys.executable, "-m", "roaas", "certify", "--init", str(statement), "--rest", web_server]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    done = ended(*command)
     assert (done.returncode, done.stderr) == (0, "")
     done, result = _certify(tmp_path, str(statement), "--effort", "quick")
     assert (done.returncode, result["target"]["rest"]) == (1, web_server)
-    again = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    again = ended(*command)
     assert (again.returncode, "exists already" in again.stderr) == (2, True), again.stderr
 
 
 @contextmanager
 def _independent_robot(name):
-    command = [sys.executable, "-m", "conformance.packs.table1.independent_robots", name]
-    command += ["--rest-port", "0", "--soap-port", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            words = process.stdout.readline().split()
-            assert words[0] == "ready"
-            rest, soap = (word.split("=", 1)[1] for word in words[1:3])
-            where = ["--rest", rest, "--publishers-wsdl", soap]
-            where += ["--subscribers-wsdl", soap.replace("publisher", "subscriber")]
-            yield process, rest, [str(_INDEPENDENT_ROBOTS / name / f"{name}.toml"), *where]
-        finally:
-            process.kill()
+    with independent_robot(name) as (process, rest, soap):
+        services = ["--publishers-wsdl", soap, "--subscribers-wsdl", soap.replace("publisher", "subscriber")]
+        yield process, rest, [str(_INDEPENDENT_ROBOTS / name / f"{name}.toml"), "--rest", rest, *services]
 
 
 def _until(process, text):
@@ -198,8 +190,7 @@ def test_an_interrupted_run_keeps_what_it_has_and_stops_the_robot(tmp_path):
         code, result = _broken_off(tmp_path, where, lambda run: run.send_signal(signal.SIGINT))
         assert code == 130
         assert result["interrupted"]
-        verdicts = {item["verdict"] for item in result["requirements"]}
-        assert {"pass", "error"} <= verdicts
+        assert {"pass", "error"} <= {item["verdict"] for item in result["requirements"]}
         with pytest.raises(HTTPError) as none:
             urlopen(rest + "/robot/navigation/action/goal/")  # noqa: S310 - our own robot
         assert none.value.code == 404
@@ -213,7 +204,7 @@ def test_the_suite_runs_in_somebody_elses_project(tmp_path):
     with _independent_robot("plain") as (_, rest, _):
         command = [sys.executable, "-m", "pytest", "-q", "-p", "roaas_pytest", "--pyargs", "conformance", "test_own.py"]
         command += ["--robot-rest", rest, "--robot-class", "rest-formats", "--robot-effort", "quick"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=240, check=False)
+        done = ended(*command, cwd=tmp_path)
     assert (done.returncode, "passed" in done.stdout) == (0, True), done.stdout
 
 

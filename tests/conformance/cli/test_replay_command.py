@@ -48,18 +48,18 @@ def _result(tmp_path, base, methods=("PUT", "GET")):
         )
         for index, method in enumerate(methods)
     ]
-    failure = {
-        "message": "status 500",
-        "response": {"status": 500, "headers": {}, "body": None},
-        "sequence": written(sent),
-    }
+    failure = {"message": "status 500", "response": {"status": 500, "headers": {}, "body": None}}
+    found = [{"id": "http/declared-status", "failures": [failure | {"sequence": written(sent)}]}]
+    return _written(tmp_path, [*found, {"id": "http/head", "failures": []}], target={"subscribers_endpoint": None})
+
+
+def _written(tmp_path, requirements, **more):
     document = {
         "format": "roaas-result/1",
         "suite": {"contract": Contract.load().version},
-        "target": {"subscribers_endpoint": None},
-        "requirements": [{"id": "http/declared-status", "failures": [failure]}, {"id": "http/head", "failures": []}],
+        "requirements": requirements,
     }
-    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    (tmp_path / "result.json").write_text(json.dumps(document | more), encoding="utf-8")
     return str(tmp_path)
 
 
@@ -83,20 +83,10 @@ def test_a_finding_is_still_there_until_it_is_repaired(robot, tmp_path):
 def test_what_an_answer_shows_by_itself_is_judged_as_in_the_run(robot, tmp_path):
     base = robot.url
     request = Request("GET", f"{base}/robot/pose/", (("Host", "x"), ("Accept", "image/png")))
-    failure = {
-        "message": "Date: None",
-        "response": {"status": 406, "headers": {"Content-Length": "0"}, "body": None},
-        "sequence": written([Sent(0.0, request)]),
-    }
-    document = {
-        "format": "roaas-result/1",
-        "suite": {"contract": Contract.load().version},
-        "target": {"rest": base},
-        "seed": 0,
-        "effort": "quick",
-        "requirements": [{"id": "http/date", "failures": [failure]}],
-    }
-    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    response = {"status": 406, "headers": {"Content-Length": "0"}, "body": None}
+    failure = {"message": "Date: None", "response": response, "sequence": written([Sent(0.0, request)])}
+    found = [{"id": "http/date", "failures": [failure]}]
+    _written(tmp_path, found, target={"rest": base}, seed=0, effort="quick")
     (tmp_path / "robot.toml").write_text(f'[endpoints]\nrest = "{base}"\n', encoding="utf-8")
     (tmp_path / "token").write_text("sesame", encoding="utf-8")
     by_checks = (str(tmp_path), "--statement", str(tmp_path / "robot.toml"), "--token-file", str(tmp_path / "token"))

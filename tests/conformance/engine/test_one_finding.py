@@ -1,11 +1,11 @@
 """A robot with one fault has one finding, however many checks meet it: seen with real servers."""
 
 import json
-import subprocess
 import sys
 import time
 
 import pytest
+from processes import ended
 from toy_server import Handler, server_of
 
 from conformance.cli.summary import print_summary
@@ -122,8 +122,7 @@ def test_requests_that_are_dropped_again_and_again_on_a_busy_connection_are_one_
         statement = type(empty_statement(contract))(endpoints=Endpoints(rest=server.url))
         run = Run(statement=statement, contract=contract, claims=("http",), effort=Effort("quick"))
         document = certify(RobotUnderTest(run, Connection(timeout_s=2)), tmp_path, progress=None).document
-    verdicts = {item["id"]: item["verdict"] for item in document["requirements"]}
-    assert verdicts["http/many-requests"] == "fail"
+    assert {item["id"]: item["verdict"] for item in document["requirements"]}["http/many-requests"] == "fail"
     (failure,) = (one for item in document["requirements"] for one in item["failures"] if "many" in item["id"])
     assert "the server closed 3 times without a response" in failure["message"]
 
@@ -146,7 +145,7 @@ def test_in_somebody_elses_project_one_cause_fails_one_test(tmp_path):
     with server_of(_Handler, fault=_FAULTS["closes"][0], status=0) as server:
         command = [sys.executable, "-m", "pytest", "-rs", "-p", "roaas_pytest", "test_checks.py"]
         command += ["--robot-rest", server.url]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+        done = ended(*command, cwd=tmp_path)
     assert "1 failed, 1 skipped" in done.stdout, done.stdout
     assert "Sent `GET /robot/sensors/`. Expected a response (rest-resources/sensors-type" in done.stdout
     assert "Not tested, because of a failure before: GET /robot/sensors/: no response" in done.stdout

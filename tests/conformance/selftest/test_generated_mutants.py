@@ -90,6 +90,10 @@ def test_answers_are_altered_in_json_and_xml():
         [json.dumps({"x": math.nextafter(1, 2), "y": 0}).encode()],
         1,
     )
+    seen, altered = answered("delay:getLinearVelocity:answer.x:json", request, b'{"x":1}', b'{"x":1.0}', b'{"x":2}')
+    assert (seen, altered) == ([b'{"x":1}', b'{"x":1.0}', b'{"x": 1.0}'], 1)
+    seen, altered = answered("duplicate:getLinearVelocity:answer.x:json", request, b'{"x":1}')
+    assert (seen, altered) == ([b'{"x": 1, "x": 1}'], 1)
     vector = b"<Vector3><x>1.0</x><y>2.0</y></Vector3>"
     seen, _ = answered("swap:getLinearVelocity:answer.x:xml", request, vector, media_type="application/xml")
     assert b"<x>2.0</x><y>1.0</y>" in seen[0]

@@ -79,8 +79,7 @@ def test_a_missing_text_is_filled_by_the_descriptions_example(door):
 
 def test_a_hook_is_read_from_the_packs_folder(tmp_path):
     source = "from conformance.mutation.self_test import *\nSELFTEST = SelfTest(classes={'put.*': ('doors',)})\n"
-    contract = pack(tmp_path, selftest__py=source)
-    assert classes_of(contract, "putDoor", Interface.REST) == ("doors",)
+    assert classes_of(pack(tmp_path, selftest__py=source), "putDoor", Interface.REST) == ("doors",)
 
 
 @pytest.mark.parametrize("source", ["SELFTEST = 1", "x = 1", "import no_such_module", "def"])

@@ -76,7 +76,7 @@ def test_a_full_statement(tmp_path):
         ("[limits]\nlinear_m_s = 'fast'", "[limits] linear_m_s = 'fast' must be a number, and not negative"),
         ("[limits]\nlinear_m_s = true", "[limits] linear_m_s = True must be a number, and not negative"),
         *(
-            (f"[limits]\n{line}", f"{line} must be a number {bounds}")
+            (f"[limits]\n{line}", f"[limits] {line} must be a number {bounds}")
             for line, bounds in (
                 ("settle_s = nan", "from 0 to 5"),
                 ("settle_s = inf", "from 0 to 5"),
@@ -133,14 +133,9 @@ def test_noise_rate_and_clock_are_declared_among_the_limits(tmp_path):
     limits = _load(tmp_path, text).limits
     assert (limits.odometry_hz, limits.time_scale) == (10, 2)
     assert limits.noise == Noise(position_m=0.01, linear_m_s=0.02)
-    assert limits.tolerances == {
-        "tolerance": 0.05,
-        "tolerance_abs": 0.02,
-        "tolerance_linear_m_s": 0.02,
-        "tolerance_angular_rad_s": 0.02,
-        "noise_position_m": 0.01,
-        "noise_linear_m_s": 0.02,
-    }
+    declared = dict.fromkeys(("tolerance_abs", "tolerance_linear_m_s", "tolerance_angular_rad_s"), 0.02)
+    declared |= {"tolerance": 0.05, "noise_position_m": 0.01, "noise_linear_m_s": 0.02}
+    assert limits.tolerances == declared
     assert Statement().limits.odometry_hz is None
 
 

@@ -184,6 +184,5 @@ def test_a_request_that_nobody_can_have_read_is_sent_again_whatever_its_method()
 def test_what_several_clients_send_again_is_counted(stale):
     server, client = stale
     rounds = [[Outgoing(client, "GET", "/")] * 2] * 2
-    answered = send_together(rounds)
-    assert [attempt.response.status for attempts in answered for attempt in attempts] == [204] * 4
+    assert [attempt.response.status for attempts in send_together(rounds) for attempt in attempts] == [204] * 4
     assert (client.connection.resent, len(server.seen)) == (2, 6)

@@ -134,8 +134,7 @@ def test_ipv6_and_a_base_path(toy):
     robot = toy("--prefix", "/fleet/7", host="::1")
     connection = connect(robot)
     assert connection.endpoint.authority == f"[::1]:{robot.port}"
-    request = rest_request(connection.endpoint, "pose", {}, None)
-    assert connection.call(request).status == 200
+    assert connection.call(rest_request(connection.endpoint, "pose", {}, None)).status == 200
     assert connection.call(get(Endpoint.parse(f"http://[::1]:{robot.port}"))).status == 404
 
 

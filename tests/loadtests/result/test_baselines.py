@@ -70,8 +70,7 @@ def test_results_are_stored_compared_and_told_as_a_history(load):
 
 
 def test_what_is_not_valid_is_not_stored_and_other_loads_are_not_compared(load):
-    invalid = load("--save", "main", valid=False, invalid_because=["the machine was busy"])
-    assert "not stored" in invalid.output
+    assert "not stored" in load("--save", "main", valid=False, invalid_because=["the machine was busy"]).output
     assert not Path(".roaas").exists()
     plan = json.loads(EXAMPLE.read_text())["plan"]
     load("--save", "main")

@@ -44,8 +44,7 @@ def test_a_cancelled_goal_leaves_the_robot_at_rest_within_the_settle_time(robot)
     handle = robot.send(pose(81.0, 39.0))
     until(lambda: robot.velocity[0] > 0.5)
     cancelled_at = time.monotonic()
-    response = robot.ask(handle.cancel_goal_async)
-    assert len(response.goals_canceling) == 1
+    assert len(robot.ask(handle.cancel_goal_async).goals_canceling) == 1
     assert robot.end_of(handle) == GoalStatus.STATUS_CANCELED
     until(lambda: robot.rests)
     assert robot.odometry[-1][0] - cancelled_at < 0.6

@@ -74,8 +74,7 @@ def test_the_papers_places_reach_each_other_quickly(start, goal):
 
 
 def test_a_goal_where_the_robot_stands_is_a_turn():
-    path = PLANNER.plan((*DEPOT, 0.0), (*DEPOT, 1.5))
-    assert path.tolist() == [[*DEPOT, 0.0], [*DEPOT, 1.5]]
+    assert PLANNER.plan((*DEPOT, 0.0), (*DEPOT, 1.5)).tolist() == [[*DEPOT, 0.0], [*DEPOT, 1.5]]
 
 
 @pytest.mark.parametrize(

@@ -77,16 +77,13 @@ class Navigator(Node):
         group = ReentrantCallbackGroup()
         for name in ("bt_navigator", "planner_server"):
             self.create_service(GetState, f"{name}/get_state", self._get_state, callback_group=group)
-        self._planner = ActionServer(
-            self,
-            ComputePathToPose,
-            "compute_path_to_pose",
-            execute_callback=self._plan,
-            goal_callback=lambda _: GoalResponse.ACCEPT if self._state == "active" else GoalResponse.REJECT,
-            callback_group=group,
-        )
+        calls = {"goal_callback": self._taken_when_active, "callback_group": group}
+        self._planner = ActionServer(self, ComputePathToPose, "compute_path_to_pose", self._plan, **calls)
         self._group = group
         self._server: ActionServer | None = self._serve()
+
+    def _taken_when_active(self, _goal: Any) -> GoalResponse:
+        return GoalResponse.ACCEPT if self._state == "active" else GoalResponse.REJECT
 
     def _serve(self) -> ActionServer:
         calls = {"goal_callback": self._goal, "cancel_callback": self._cancel, "callback_group": self._group}
@@ -107,7 +104,7 @@ class Navigator(Node):
         self._finished.clear()
         tell(goal=goal.pose.pose.position.x)
         self._answers.wait()
-        return GoalResponse.ACCEPT if self._state == "active" else GoalResponse.REJECT
+        return self._taken_when_active(goal)
 
     def _cancel(self, handle: Any) -> CancelResponse:
         tell(cancel=handle.request.pose.pose.position.x)

@@ -156,11 +156,8 @@ def test_https_tokens_with_scopes_and_the_public_address(domain_id, tmp_path):
     tokens = tmp_path / "tokens"
     tokens.write_text(TOKENS)
     options = [f"--tls-cert={certificate}", f"--tls-key={key}", f"--token-file={tokens}", "--time-scale=20"]
-    options += [
-        "--trusted-proxy=127.0.0.1",
-        "--allowed-host=proxy.example",
-        "--public-url=rest=https://out.example/r2/",
-    ]
+    options += ["--trusted-proxy=127.0.0.1", "--allowed-host=proxy.example"]
+    options += ["--public-url=rest=https://out.example/r2/"]
     trusted = ssl.create_default_context(cafile=str(certificate))
     with running_robot(domain_id, *options, verify=trusted) as served:
         assert served.rest.startswith("https://127.0.0.1:")
@@ -193,8 +190,7 @@ def test_https_tokens_with_scopes_and_the_public_address(domain_id, tmp_path):
             assert served.client.options(pose, headers=bearer(token)).status_code == 204
 
         # Hosts and origins: refused before the token is looked at, or in spite of it.
-        evil = get(pose, headers={"Host": "evil.test"})
-        assert "--allowed-host" in problem(evil, 421)
+        assert "--allowed-host" in problem(get(pose, headers={"Host": "evil.test"}), 421)
         forged = put(served.rest + delivery_path(), headers=bearer("all") | {"Origin": "https://evil.test"})
         assert forged.status_code == 403
 
@@ -233,16 +229,7 @@ def assert_only_tls_from_1_2(rest: str, certificate: Path) -> None:
 def assert_certified_over_https(served, certificate: Path) -> None:
     """Have the suite judge what depends on TLS, tokens and addresses: raw sockets, zeep, a WSDL's own address."""
     asked = ("http/authentication", "http/pipelining", "describe/wsdl-address", "soap-subscribers/interop")
-    outcome = run_job(
-        Job(
-            Contract.load().directory,
-            REFERENCE.statement,
-            served.rest,
-            served.publishers + "?wsdl",
-            served.subscribers + "?wsdl",
-            requirements=asked,
-            token=TOKENS.split()[-5],
-            endpoints={"ca_file": str(certificate)},
-        )
-    )
+    services = [f"{url}?wsdl" for url in (served.publishers, served.subscribers)]
+    named = {"requirements": asked, "token": TOKENS.split()[-5], "endpoints": {"ca_file": str(certificate)}}
+    outcome = run_job(Job(Contract.load().directory, REFERENCE.statement, served.rest, *services, **named))
     assert outcome.verdicts == dict.fromkeys(asked, "pass"), outcome.reasons

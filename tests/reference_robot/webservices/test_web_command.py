@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from processes import ended
 from web_messages import delivery_envelope, delivery_path, goal, twist
 from web_robot import eventually, problem, ros_environment, running_robot, usage_error
 
@@ -77,7 +78,7 @@ def test_the_robot_ends_with_its_simulation(domain_id):
 @pytest.mark.parametrize("package", ["rclpy", "mybot_delivery_app", "nav2_msgs", "httptools"])
 def test_a_missing_package_is_named_with_its_remedy(package):
     program = f"import sys; sys.modules[{package!r}] = None; from reference_robot.cli import robot; robot(['--attach'])"
-    done = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, text=True, timeout=240)
+    done = ended(sys.executable, "-c", program)
     assert (done.returncode, package in done.stderr) == (2, True), done.stderr
     assert "pip install" in done.stderr
     assert "Traceback" not in done.stderr
@@ -88,9 +89,7 @@ def test_a_port_in_use_and_an_address_that_is_not_ours_are_named():
         port = taken.getsockname()[1]
         for named, option in ((str(port), f"--soap-port={port}"), ("192.0.2.1", "--host=192.0.2.1")):
             command = [*COMMAND, "--attach", "--insecure", option]
-            done = subprocess.run(
-                command, capture_output=True, text=True, env=ros_environment(), timeout=240, check=False
-            )
+            done = ended(*command, env=ros_environment())
             assert (done.returncode, done.stdout) == (2, "")
             assert named in done.stderr
             assert "Traceback" not in done.stderr

@@ -11,6 +11,7 @@ import sys
 
 import pytest
 from click.testing import CliRunner
+from processes import ended
 from vendors import Door, requirement
 
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key, signer_of
@@ -36,7 +37,7 @@ def test_openssl_verifies_the_signature(desk, tmp_path):
     (tmp_path / "signature").write_bytes(base64.b64decode(document["signatures"][0]["sig"]))
     command = ["openssl", "pkeyutl", "-verify", "-pubin", "-inkey", desk.keys / PUBLIC_NAME, "-rawin"]
     command += ["-in", tmp_path / "signed", "-sigfile", tmp_path / "signature"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = ended(*command)
     assert done.returncode == 0, done.stderr
     (tmp_path / "signed").write_bytes(encoded + b" ")
     assert subprocess.run(command, capture_output=True, check=False).returncode != 0
@@ -86,15 +87,10 @@ def test_keys_are_not_taken_for_one_another(tmp_path):
 
 def test_subjects_are_the_files_that_the_run_was_made_with(desk):
     subjects = {item["name"]: item["digest"]["sha256"] for item in json.loads(desk.payload)["subject"]}
-    assert list(subjects) == [
-        "result.json",
-        "certificate.html",
-        "certificate-print.html",
-        "statement",
-        "contract/openapi.yaml",
-    ]
+    files = ["result.json", "certificate.html", "certificate-print.html"]
+    assert list(subjects) == [*files, "statement", "contract/openapi.yaml"]
     assert subjects["statement"] == "1" * 64
-    done = subprocess.run(["sha256sum", desk.folder / "result.json"], capture_output=True, text=True, check=True)
+    done = ended("sha256sum", desk.folder / "result.json", check=True)
     assert done.stdout.split()[0] == subjects["result.json"]
 
 
@@ -204,7 +200,7 @@ def test_the_page_of_certificates_shows_the_default_policy(tmp_path, pytestconfi
 def test_verifying_is_cold_under_a_second(desk):
     command = [sys.executable, "-m", "roaas", "verify", desk.envelope, "--key", desk.keys / PUBLIC_NAME]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = ended(*command)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     assert done.returncode == 1, done.stderr
     assert "which the policy does not trust" in done.stdout, "the suite of the test is not the one that is installed"
@@ -214,5 +210,5 @@ def test_verifying_is_cold_under_a_second(desk):
 
 def test_verifying_imports_nothing_heavy():
     code = "import sys, reports.cli.attestation; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = ended(sys.executable, "-c", code, check=True)
     assert not {"jinja2", "jsonschema", "lxml", "numpy", "matplotlib", "rclpy"} & set(done.stdout.split())

@@ -207,15 +207,8 @@ def test_an_envelope_that_holds_what_is_not_known_is_not_handed_on(host, monkeyp
 
 
 def test_hostile_names_are_shown_and_do_nothing(host, hostile_text):
-    names = [
-        hostile_text.replace("\ud800", ""),
-        "<script>alert(1)</script>",
-        "../../../etc/passwd",
-        "..",
-        "CON",
-        "/",
-        "\0",
-    ]
+    names = [hostile_text.replace("\ud800", ""), "<script>alert(1)</script>", "../../../etc/passwd", "..", "CON"]
+    names += ["/", "\0"]
     for number, name in enumerate(names):
         host.sign(str(number), statement__robot={"name": name, "vendor": name, "version": name})
     host.sign("none", statement__robot={})

@@ -11,20 +11,11 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import operations_of
 from conformance.documents.representation import UnreadableError, flattened, read
 
-SCHEMA = {
-    "type": "object",
-    "required": ["name", "on", "count", "values", "parts"],
-    "properties": {
-        "name": {"type": "string"},
-        "on": {"type": "boolean"},
-        "count": {"type": "integer"},
-        "values": {"type": "array", "items": {"type": "number"}},
-        "parts": {
-            "type": "array",
-            "items": {"type": "object", "required": ["x"], "properties": {"x": {"type": "number"}}},
-        },
-    },
-}
+NUMBER = {"type": "number"}
+PART = {"type": "object", "required": ["x"], "properties": {"x": NUMBER}}
+FIELDS = {name: {"type": kind} for name, kind in (("name", "string"), ("on", "boolean"), ("count", "integer"))}
+FIELDS |= {name: {"type": "array", "items": item} for name, item in (("values", NUMBER), ("parts", PART))}
+SCHEMA = {"type": "object", "required": list(FIELDS), "properties": FIELDS}
 VALUE = {"name": "12", "on": True, "count": 7, "values": [0.1, 1e-05], "parts": [{"x": 1.5}, {"x": -0.0}]}
 FRONT = "<m><name>12</name><on>true</on><count>7</count>"
 

@@ -89,8 +89,7 @@ def test_endless_references_end():
         include = f'<xs:include schemaLocation="a?n={number + 1}"/>'
         return f'<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema">{include}</xs:schema>'.encode()
 
-    robot = describe(WSDL, BASE, fetch)
-    assert "more than" in robot.missing[0][1]
+    assert "more than" in describe(WSDL, BASE, fetch).missing[0][1]
 
 
 @pytest.mark.parametrize("document", [b"", b"<a/>", b"<html>", b"\x00"])

@@ -37,30 +37,35 @@ def test_what_is_no_soap_answer_is_none_to_judge():
     assert broken("not found", 404, "text/plain") == set()
 
 
+FAULTS = [
+    (r"(faultcode>)s:", r"\1", "faultcode-qualified"),
+    (r"(faultcode>)s:", r"\1nowhere:", "faultcode-qualified"),
+    (":Client<", ":Sender<", "R1004"),
+    ("<faultstring>.*?</faultstring>", "", "fault-complete"),
+    ("<faultcode>.*?</faultcode>", "", "fault-complete"),
+    ("(</faultstring>)", r"\1<time>1</time>", "R1000"),
+    ("faultstring>", "s:faultstring>", "R1001"),
+    ("(</faultstring>)", r"Traceback (most recent call last): \1", "fault-no-traceback"),
+    ("(<s:Fault)", r"<?a b?>\1", "R1009"),
+]
+RESPONSES = [
+    ("$", "<?a b?>", "R1009"),
+    ("^", "<?a b?>", "R1009"),
+    ("^", "<!DOCTYPE s:Envelope>", "R1008"),
+    ("(</s:Envelope>)", r'<x xmlns="urn:x"/>\1', "R1011"),
+    ("(<s:Body)", r'<s:Header><a xmlns="urn:a" s:mustUnderstand="true"/></s:Header>\1', "R1013"),
+    ("t:GetGoalResponse xmlns:t=.*?/>", "GetGoalResponse/>", "R1014"),
+    ("(GetGoalResponse) ", r'\1 s:encodingStyle="urn:a" ', "R1006"),
+    ("(<s:Body)", r'\1 s:encodingStyle="urn:a"', "R1005"),
+    ("GetGoalResponse", "GetGoal", "R2712"),
+    ("(?s).*", "<html/>", "content-type"),
+    ("(?s).*", "done", "content-type"),
+]
+
+
 @pytest.mark.parametrize(
     ("answer", "status", "old", "new", "name"),
-    [
-        (FAULT, 500, r"(faultcode>)s:", r"\1", "faultcode-qualified"),
-        (FAULT, 500, r"(faultcode>)s:", r"\1nowhere:", "faultcode-qualified"),
-        (FAULT, 500, ":Client<", ":Sender<", "R1004"),
-        (FAULT, 500, "<faultstring>.*?</faultstring>", "", "fault-complete"),
-        (FAULT, 500, "<faultcode>.*?</faultcode>", "", "fault-complete"),
-        (FAULT, 500, "(</faultstring>)", r"\1<time>1</time>", "R1000"),
-        (FAULT, 500, "faultstring>", "s:faultstring>", "R1001"),
-        (FAULT, 500, "(</faultstring>)", r"Traceback (most recent call last): \1", "fault-no-traceback"),
-        (FAULT, 500, "(<s:Fault)", r"<?a b?>\1", "R1009"),
-        (RESPONSE, 200, "$", "<?a b?>", "R1009"),
-        (RESPONSE, 200, "^", "<?a b?>", "R1009"),
-        (RESPONSE, 200, "^", "<!DOCTYPE s:Envelope>", "R1008"),
-        (RESPONSE, 200, "(</s:Envelope>)", r'<x xmlns="urn:x"/>\1', "R1011"),
-        (RESPONSE, 200, "(<s:Body)", r'<s:Header><a xmlns="urn:a" s:mustUnderstand="true"/></s:Header>\1', "R1013"),
-        (RESPONSE, 200, "t:GetGoalResponse xmlns:t=.*?/>", "GetGoalResponse/>", "R1014"),
-        (RESPONSE, 200, "(GetGoalResponse) ", r'\1 s:encodingStyle="urn:a" ', "R1006"),
-        (RESPONSE, 200, "(<s:Body)", r'\1 s:encodingStyle="urn:a"', "R1005"),
-        (RESPONSE, 200, "GetGoalResponse", "GetGoal", "R2712"),
-        (RESPONSE, 200, "(?s).*", "<html/>", "content-type"),
-        (RESPONSE, 200, "(?s).*", "done", "content-type"),
-    ],
+    [*((FAULT, 500, *row) for row in FAULTS), *((RESPONSE, 200, *row) for row in RESPONSES)],
 )
 def test_breaches_of_an_answer(answer, status, old, new, name):
     assert name in broken(re.sub(old, new, answer, count=0 if answer is FAULT else 1), status)

@@ -109,5 +109,4 @@ def test_one_that_was_renewed_too_late_is_not_blamed():
 
 
 def test_who_is_held_up_many_times_tries_again():
-    driven = _renewing(looks=dict.fromkeys(range(16), 1.1))
-    assert driven.judged[_RENEWAL] is True
+    assert _renewing(looks=dict.fromkeys(range(16), 1.1)).judged[_RENEWAL] is True

@@ -151,8 +151,7 @@ def test_a_robot_is_not_faster_than_it_was_ever_asked_to_be():
     assert speed(seen(_AHEAD, _AHEAD, _AHEAD)) is None
     fast = _AHEAD._replace(linear_x=-0.7)
     for velocities, holds in (((_AHEAD,) * 3, True), ((fast,) * 3, False), ((_AHEAD, fast, _AHEAD), True)):
-        trace = seen(*velocities).commanded(command()).commanded(command(STILL, at=1.0))
-        assert speed(trace).holds is holds
+        assert speed(seen(*velocities).commanded(command()).commanded(command(STILL, at=1.0))).holds is holds
 
 
 def test_times_of_commands():

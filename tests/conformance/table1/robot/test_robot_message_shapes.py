@@ -15,7 +15,7 @@ def answer(body: bytes, status: int = 200) -> Response:
 
 def test_a_complete_message_has_no_fault_whatever_a_robot_adds_to_it():
     message = copy.deepcopy(odometry()) | {"battery": 0.5}
-    message["pose"]["pose"]["position"]["w"] = None
+    message["pose"]["pose"]["position"] = {"x": 0, "y": 1.5, "z": -2e3, "w": None}
     assert ODOMETRY.problem(message) == ""
     assert "battery" not in projected(message, ODOMETRY.schema)
 

@@ -27,23 +27,14 @@ class Body:
         goal_ends_s: how long it has a goal, after which its heading is another one by yaw_after_goal.
     """
 
-    def __init__(
-        self,
-        *,
-        forgets=False,
-        refuses=0,
-        stands=False,
-        takes_s=0.05,
-        slow_s=0.0,
-        goal_ends_s=math.inf,
-        yaw_after_goal=0.0,
-    ) -> None:
-        self.forgets, self.refuses, self.stands = forgets, refuses, stands
-        self.takes_s, self.slow_s = takes_s, slow_s
+    forgets, refuses, stands, takes_s, slow_s = False, 0, False, 0.05, 0.0
+    goal_ends_s, yaw_after_goal = math.inf, 0.0
+
+    def __init__(self, **given: float) -> None:
+        vars(self).update(given)
         self.told = STILL.twist
         self.moves_from = self.until = -math.inf
         self.goal: dict | None = None
-        self.goal_ends_s, self.yaw_after_goal = goal_ends_s, yaw_after_goal
         self.goal_until = math.inf
         self.yaw = 0.0
 

@@ -65,8 +65,7 @@ def test_what_a_robot_does_is_seen_through_its_noise(hz, seed):
 
 @given(rates, seeds, st.sampled_from((0.9, 1.1)))
 def test_an_error_of_a_tenth_is_seen_through_any_noise(hz, seed, factor):
-    wrong = Velocity(*(factor * value for value in _FAST))
-    assert shown(watched([wrong] * 120, hz, seed), _FAST) is False
+    assert shown(watched([Velocity(*(factor * value for value in _FAST))] * 120, hz, seed), _FAST) is False
 
 
 @given(rates, outliers, st.integers(1, 40))
@@ -115,8 +114,7 @@ def let_go(holds: float, hz: float = 50, begins: float = 0.1, seed: int | None =
     for index in range(150):
         left = 1 - max(0.0, 0.02 * index - holds) / 0.2
         true.append(Velocity(*(max(0.0, left) * value for value in _FAST)))
-    turns = [one for one in watched(true, hz, seed) if one.at >= begins]
-    return LetGo(_FAST, 0.0, 0.02, tuple(turns))
+    return LetGo(_FAST, 0.0, 0.02, tuple([one for one in watched(true, hz, seed) if one.at >= begins]))
 
 
 @few
@@ -151,8 +149,7 @@ def in_silence(holds: float, hz: float = 50, seed: int | None = None) -> LetGo:
     whole = let_go(holds, hz, seed=seed)
     before = tuple(one for one in whole.turns if one.at < 0.95)
     until = LetGo(_FAST, 0.0, 0.02, before).longest(_LIMITS) + 0.02
-    behind = tuple(one for one in whole.turns if one.at > until)
-    return LetGo(_FAST, 0.0, 0.02, before + behind, len(before))
+    return LetGo(_FAST, 0.0, 0.02, before + tuple(one for one in whole.turns if one.at > until), len(before))
 
 
 @few
