@@ -6,13 +6,13 @@ is what it does not see: circles between modules, modules that are named in stri
 
 import ast
 import re
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
 
 import grimp
 import pytest
+from processes import ended
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("conformance", "reference_robot", "loadtests", "reports")
@@ -42,7 +42,7 @@ def imports():
 def test_the_floors_hold():
     lint = "from importlinter.cli import lint_imports_command; lint_imports_command()"
     command = [sys.executable, "-c", lint, "--no-cache"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
+    done = ended(*command, cwd=ROOT)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -133,5 +133,5 @@ def test_the_drawing_in_contributing_is_the_real_tree():
 def test_the_suite_and_the_load_tests_start_without_ros(command):
     blocked = "import sys; sys.modules['rclpy'] = None; import roaas; "
     call = f"roaas.main(['{command}', '--help'], standalone_mode=False)"
-    done = subprocess.run([sys.executable, "-c", blocked + call], capture_output=True, text=True, check=False)
+    done = ended(sys.executable, "-c", blocked + call)
     assert done.returncode == 0, done.stderr

@@ -3,7 +3,6 @@
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 from itertools import dropwhile, groupby
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 import click
 import pytest
 import yaml
+from processes import ended
 
 from conformance.contract.pack import Contract
 from conformance.packs.table1.selftest import PLAIN
@@ -46,19 +46,8 @@ def commands():
 
 COMMANDS = list(commands())
 # Of others: what is here of them is looked at, and they are run by hand.
-OTHERS = {
-    "curl",
-    "docker",
-    "make",
-    "openssl",
-    "python",
-    "roaas",
-    "roaas-ci",
-    "roaas-load-node",
-    "ros2",
-    "sudo",
-    "umask",
-}
+OTHERS = {"curl", "docker", "make", "openssl", "python", "ros2", "sudo", "umask"}
+OTHERS |= {"roaas", "roaas-ci", "roaas-load-node"}
 
 
 def test_there_are_commands_and_no_program_that_nobody_looked_at():
@@ -102,8 +91,7 @@ def test_a_newcomers_way_through_the_pages(tmp_path):
         def run(start, folder=tmp_path):
             rest = robot.rest.removeprefix("http://")
             words = [word.replace("robot:7003", rest) for word in documented(start)[1:]]
-            command = [sys.executable, "-m", "roaas", *words]
-            return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=240, check=False)
+            return ended(sys.executable, "-m", "roaas", *words, cwd=folder)
 
         assert run("roaas certify --init robot.toml --rest http://robot:7003").returncode == 0
         statement = tmp_path / "robot.toml"
@@ -135,7 +123,7 @@ def test_a_file_for_a_ci_service_is_valid(text, tmp_path):
     (tmp_path / "file.yml").write_text(text, encoding="utf-8")
     linter = Path(sys.executable).with_name("check-jsonschema")
     command = [linter, "--builtin-schema", f"vendor.{kind}", tmp_path / "file.yml"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    done = ended(*command)
     assert done.returncode == 0, done.stdout
     for job in document.get("jobs", {}).values():
         ours = next(step for step in job["steps"] if "/ci/github@" in step.get("uses", ""))

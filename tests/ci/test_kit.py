@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from processes import ended
 
 from conformance.contract.pack import Contract
 from conformance.packs.table1.mutants import MUTANTS
@@ -28,7 +29,6 @@ CI = Path(__file__).parents[2] / "ci"
 ACTION = yaml.safe_load((CI / "github" / "action.yml").read_text(encoding="utf-8"))
 TEMPLATE = yaml.safe_load((CI / "gitlab" / "roaas.yml").read_text(encoding="utf-8"))
 FILES = {"result.json", "certificate.html", *(one.file for one in FORMATS.values())}
-_LIMIT_S = 240
 
 
 @pytest.fixture(scope="module")
@@ -72,9 +72,7 @@ def absent():
 
 def bash(script, environment, folder):
     command = ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", script]
-    return subprocess.run(
-        command, env=environment, cwd=folder, capture_output=True, text=True, timeout=_LIMIT_S, check=False
-    )
+    return ended(*command, env=environment, cwd=folder)
 
 
 def on_github(programs, folder, **inputs):
@@ -161,8 +159,7 @@ def test_wrong_usage_is_red_and_no_old_result_is_taken_for_new(programs, absent,
     out.mkdir()
     for name in {*FILES, ENVELOPE_NAME}:
         (out / name).write_text("of an earlier run", encoding="utf-8")
-    done = on_github(programs, tmp_path, rest=absent, statement="$(touch injected).toml")
-    assert done.returncode == 2
+    assert on_github(programs, tmp_path, rest=absent, statement="$(touch injected).toml").returncode == 2
     assert list(out.iterdir()) == []
     assert not (tmp_path / "injected").exists()
     assert "exit code 2" in (tmp_path / "summary").read_text(encoding="utf-8")
@@ -174,14 +171,10 @@ def text_of(image):
 
 
 def test_the_images_commands_do_what_they_are_for(programs, domain_id):
-    said = {
-        name: [
-            word
-            for found in re.findall(r"^(?:ENTRYPOINT|CMD) (\[.*\])$", text_of(name), re.MULTILINE)
-            for word in json.loads(found)
-        ]
-        for name in ("suite", "robot")
-    }
+    said = {}
+    for name in ("suite", "robot"):
+        found = re.findall(r"^(?:ENTRYPOINT|CMD) (\[.*\])$", text_of(name), re.MULTILINE)
+        said[name] = [word for words in found for word in json.loads(words)]
     environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}", "ROS_DOMAIN_ID": str(domain_id)}
     assert bash(" ".join(said["suite"]), environment, programs).returncode == 0
     command = [*said["robot"], "--rest-port=0", "--soap-port=0"]
@@ -222,5 +215,5 @@ def test_what_others_wrote_is_pinned():
 )
 def test_the_files_pass_the_fields_linters(command):
     program = Path(sys.executable).with_name(command[0])
-    done = subprocess.run([program, *command[1:]], cwd=CI, capture_output=True, text=True, timeout=60, check=False)
+    done = ended(program, *command[1:], cwd=CI)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -10,6 +10,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from processes import ended
 
 from conformance.contract.pack import Contract
 from conformance.engine.suite import suite_digest
@@ -40,7 +41,7 @@ def built(folder, mode):
     (folder / "src").mkdir()
     sources(folder / "src", mode)
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, folder / "src"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    done = ended(*command)
     assert done.returncode == 0, done.stdout + done.stderr
     return {path.name: path for path in folder.iterdir() if path.is_file()}
 
@@ -74,10 +75,7 @@ def run(installed, folder, *words):
     path = os.pathsep.join(map(str, [folder, installed]))
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST")}
     environment |= {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, *map(str, words)]
-    return subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=240, check=False
-    )
+    return ended(sys.executable, *map(str, words), cwd=folder, env=environment)
 
 
 def test_the_same_sources_give_the_same_bits(twice):

@@ -116,8 +116,7 @@ def test_recorded_traces_are_judged_again_without_the_device(results):
 def test_two_results_are_compared(results):
     folder, _ = results
     done = roaas("diff", folder / "good", folder / "broken")
-    assert done.exit_code == 1
-    assert "lamp/target" in done.output
+    assert (done.exit_code, "lamp/target" in done.output) == (1, True), done.output
 
 
 def test_the_plan_sends_nothing(closed_port):
@@ -138,16 +137,7 @@ def test_a_fleet_is_judged_by_the_pack(tmp_path):
     assert json.loads((out / "fleet.json").read_text(encoding="utf-8"))["class_titles"]["lamp"].startswith("The lamp")
 
 
-def test_mutants_by_rule_are_made_for_the_pack(tmp_path):
-    out = tmp_path / "selftest"
-    command = ["selftest", "--contract", LAMP, "--generated", "4", "--seed", "77", "--parallel", "1", "--out", out]
-    done = roaas(*command)
-    assert done.exit_code in {0, 1}, done.output
-    assert re.search(r"Mutants by rule killed: [1-4] of [1-4]", done.output), done.output
-
-
 def test_each_of_its_own_mutants_is_killed(tmp_path):
     command = ["selftest", "--contract", LAMP, "--faults", "lamp-*", "--seeds", "1", "--no-variants", "--no-compare"]
     done = roaas(*command, "--parallel", "1", "--out", tmp_path / "selftest")
-    assert done.exit_code == 0, done.output
-    assert "5 of 5 mutants killed" in done.output
+    assert (done.exit_code, "5 of 5 mutants killed" in done.output) == (0, True), done.output

@@ -45,25 +45,36 @@ class Toy:
 
 
 @pytest.fixture
-def toy():
-    """Start a toy robot with options, and words before its command; all end with the test."""
-    started = []
+def started():
+    """Start a program of this folder that prints `ready PORT`; gives both. All end with the test."""
+    running = []
+
+    def start(script, *options, on=()):
+        command = [*on, sys.executable, HERE / script, *options]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        running.append(process)
+        word, port = process.stdout.readline().split()
+        assert word == "ready"
+        return process, int(port)
+
+    yield start
+    for process in running:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+@pytest.fixture
+def toy(started):
+    """Start a toy robot with options, and words before its command."""
 
     def start(*options, host="127.0.0.1", on=()):
         words = [str(option) for option in options]
-        process = subprocess.Popen(
-            [*on, sys.executable, HERE / "toy_robot.py", "--host", host, *words], stdout=subprocess.PIPE, text=True
-        )
-        started.append(process)
-        word, port = process.stdout.readline().split()
-        assert word == "ready"
+        process, port = started("toy_robot.py", "--host", host, *words, on=on)
         prefix = words[words.index("--prefix") + 1] if "--prefix" in words else ""
-        return Toy(process, int(port), host, "https" if "--tls" in words else "http", prefix)
+        return Toy(process, port, host, "https" if "--tls" in words else "http", prefix)
 
-    yield start
-    for process in started:
-        process.kill()
-        process.wait()
+    return start
 
 
 @dataclass

@@ -60,8 +60,7 @@ def test_a_slow_robot_is_seen_to_be_slow_and_misses_its_threshold(toy, load, tmp
     assert series["spans_ms"]["server"] is None, "the robot does not say"
     assert series["service_ms"]["p99"] is None
     assert "needs 1000" in series["reasons"]["p99"]
-    assert result["thresholds"][0]["outcome"] == "missed"
-    assert result["comparisons"] == []
+    assert (result["thresholds"][0]["outcome"], result["comparisons"]) == ("missed", [])
     assert run.code == (1 if result["valid"] else 4)
     assert result["plan"]["block_s"] >= 0.099, "long beside an answer"
 
@@ -132,16 +131,14 @@ def test_repeats_begin_with_new_connections_and_a_command(toy, load, tmp_path):
     result = run.result
     assert mark.read_text() == "x", run.err
     assert str(tmp_path) not in json.dumps(result)
-    assert result["plan"]["repeats"] == 2
-    assert {block["repeat"] for block in result["blocks"]} == {0, 1}
+    assert (result["plan"]["repeats"], {block["repeat"] for block in result["blocks"]}) == (2, {0, 1})
     assert [repeat["repeat"] for repeat in run.series("pose", "rest")["repeats"]] == [0, 1]
     assert max(point["t_s"] for entry in result["time_series"]["series"] for point in entry["points"]) > 3
     assert result["generator"]["connects"] >= 2
     assert process.returncode == run.code
     command.write_text("#!/bin/sh\nexit 3\n")
     failed = load(*options, "--restart-command", command)
-    assert failed.code == 3
-    assert "exit code 3" in failed.err
+    assert (failed.code, "exit code 3" in failed.err) == (3, True), failed.err
     assert sum(entry["count"] for entry in failed.result["series"]) > 40, "what was measured is kept"
 
 
@@ -150,8 +147,7 @@ def test_a_token_and_a_base_path(toy, load, tmp_path):
     token.write_text("s3same\n")
     robot = toy("--token", "s3same", "--prefix", "/fleet/7")
     refused = load("--rest", robot.url, SHORT)
-    assert refused.code == 4
-    assert "--token-file" in refused.err
+    assert (refused.code, "--token-file" in refused.err) == (4, True), refused.err
     run = load(*robot.both(), SHORT, "--client zeep --token-file", token)
     result = run.result
     assert all(entry["count"] and not entry["errors"] for entry in result["series"])
@@ -161,23 +157,20 @@ def test_a_token_and_a_base_path(toy, load, tmp_path):
 def test_tls(toy, load, certificate):
     robot = toy("--tls", *certificate)
     distrusting = load("--rest", robot.url, SHORT)
-    assert distrusting.code == 3
-    assert "ca_file" in distrusting.err
+    assert (distrusting.code, "ca_file" in distrusting.err) == (3, True), distrusting.err
     run = load(*robot.both(), SHORT, "--ca-file", certificate[0])
     assert all(entry["count"] and not entry["errors"] for entry in run.result["series"])
 
 
 def test_nobody_there(load, free_port):
     run = load("--rest", f"http://127.0.0.1:{free_port}", SHORT)
-    assert run.code == 3
-    assert "connection refused" in run.err
+    assert (run.code, "connection refused" in run.err) == (3, True), run.err
     assert not run.result["valid"]
 
 
 def test_a_wrong_wsdl(toy, load):
     run = load("--rest", toy().url, "--publishers-wsdl", CONTRACT_DIR / "subscribers.wsdl", SHORT)
-    assert run.code == 2
-    assert "has no operation 'ExecuteDeliveryRequest'" in run.err
+    assert (run.code, "has no operation 'ExecuteDeliveryRequest'" in run.err) == (2, True), run.err
 
 
 def test_a_robot_that_dies_leaves_what_was_measured(toy, load):
@@ -237,8 +230,7 @@ def test_a_worker_that_is_killed_is_missed_and_named_and_one_that_was_silent_is_
 def test_ports_in_use(toy, load, option):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         run = load("--rest", toy().url, SHORT, f"{option} {taken.getsockname()[1]} --processes 2")
-    assert run.code == 2
-    assert option in run.err
+    assert (run.code, option in run.err) == (2, True), run.err
 
 
 def test_the_closed_model_and_the_histograms_while_they_grow(toy, load, wait_for, free_port):
@@ -253,8 +245,7 @@ def test_the_closed_model_and_the_histograms_while_they_grow(toy, load, wait_for
     assert int(float(counted[0])) > 0, text
     assert 'le="+Inf"' in text
     result = run.result
-    assert result["plan"]["model"] == "closed"
-    assert result["plan"]["users"] == 2
+    assert (result["plan"]["model"], result["plan"]["users"]) == ("closed", 2)
     series = run.series("pose", "rest")
     assert series["count"] > 100
     assert series["response_ms"]["p50"] == pytest.approx(series["service_ms"]["p50"], rel=0.2)
@@ -271,8 +262,7 @@ def test_the_closed_model_and_the_histograms_while_they_grow(toy, load, wait_for
 )
 def test_usage_errors_touch_no_robot(load, options, message):
     run = load("--rest http://127.0.0.1:9", options)
-    assert run.code == 2
-    assert message in run.err
+    assert (run.code, message in run.err) == (2, True), run.err
     assert not (run.folder / "latency.json").exists()
 
 

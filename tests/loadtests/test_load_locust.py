@@ -12,6 +12,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 import yaml
+from processes import ended
 
 from loadtests.cli import load as load_command
 
@@ -26,19 +27,11 @@ locust.runners.WorkerRunner.connect_to_master = lambda runner: (connect(runner),
 """
 
 
-def ended(*command, **options):
-    return subprocess.run(command, capture_output=True, text=True, timeout=240, check=False, **options)
-
-
 def locust_until(reached, *options, folder):
     """Run Locust until what it prints says enough; returns that and its statistics in the end by name."""
-    process = subprocess.Popen(
-        [*LOCUST, "-t", "60s", *options, "--json-file", "found"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=folder,
-    )
+    command = [*LOCUST, "-t", "60s", *options, "--json-file", "found"]
+    outputs = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen(command, cwd=folder, **outputs)
     told = ""
     for line in process.stderr:
         told += line
@@ -69,8 +62,7 @@ def test_plain_locust_moves_nothing_unasked_and_says_when_it_cannot_begin(toy, t
         folder=tmp_path,
     )
     assert {name.split()[0] for name in entries} == {"pose"}, told
-    lost = ended(*LOCUST, "-u", "1", "-t", "2s", cwd=tmp_path)
-    assert "cannot begin: no endpoint" in lost.stderr
+    assert "cannot begin: no endpoint" in ended(*LOCUST, "-u", "1", "-t", "2s", cwd=tmp_path).stderr
 
 
 @pytest.mark.parametrize("habit", ["", DAWDLING], ids=["prompt", "dawdling"])
@@ -138,8 +130,7 @@ def test_the_master_lingers_for_its_result_to_be_fetched():
         *(sys.executable, "-m", "loadtests.node", "--master", "--expect-workers", "1"),
         env=os.environ | {"ROAAS_LINGER_S": "0.1"},
     )
-    assert run.returncode == 2
-    assert "no endpoint" in run.stderr
+    assert (run.returncode, "no endpoint" in run.stderr) == (2, True), run.stderr
     assert "kept for 0.1 s" in run.stderr
 
 
@@ -147,12 +138,10 @@ def test_a_worker_without_a_master_says_so_and_ends(free_port):
     hasty = "import sys, locust.runners as runners\nrunners.CONNECT_TIMEOUT, runners.CONNECT_RETRY_COUNT = 0.1, 1\n"
     words = ["--worker", "--master-host=127.0.0.1", f"--master-port={free_port}"]
     run = ended(sys.executable, "-c", hasty + NODE, *words)
-    assert run.returncode == 3
-    assert f"no master responds at 127.0.0.1:{free_port}" in run.stderr
+    assert (run.returncode, f"no master responds at 127.0.0.1:{free_port}" in run.stderr) == (3, True), run.stderr
 
 
 @pytest.mark.parametrize("words", [["--worker"], ["--worker", "--master-port", "1"]])
 def test_a_worker_has_to_know_its_master(words):
     run = ended(sys.executable, "-m", "loadtests.node", *words)
-    assert run.returncode == 1
-    assert "--master-host" in run.stderr
+    assert (run.returncode, "--master-host" in run.stderr) == (1, True), run.stderr

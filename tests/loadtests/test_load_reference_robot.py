@@ -14,12 +14,9 @@ from conformance.commandline.exit_codes import ExitCode
 @pytest.fixture
 def robot(domain_id):
     """The reference robot: (REST URL, publishers' WSDL, subscribers' WSDL, ROS domain)."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "roaas", "robot", "--rest-port", "0", "--soap-port", "0", "--domain-id", str(domain_id)],
-        stdout=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
-    )
+    command = [sys.executable, "-m", "roaas", "robot", "--rest-port=0", "--soap-port=0", f"--domain-id={domain_id}"]
+    environment = os.environ | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
     found = re.search(r"ready rest=(\S+) soap=(\S+)", process.stdout.readline())
     assert found, "the robot did not come up"
     yield found[1], found[2], found[2].replace("publisher_ws", "subscriber_ws"), domain_id

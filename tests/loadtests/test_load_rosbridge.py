@@ -1,9 +1,5 @@
 """The third way: rosbridge beside REST and SOAP, by its published protocol over a real WebSocket."""
 
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
 from conformance.commandline.exit_codes import ExitCode
@@ -12,24 +8,9 @@ RUN = "--rate 100 --duration 3 --warmup 0.4"
 
 
 @pytest.fixture
-def bridge():
+def bridge(started):
     """Start a toy rosbridge with options; gives its URL."""
-    started = []
-
-    def start(*options):
-        process = subprocess.Popen(
-            [sys.executable, Path(__file__).with_name("toy_rosbridge.py"), *options], stdout=subprocess.PIPE, text=True
-        )
-        started.append(process)
-        word, port = process.stdout.readline().split()
-        assert word == "ready"
-        return f"ws://127.0.0.1:{port}"
-
-    yield start
-    for process in started:
-        process.kill()
-        process.wait()
-        process.stdout.close()
+    return lambda *options: f"ws://127.0.0.1:{started('toy_rosbridge.py', *options)[1]}"
 
 
 def test_rosbridge_is_a_third_line_of_the_duel(toy, bridge, load):
@@ -70,8 +51,7 @@ def test_a_bridge_that_does_not_answer_gives_no_valid_run(bridge, load, options,
         f"--interface rosbridge --operation {operation} --allow-motion --timeout 1",
         RUN,
     )
-    assert run.code == ExitCode.INCONCLUSIVE
-    assert told in run.err
+    assert (run.code, told in run.err) == (ExitCode.INCONCLUSIVE, True), run.err
 
 
 def test_who_speaks_no_websocket_is_told_from_who_is_not_there(toy, load, free_port):
@@ -81,5 +61,4 @@ def test_who_speaks_no_websocket_is_told_from_who_is_not_there(toy, load, free_p
         (free_port, ExitCode.UNREACHABLE, "connection refused"),
     ):
         run = load(f"--rosbridge ws://127.0.0.1:{there} --interface rosbridge", RUN)
-        assert run.code == code, run.err
-        assert told in run.err
+        assert (run.code, told in run.err) == (code, True), run.err

@@ -16,8 +16,7 @@ def test_a_file_changes_only_what_it_names(tmp_path):
     file = tmp_path / "robot.toml"
     file.write_text('[topics]\nodom = "/base/odom"\n[velocity]\nmessage = "TwistStamped"\n[web]\nhold = 2\n')
     for names in (load_names(file), load_configuration(file)):
-        assert names.topics.odom == "/base/odom"
-        assert names.velocity.message == "TwistStamped"
+        assert (names.topics.odom, names.velocity.message) == ("/base/odom", "TwistStamped")
         assert names.topics.scan == "scan"
     assert (names.web.hold, names.web.settle) == (2.0, 0.6)
 

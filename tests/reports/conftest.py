@@ -4,12 +4,12 @@ import copy
 import json
 import re
 import shutil
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from processes import ended
 
 DATA = Path(__file__).parent / "data"
 _RESULT = json.loads((DATA / "result-example.json").read_text(encoding="utf-8"))
@@ -121,13 +121,7 @@ def browse() -> Callable[[Path, dict[str, str], str], dict[str, Any]]:
         wrapper = folder / "wrapper.html"
         wrapper.write_text(_WRAPPER.replace("FRAMES", json.dumps(frames)).replace("MEASURE", measure), encoding="utf-8")
         profile = f"--user-data-dir={folder / 'profile'}"
-        done = subprocess.run(
-            [browser, *_BROWSER_OPTIONS.split(), profile, wrapper.as_uri()],
-            capture_output=True,
-            text=True,
-            timeout=240,
-            check=True,
-        )
+        done = ended(browser, *_BROWSER_OPTIONS.split(), profile, wrapper.as_uri(), check=True)
         out = re.search(r'<pre id="out">(\{.*?\})</pre>', done.stdout, re.DOTALL)
         assert out, f"the pages did not load: {done.stderr[-2000:]}"
         return json.loads(out.group(1).replace("&amp;", "&").replace("&lt;", "<").replace("&gt;", ">"))

@@ -90,18 +90,13 @@ def test_other_format(tmp_path, result, found):
     ],
 )
 def test_garbled_file(tmp_path, content, kind, told):
-    path = tmp_path / "result.json"
-    path.write_bytes(content)
+    (tmp_path / "result.json").write_bytes(content)
     with pytest.raises(kind, match=told) as raised:
-        read_result(path)
-    assert str(path) in str(raised.value)
-
-
-def test_no_file(tmp_path):
-    with pytest.raises(ResultMissingError):
         read_result(tmp_path / "result.json")
+    assert str(tmp_path / "result.json") in str(raised.value)
 
 
-def test_directory_for_a_file(tmp_path):
-    with pytest.raises(ResultUnreadableError):
-        read_result(tmp_path)
+@pytest.mark.parametrize(("name", "kind"), [("result.json", ResultMissingError), ("", ResultUnreadableError)])
+def test_no_file_and_a_directory_for_a_file(tmp_path, name, kind):
+    with pytest.raises(kind):
+        read_result(tmp_path / name)

@@ -5,14 +5,14 @@ import json
 import signal
 import subprocess
 import sys
-import threading
 import time
 from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
 import pytest
+from processes import ended, independent_robot
+from toy_server import Handler, server_of
 
 from conformance.contract.pack import Contract
 from conformance.contract.requirement_sets import current, load_set
@@ -26,7 +26,7 @@ _INDEPENDENT_ROBOTS = CONTRACT_DIR / "independent_robots"
 
 def _certify(tmp_path, *arguments):
     command = [sys.executable, "-m", "roaas", "certify", *arguments, "--out", str(tmp_path / "out")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    done = ended(*command)
     assert "Traceback" not in done.stdout + done.stderr
     result = tmp_path / "out" / "result.json"
     return done, json.loads(result.read_text(encoding="utf-8")) if result.exists() else None
@@ -49,8 +49,7 @@ def test_a_nonce_gives_the_seed_and_stands_in_the_result(tmp_path, closed_port):
 @pytest.mark.parametrize("wrong", [["--nonce", "a", "--seed", "1"], ["--nonce", " "], ["--nonce", "\n"]])
 def test_a_nonce_is_text_and_goes_without_a_seed(tmp_path, closed_port, wrong):
     done, result = _certify(tmp_path, "--rest", closed_port, *wrong)
-    assert done.returncode == 2
-    assert "--nonce" in done.stderr
+    assert (done.returncode, "--nonce" in done.stderr) == (2, True), done.stderr
     assert result is None
 
 
@@ -77,23 +76,20 @@ def test_a_certificate_is_signed_also_when_the_robot_was_not_reached(tmp_path, c
 def test_a_key_that_cannot_sign_is_told_before_the_run(tmp_path, closed_port):
     generate(tmp_path / "keys")
     done, result = _certify(tmp_path, "--rest", closed_port, "--sign", str(tmp_path / "keys" / PUBLIC_NAME))
-    assert done.returncode == 2
-    assert "not a private key" in done.stderr
+    assert (done.returncode, "not a private key" in done.stderr) == (2, True), done.stderr
     assert result is None
 
 
 def test_a_server_that_never_answers_is_not_reached(tmp_path, listening):
     url = listening(lambda connection: time.sleep(60) or connection)
     done, result = _certify(tmp_path, "--rest", url, "--timeout", "0.5")
-    assert done.returncode == 3
-    assert "no response within 0.5 s" in done.stderr
+    assert (done.returncode, "no response within 0.5 s" in done.stderr) == (3, True), done.stderr
     assert result["verdict"] == "inconclusive"
 
 
 def test_a_plain_web_server_does_not_conform(tmp_path, web_server):
     done, result = _certify(tmp_path, "--rest", web_server, "--effort", "quick")
-    assert done.returncode == 1
-    assert result["verdict"] == "not-conformant"
+    assert (done.returncode, result["verdict"]) == (1, "not-conformant")
     assert result["classes"]["rest-resources"] == "fail"
     failed = next(item for item in result["requirements"] if item["id"] == "rest-resources/pose-type")
     assert failed["failures"][0]["request"]["curl"].endswith("/robot/pose/")
@@ -102,22 +98,20 @@ def test_a_plain_web_server_does_not_conform(tmp_path, web_server):
 
 
 def test_a_server_of_one_page_leaves_nothing_in_error(tmp_path):
-    class _Page(BaseHTTPRequestHandler):
-        def do_GET(self):
+    class _Page(Handler):
+        protocol_version = "HTTP/1.0"
+
+        def answer(self):
+            if self.command != "GET":
+                self.send_error(501)
+                return
             self.send_response(200)
             self.send_header("Content-Type", "text/html")
             self.end_headers()
             self.wfile.write(b"<html>welcome</html>")
 
-        def log_message(self, *_):
-            return
-
-    with ThreadingHTTPServer(("127.0.0.1", 0), _Page) as server:
-        server.handle_error = lambda *_: None  # clients that break off are no news
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        url = f"http://127.0.0.1:{server.server_port}"
-        done, result = _certify(tmp_path, "--rest", url, "--effort", "quick", "--class", "http")
-        server.shutdown()
+    with server_of(_Page, handle_error=lambda *_: None) as server:  # clients that break off are no news
+        done, result = _certify(tmp_path, "--rest", server.url, "--effort", "quick", "--class", "http")
     assert done.returncode == 1
     assert "error" not in {item["verdict"] for item in result["requirements"]}
 
@@ -125,8 +119,7 @@ def test_a_server_of_one_page_leaves_nothing_in_error(tmp_path):
 def test_a_claimed_class_without_its_interface_fails(tmp_path, web_server):
     _, result = _certify(tmp_path, "--rest", web_server, "--class", "soap-delivery")
     verdicts = {item["id"]: item["verdict"] for item in result["requirements"]}
-    assert verdicts["soap-delivery/reachable"] == "fail"
-    assert result["classes"]["soap-delivery"] == "fail"
+    assert (verdicts["soap-delivery/reachable"], result["classes"]["soap-delivery"]) == ("fail", "fail")
 
 
 @pytest.mark.parametrize(
@@ -142,38 +135,26 @@ def test_a_claimed_class_without_its_interface_fails(tmp_path, web_server):
 )
 def test_wrong_usage_is_told_by_name(tmp_path, arguments, named):
     done, result = _certify(tmp_path, *arguments)
-    assert done.returncode == 2
-    assert named in done.stderr
+    assert (done.returncode, named in done.stderr) == (2, True), done.stderr
     assert result is None
 
 
 def test_a_first_statement_is_written_and_can_be_used(tmp_path, web_server):
     statement = tmp_path / "robot.toml"
     command = [sys.executable, "-m", "roaas", "certify", "--init", str(statement), "--rest", web_server]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    done = ended(*command)
     assert (done.returncode, done.stderr) == (0, "")
     done, result = _certify(tmp_path, str(statement), "--effort", "quick")
-    assert done.returncode == 1
-    assert result["target"]["rest"] == web_server
-    again = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
-    assert again.returncode == 2
-    assert "exists already" in again.stderr
+    assert (done.returncode, result["target"]["rest"]) == (1, web_server)
+    again = ended(*command)
+    assert (again.returncode, "exists already" in again.stderr) == (2, True), again.stderr
 
 
 @contextmanager
 def _independent_robot(name):
-    command = [sys.executable, "-m", "conformance.packs.table1.independent_robots", name]
-    command += ["--rest-port", "0", "--soap-port", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            words = process.stdout.readline().split()
-            assert words[0] == "ready"
-            rest, soap = (word.split("=", 1)[1] for word in words[1:3])
-            where = ["--rest", rest, "--publishers-wsdl", soap]
-            where += ["--subscribers-wsdl", soap.replace("publisher", "subscriber")]
-            yield process, rest, [str(_INDEPENDENT_ROBOTS / name / f"{name}.toml"), *where]
-        finally:
-            process.kill()
+    with independent_robot(name) as (process, rest, soap):
+        services = ["--publishers-wsdl", soap, "--subscribers-wsdl", soap.replace("publisher", "subscriber")]
+        yield process, rest, [str(_INDEPENDENT_ROBOTS / name / f"{name}.toml"), "--rest", rest, *services]
 
 
 def _until(process, text):
@@ -209,8 +190,7 @@ def test_an_interrupted_run_keeps_what_it_has_and_stops_the_robot(tmp_path):
         code, result = _broken_off(tmp_path, where, lambda run: run.send_signal(signal.SIGINT))
         assert code == 130
         assert result["interrupted"]
-        verdicts = {item["verdict"] for item in result["requirements"]}
-        assert {"pass", "error"} <= verdicts
+        assert {"pass", "error"} <= {item["verdict"] for item in result["requirements"]}
         with pytest.raises(HTTPError) as none:
             urlopen(rest + "/robot/navigation/action/goal/")  # noqa: S310 - our own robot
         assert none.value.code == 404
@@ -224,14 +204,12 @@ def test_the_suite_runs_in_somebody_elses_project(tmp_path):
     with _independent_robot("plain") as (_, rest, _):
         command = [sys.executable, "-m", "pytest", "-q", "-p", "roaas_pytest", "--pyargs", "conformance", "test_own.py"]
         command += ["--robot-rest", rest, "--robot-class", "rest-formats", "--robot-effort", "quick"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 0, done.stdout
-    assert "passed" in done.stdout
+        done = ended(*command, cwd=tmp_path)
+    assert (done.returncode, "passed" in done.stdout) == (0, True), done.stdout
 
 
 def test_a_frozen_set_is_what_a_run_is_scored_by(tmp_path, closed_port):
     _, result = _certify(tmp_path, "--rest", closed_port, "--requirements", "1.1")
     assert result["requirement_set"] == load_set(Contract.load(), "1.1").told
     done, _ = _certify(tmp_path, "--rest", closed_port, "--requirements", "0.9")
-    assert done.returncode == 2
-    assert "'0.9'" in done.stderr
+    assert (done.returncode, "'0.9'" in done.stderr) == (2, True), done.stderr

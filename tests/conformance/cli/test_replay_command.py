@@ -2,12 +2,11 @@
 
 import base64
 import json
-import threading
 import zlib
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 from click.testing import CliRunner
+from toy_server import Handler, server_of
 
 from conformance.contract.pack import Contract
 from conformance.engine.permission import moves
@@ -17,20 +16,11 @@ from conformance.verdict.finding import Sent
 from roaas import main
 
 
-class _Robot(ThreadingHTTPServer):
+class _Handler(Handler):
     """Answers 500 to a GET that follows a PUT, until it is repaired."""
 
-    def __init__(self):
-        self.asked: list[tuple[str, str, bytes, str | None]] = []
-        self.repaired = False
-        super().__init__(("127.0.0.1", 0), _Handler)
-
-
-class _Handler(BaseHTTPRequestHandler):
-    server: _Robot
-
-    def _answer(self):
-        body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
+    def answer(self):
+        body = self.content()
         broken = self.command == "GET" and not self.server.repaired and self.server.asked[-1:] != []
         self.server.asked.append((self.command, self.path, body, self.headers.get("Authorization")))
         if self.path == "/robot/pose/":
@@ -42,20 +32,11 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_response(500 if broken else 204)
         self.end_headers()
 
-    do_GET = do_PUT = _answer  # noqa: N815 - http.server's names
-
-    def log_message(self, *_):
-        """Say nothing."""
-
 
 @pytest.fixture(name="robot")
 def _robot():
-    with _Robot() as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
-        thread.start()
+    with server_of(_Handler, asked=[], repaired=False) as server:
         yield server
-        server.shutdown()
-        thread.join()
 
 
 def _result(tmp_path, base, methods=("PUT", "GET")):
@@ -67,18 +48,18 @@ def _result(tmp_path, base, methods=("PUT", "GET")):
         )
         for index, method in enumerate(methods)
     ]
-    failure = {
-        "message": "status 500",
-        "response": {"status": 500, "headers": {}, "body": None},
-        "sequence": written(sent),
-    }
+    failure = {"message": "status 500", "response": {"status": 500, "headers": {}, "body": None}}
+    found = [{"id": "http/declared-status", "failures": [failure | {"sequence": written(sent)}]}]
+    return _written(tmp_path, [*found, {"id": "http/head", "failures": []}], target={"subscribers_endpoint": None})
+
+
+def _written(tmp_path, requirements, **more):
     document = {
         "format": "roaas-result/1",
         "suite": {"contract": Contract.load().version},
-        "target": {"subscribers_endpoint": None},
-        "requirements": [{"id": "http/declared-status", "failures": [failure]}, {"id": "http/head", "failures": []}],
+        "requirements": requirements,
     }
-    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    (tmp_path / "result.json").write_text(json.dumps(document | more), encoding="utf-8")
     return str(tmp_path)
 
 
@@ -88,7 +69,7 @@ def _replay(*arguments):
 
 def test_a_finding_is_still_there_until_it_is_repaired(robot, tmp_path):
     (tmp_path / "token").write_text("sesame\n", encoding="utf-8")
-    result = _result(tmp_path, f"http://127.0.0.1:{robot.server_port}")
+    result = _result(tmp_path, robot.url)
     base = f"HTTP://127.0.0.1:{robot.server_port}/elsewhere"
     arguments = (result, "--allow-motion", "--token-file", str(tmp_path / "token"), "--token-for", base)
     there = _replay(*arguments)
@@ -100,22 +81,12 @@ def test_a_finding_is_still_there_until_it_is_repaired(robot, tmp_path):
 
 
 def test_what_an_answer_shows_by_itself_is_judged_as_in_the_run(robot, tmp_path):
-    base = f"http://127.0.0.1:{robot.server_port}"
+    base = robot.url
     request = Request("GET", f"{base}/robot/pose/", (("Host", "x"), ("Accept", "image/png")))
-    failure = {
-        "message": "Date: None",
-        "response": {"status": 406, "headers": {"Content-Length": "0"}, "body": None},
-        "sequence": written([Sent(0.0, request)]),
-    }
-    document = {
-        "format": "roaas-result/1",
-        "suite": {"contract": Contract.load().version},
-        "target": {"rest": base},
-        "seed": 0,
-        "effort": "quick",
-        "requirements": [{"id": "http/date", "failures": [failure]}],
-    }
-    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    response = {"status": 406, "headers": {"Content-Length": "0"}, "body": None}
+    failure = {"message": "Date: None", "response": response, "sequence": written([Sent(0.0, request)])}
+    found = [{"id": "http/date", "failures": [failure]}]
+    _written(tmp_path, found, target={"rest": base}, seed=0, effort="quick")
     (tmp_path / "robot.toml").write_text(f'[endpoints]\nrest = "{base}"\n', encoding="utf-8")
     (tmp_path / "token").write_text("sesame", encoding="utf-8")
     by_checks = (str(tmp_path), "--statement", str(tmp_path / "robot.toml"), "--token-file", str(tmp_path / "token"))
@@ -132,7 +103,7 @@ def test_what_an_answer_shows_by_itself_is_judged_as_in_the_run(robot, tmp_path)
 
 
 def test_what_moves_the_robot_asks_first(robot, tmp_path):
-    refused = _replay(_result(tmp_path, f"http://127.0.0.1:{robot.server_port}"))
+    refused = _replay(_result(tmp_path, robot.url))
     assert (refused.exit_code, robot.asked) == (2, [])
     assert "--allow-motion" in refused.output
 
@@ -142,7 +113,7 @@ def test_what_moves_the_robot_asks_first(robot, tmp_path):
 )
 def test_the_token_goes_to_no_address_that_the_user_did_not_name(robot, tmp_path, others):
     (tmp_path / "token").write_text("sesame", encoding="utf-8")
-    result = _result(tmp_path, f"http://127.0.0.1:{robot.server_port}", ("GET",))
+    result = _result(tmp_path, robot.url, ("GET",))
     trusted = [part for url in others for part in ("--token-for", url.format(port=robot.server_port))]
     refused = _replay(result, "--token-file", str(tmp_path / "token"), *trusted)
     assert (refused.exit_code, robot.asked) == (2, [])
@@ -202,7 +173,7 @@ def test_a_sequence_that_no_run_wrote_is_refused(part):
 
 
 def test_a_bomb_in_a_result_is_wrong_usage(robot, tmp_path):
-    result = _result(tmp_path, f"http://127.0.0.1:{robot.server_port}", ("GET",))
+    result = _result(tmp_path, robot.url, ("GET",))
     document = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
     bomb = base64.b64encode(zlib.compress(bytes(60 * 1024 * 1024))).decode()
     document["requirements"][0]["failures"][0]["sequence"][0]["body"] = bomb

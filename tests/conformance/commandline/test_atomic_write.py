@@ -24,8 +24,7 @@ def test_a_file_is_replaced_and_no_draft_is_left(tmp_path):
 @pytest.mark.parametrize(("mask", "mode"), [(0o022, 0o644), (0o027, 0o640), (0o077, 0o600), (0o002, 0o664)])
 def test_who_may_read_it_follows_the_umask(tmp_path, umask, mask, mode):
     umask(mask)
-    path = write_atomically(tmp_path / "latency.json", "{}")
-    assert stat.S_IMODE(path.stat().st_mode) == mode
+    assert stat.S_IMODE(write_atomically(tmp_path / "latency.json", "{}").stat().st_mode) == mode
 
 
 def test_what_cannot_be_written_leaves_the_old_file_and_no_draft(tmp_path):

@@ -3,25 +3,17 @@
 import re
 
 from conformance.contract.pack import Contract
-from conformance.packs.table1.delivery import (
-    COFFEE,
-    COORDINATES,
-    COURIER,
-    EXAMPLE,
-    MESSAGE_FIELDS,
-    PATH_NAMES,
-    XSD_FIELDS,
-)
+from conformance.packs.table1 import delivery
 
 
 def test_the_path_of_the_openapi_description():
     paths = Contract.load().openapi["paths"]
     path = next(path for path in paths if "/depot_x/" in path)
-    assert tuple(re.findall(r"/(\w+)/\{", path))[1:] == PATH_NAMES
+    assert tuple(re.findall(r"/(\w+)/\{", path))[1:] == delivery.PATH_NAMES
     code = next(item for item in paths[path]["put"]["parameters"] if item["name"] in {"code", "message_code"})
-    assert code["schema"]["enum"] == [COURIER, COFFEE]
+    assert code["schema"]["enum"] == [delivery.COURIER, delivery.COFFEE]
 
 
 def test_every_form_has_the_same_fields():
-    assert set(MESSAGE_FIELDS) == set(XSD_FIELDS)
-    assert tuple(EXAMPLE) == COORDINATES
+    assert set(delivery.MESSAGE_FIELDS) == set(delivery.XSD_FIELDS)
+    assert tuple(delivery.EXAMPLE) == delivery.COORDINATES

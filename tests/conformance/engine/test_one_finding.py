@@ -1,14 +1,12 @@
 """A robot with one fault has one finding, however many checks meet it: seen with real servers."""
 
 import json
-import subprocess
 import sys
-import threading
 import time
-from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
+from processes import ended
+from toy_server import Handler, server_of
 
 from conformance.cli.summary import print_summary
 from conformance.contract.pack import Contract
@@ -22,12 +20,10 @@ from conformance.verdict.run import Run
 _SENSORS = "/robot/sensors/"
 
 
-class _Handler(BaseHTTPRequestHandler):
+class _Handler(Handler):
     """Has a fault in /robot/sensors/, and a list of services."""
 
-    protocol_version = "HTTP/1.1"
-
-    def do_GET(self):
+    def answer(self):
         body = b"[]" if self.path.startswith("/robot/navigation/services/") else b""
         path = self.path.split("?")[0]
         if path == _SENSORS:
@@ -36,22 +32,9 @@ class _Handler(BaseHTTPRequestHandler):
                 self.close_connection = True
                 return
         if body:
-            self._send(self.server.status if path == _SENSORS else 200, "application/json", body)
+            self.send(self.server.status if path == _SENSORS else 200, body)
         else:
-            self._send(404, "application/problem+json", b'{"status": 404}')
-
-    def _send(self, status, media_type, body):
-        self.send_response(status)
-        self.send_header("Content-Type", media_type)
-        self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        if self.command != "HEAD":
-            self.wfile.write(body)
-
-    do_HEAD = do_GET  # noqa: N815 - http.server's name
-
-    def log_message(self, *_):
-        """Say nothing."""
+            self.send(404, b'{"status": 404}', "application/problem+json")
 
 
 def _endless(handler):
@@ -62,6 +45,7 @@ def _endless(handler):
     while time.monotonic() < until:
         try:
             handler.wfile.write(b"data: 1\n\n")
+            handler.wfile.flush()
         except OSError:
             break
         time.sleep(0.05)
@@ -81,24 +65,13 @@ _ONLY = (
 )
 
 
-@contextmanager
-def _serving(fault, status, handler=_Handler):
-    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    server.daemon_threads, server.fault, server.status = True, fault, status
-    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
-    yield f"http://127.0.0.1:{server.server_port}"
-    server.shutdown()
-    server.server_close()
-
-
 @pytest.mark.parametrize("name", _FAULTS)
 def test_one_fault_is_one_finding(name, tmp_path, capsys):
     fault, status, kind, owner = _FAULTS[name]
     contract = Contract.load(only=_ONLY)
     classes = tuple(dict.fromkeys(id_.split("/")[0] for id_ in _ONLY))
-    with _serving(fault, status) as base:
-        statement = empty_statement(contract)
-        statement = type(statement)(endpoints=Endpoints(rest=base))
+    with server_of(_Handler, fault=fault, status=status) as server:
+        statement = type(empty_statement(contract))(endpoints=Endpoints(rest=server.url))
         run = Run(statement=statement, contract=contract, claims=classes, effort=Effort("quick"))
         outcome = certify(RobotUnderTest(run, Connection(timeout_s=0.5)), tmp_path, progress=None)
     document = json.loads(outcome.path.read_text(encoding="utf-8"))
@@ -118,8 +91,7 @@ def test_one_fault_is_one_finding(name, tmp_path, capsys):
     assert failure["message"] == cause["text"]
     assert (failure["subject"], failure["cause"]) == ("GET /robot/sensors/", kind)
     assert failure["observed"] in failure["message"]
-    assert document["verdict"] == "not-conformant"
-    assert (document["resent_requests"] > 0) == (name == "closes")
+    assert (document["verdict"], document["resent_requests"] > 0) == ("not-conformant", name == "closes")
     if name == "closes":
         assert "closed the connection without a response, 2 of 2 times; the request before it" in failure["observed"]
     print_summary(outcome)
@@ -136,22 +108,21 @@ class _Dropping(_Handler):
         super().setup()
         self.left = 4
 
-    def do_GET(self):
+    def answer(self):
         self.left -= 1
         if self.left < 0:
             self.close_connection = True
         else:
-            self._send(200, "application/json", b"[]")
+            self.send(200, b"[]")
 
 
 def test_requests_that_are_dropped_again_and_again_on_a_busy_connection_are_one_finding(tmp_path):
     contract = Contract.load(only=("http/many-requests", "http/head"))
-    with _serving(None, 0, _Dropping) as base:
-        statement = type(empty_statement(contract))(endpoints=Endpoints(rest=base))
+    with server_of(_Dropping) as server:
+        statement = type(empty_statement(contract))(endpoints=Endpoints(rest=server.url))
         run = Run(statement=statement, contract=contract, claims=("http",), effort=Effort("quick"))
         document = certify(RobotUnderTest(run, Connection(timeout_s=2)), tmp_path, progress=None).document
-    verdicts = {item["id"]: item["verdict"] for item in document["requirements"]}
-    assert verdicts["http/many-requests"] == "fail"
+    assert {item["id"]: item["verdict"] for item in document["requirements"]}["http/many-requests"] == "fail"
     (failure,) = (one for item in document["requirements"] for one in item["failures"] if "many" in item["id"])
     assert "the server closed 3 times without a response" in failure["message"]
 
@@ -171,9 +142,10 @@ def test_second(rest):
 
 def test_in_somebody_elses_project_one_cause_fails_one_test(tmp_path):
     (tmp_path / "test_checks.py").write_text(_CHECKS, encoding="utf-8")
-    with _serving(*_FAULTS["closes"][:2]) as base:
-        command = [sys.executable, "-m", "pytest", "-rs", "-p", "roaas_pytest", "test_checks.py", "--robot-rest", base]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    with server_of(_Handler, fault=_FAULTS["closes"][0], status=0) as server:
+        command = [sys.executable, "-m", "pytest", "-rs", "-p", "roaas_pytest", "test_checks.py"]
+        command += ["--robot-rest", server.url]
+        done = ended(*command, cwd=tmp_path)
     assert "1 failed, 1 skipped" in done.stdout, done.stdout
     assert "Sent `GET /robot/sensors/`. Expected a response (rest-resources/sensors-type" in done.stdout
     assert "Not tested, because of a failure before: GET /robot/sensors/: no response" in done.stdout

@@ -37,14 +37,12 @@ def robot_of(listening):
 
 def test_two_late_answers_in_eleven_make_no_robot_slow(robot_of):
     robot = robot_of(0.2, *[0.0] * 4, 0.2, *[0.0] * 5)
-    assert robot.connection.sent == 11
-    assert robot.run.effort.speed.name == "local"
+    assert (robot.connection.sent, robot.run.effort.speed.name) == (11, "local")
 
 
 def test_a_slow_robot_is_asked_less_often_for_it(robot_of):
     robot = robot_of(0.3)
-    assert robot.connection.sent == 5
-    assert robot.run.effort.speed.name == "far"
+    assert (robot.connection.sent, robot.run.effort.speed.name) == (5, "far")
     assert robot.connection.pace.usual_s == pytest.approx(robot.run.effort.usual_ms / 1000)
     assert robot.connection.pace.usual_s >= 0.3
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from processes import ended
 
 import roaas
 from conformance.fleet.fleet_file import Member
@@ -29,17 +30,8 @@ def fleet_file(folder: Path, robots: dict[str, str], **more: str) -> Path:
 
 
 def command(fleet: Path, *options: str) -> list[str]:
-    return [
-        sys.executable,
-        "-m",
-        "roaas",
-        "certify",
-        "--fleet",
-        str(fleet),
-        "--out",
-        str(fleet.parent / "out"),
-        *options,
-    ]
+    words = [sys.executable, "-m", "roaas", "certify", "--fleet", str(fleet)]
+    return [*words, "--out", str(fleet.parent / "out"), *options]
 
 
 def test_each_robot_has_its_end_whatever_the_others_do(tmp_path, web_server, closed_port, listening):
@@ -54,7 +46,7 @@ def test_each_robot_has_its_end_whatever_the_others_do(tmp_path, web_server, clo
     old.write_text('{"verdict": "conformant"}')
     options = ["--parallel", "3", "--class", "rest-resources", "--effort", "quick", "--timeout", "30"]
     options += ["--sign", str(tmp_path / "keys" / PRIVATE_NAME)]
-    done = subprocess.run(command(fleet, *options), capture_output=True, text=True, timeout=240, check=False)
+    done = ended(*command(fleet, *options))
     assert done.returncode == 1, done.stderr
     found = {robot["name"]: robot for robot in read_fleet(tmp_path / "out" / "fleet.json")["robots"]}
     assert {name: robot["outcome"] for name, robot in found.items()} == {
@@ -65,15 +57,13 @@ def test_each_robot_has_its_end_whatever_the_others_do(tmp_path, web_server, clo
     assert "missing.toml" in found["unusable"]["reason"]
     assert [robot["trusted"] for robot in found.values()] == [[]] * 4
     assert found["hangs"].get("classes", {}).get("rest-resources") != "pass", "an earlier run's result does not count"
-    assert found["poor"]["classes"]["rest-resources"] == "fail"
-    assert found["poor"]["robot"] == {"name": "poor"}
+    assert (found["poor"]["classes"]["rest-resources"], found["poor"]["robot"]) == ("fail", {"name": "poor"})
     for name, end in (("hangs", "given-up"), ("down", "unreachable"), ("poor", "not-conformant")):
         assert f"{name}: started" in done.stderr
         assert f"judged | {name}: {end}" in done.stderr
         assert f"  {name} " in done.stdout
     assert "4/4 judged" in done.stderr
-    page = (tmp_path / "out" / "fleet.html").read_text()
-    assert 'href="robots/poor/certificate.html"' in page
+    assert 'href="robots/poor/certificate.html"' in (tmp_path / "out" / "fleet.html").read_text()
     assert (tmp_path / "out" / "robots" / "poor" / "certificate.html").exists()
     signed = statement_in(open_envelope((tmp_path / "out" / "robots" / "poor" / ENVELOPE_NAME).read_bytes()))
     assert signed.predicate.roaas.robot.name == "poor"

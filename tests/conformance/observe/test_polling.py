@@ -7,8 +7,7 @@ from conformance.transport.pace import Pace
 
 def test_it_looks_so_often_and_once_when_the_time_is_over():
     clock = SimulatedClock(0.0)
-    turns = [round(clock.now(), 3) for _ in poll_for(clock, 0.1, 0.35)]
-    assert turns == [0.0, 0.1, 0.2, 0.3, 0.4]
+    assert [round(clock.now(), 3) for _ in poll_for(clock, 0.1, 0.35)] == [0.0, 0.1, 0.2, 0.3, 0.4]
 
 
 def test_a_turn_that_takes_long_delays_the_next_and_is_not_the_last():

@@ -32,8 +32,7 @@ def test_a_scenario_is_played_once_and_judged_by_each_rule():
     for _ in range(2):
         trace = recordings.of(counting, fixtures.__getitem__).trace
         assert [one.holds for one in is_two.outcomes(trace, fixtures.__getitem__)] == [True]
-    assert _PLAYED == [1]
-    assert is_two.fixtures == ("limit",)
+    assert (_PLAYED, is_two.fixtures) == ([1], ("limit",))
 
 
 def _fails(error: Exception) -> None:

@@ -17,11 +17,8 @@ def job(rest="http://127.0.0.1:9", **more):
 def test_a_job_says_where_the_robot_is_and_what_is_claimed(tmp_path):
     robot = robot_of(job(classes=("http",), token=tmp_path.name, endpoints={"request_rate": 5.0}, seed=7), tmp_path)
     where = robot.run.statement.endpoints
-    assert (where.rest, where.publishers_wsdl, where.request_rate) == (
-        "http://127.0.0.1:9",
-        "http://127.0.0.1:9/p?wsdl",
-        5.0,
-    )
+    told = (where.rest, where.publishers_wsdl, where.request_rate)
+    assert told == ("http://127.0.0.1:9", "http://127.0.0.1:9/p?wsdl", 5.0)
     assert Path(where.token_file).read_text() == tmp_path.name
     assert (robot.run.claims, robot.run.seed, robot.run.statement.ros.domain_id) == (("http",), 7, None)
 

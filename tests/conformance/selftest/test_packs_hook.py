@@ -3,11 +3,12 @@
 from pathlib import Path
 
 import pytest
+from taking_robot import sent_by
 
 from conformance.contract.interfaces import Interface
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
-from conformance.mutation.messages import Request, Response
+from conformance.mutation.messages import Request
 from conformance.mutation.self_test import GoodDevice, OpenPlace, SelfTest, self_test_of
 from conformance.packs.table1.selftest import BAROQUE, PLAIN
 from conformance.selftest.controls import controls_of
@@ -54,16 +55,8 @@ def mutant(contract, name):
     return next(one for one in generated_mutants(contract) if one.name == name)
 
 
-def sent_by(contract, name, request):
-    """What a mutant sends to the device, which takes everything."""
-    sent = []
-
-    def forward(request):
-        sent.append(request)
-        return Response(204)
-
-    mutant(contract, name).make(Tally())(request, forward)
-    return sent[0]
+def sent(contract, name, request):
+    return sent_by(mutant(contract, name).make(Tally()), request)
 
 
 def test_a_pack_without_a_hook_has_mutants_by_rule_alone(door):
@@ -74,20 +67,19 @@ def test_a_pack_without_a_hook_has_mutants_by_rule_alone(door):
 
 
 def test_parameters_may_have_any_name(door):
-    altered = sent_by(door, "scale:putDoor:request.door-id:path", Request("rest", "PUT", "/doors/4"))
+    altered = sent(door, "scale:putDoor:request.door-id:path", Request("rest", "PUT", "/doors/4"))
     assert altered.target == "/doors/6"
 
 
 def test_a_missing_text_is_filled_by_the_descriptions_example(door):
     json = [("Content-Type", "application/json")]
     request = Request("rest", "PUT", "/doors/4", "HTTP/1.1", json, b'{"open": false}')
-    assert sent_by(door, "fill:putDoor:request.label:json", request).body == b'{"open": false, "label": "front"}'
+    assert sent(door, "fill:putDoor:request.label:json", request).body == b'{"open": false, "label": "front"}'
 
 
 def test_a_hook_is_read_from_the_packs_folder(tmp_path):
     source = "from conformance.mutation.self_test import *\nSELFTEST = SelfTest(classes={'put.*': ('doors',)})\n"
-    contract = pack(tmp_path, selftest__py=source)
-    assert classes_of(contract, "putDoor", Interface.REST) == ("doors",)
+    assert classes_of(pack(tmp_path, selftest__py=source), "putDoor", Interface.REST) == ("doors",)
 
 
 @pytest.mark.parametrize("source", ["SELFTEST = 1", "x = 1", "import no_such_module", "def"])

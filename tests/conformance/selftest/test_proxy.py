@@ -1,16 +1,16 @@
 """The proxy hands on what it gets, and alters only what its change alters."""
 
-import contextlib
 import http.client
 import socket
 import ssl
-import threading
 import time
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from contextlib import closing, suppress
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.parse import urlsplit
 
 import pytest
+from toy_server import serving
 
 from conformance.mutation.changes import altered, becomes, header, instead, plain, rest, rewritten, values
 from conformance.mutation.messages import HangUpError, Response
@@ -21,46 +21,23 @@ from conformance.selftest.robots import Robot
 from conformance.selftest.variants import VARIANTS, certificate
 
 
-class Answering(BaseHTTPRequestHandler):
-    """Answers with what it was asked, and counts."""
-
-    protocol_version = "HTTP/1.1"
-    seen: list
-
-    def _do(self):
-        body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
-        self.seen.append((self.command, self.path, body))
-        port = self.server.server_port
-        got = b'{"x": 1, "at": "http://127.0.0.1:%d/here"}' % port if self.command == "GET" else body
-        self.send_response(200)
-        self.send_header("Content-Type", "application/json")
-        self.send_header("Content-Length", str(len(got)))
-        self.end_headers()
-        self.wfile.write(got)
-
-    do_GET = do_PUT = do_POST = _do  # noqa: N815 - http.server's names
-
-    def log_message(self, *_):
-        pass
-
-
 @pytest.fixture
 def robot():
-    handler = type("Handler", (Answering,), {"seen": []})
-    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True).start()
-    server.seen = handler.seen
-    server.url = f"http://127.0.0.1:{server.server_port}"
-    yield server
-    server.shutdown()
-    server.server_close()
+    """A robot that answers with what it was asked, and remembers."""
+    robot = SimpleNamespace(seen=[])
+
+    def answer(method, path, body):
+        robot.seen.append((method, path, body))
+        return 200, body if method != "GET" else b'{"x": 1, "at": "%s/here"}' % robot.url.encode()
+
+    with serving(answer) as robot.url:
+        yield robot
 
 
 @pytest.fixture
 def proxy(robot):
-    proxy = Proxy(robot.url, robot.url + "/turtlesim_publisher_ws?wsdl")
-    yield proxy
-    proxy.close()
+    with closing(Proxy(robot.url, robot.url + "/turtlesim_publisher_ws?wsdl")) as proxy:
+        yield proxy
 
 
 def request(url, method="GET", path="/robot/pose/", body=None, **headers):
@@ -80,7 +57,7 @@ def raw(url, octets):
         sock.sendall(octets)
         sock.shutdown(socket.SHUT_WR)
         got = b""
-        with contextlib.suppress(ConnectionResetError):
+        with suppress(ConnectionResetError):
             while data := sock.recv(65536):
                 got += data
         return got
@@ -141,12 +118,9 @@ def test_octets_can_be_sent_as_they_are(proxy):
 
 def test_what_is_no_http_reaches_the_robot():
     rest_url, soap_url, stop = plain_robot(0, 0)
-    proxy = Proxy(rest_url, soap_url)
-    try:
+    with closing(Proxy(rest_url, soap_url)) as proxy:
         assert b" 400 " in raw(proxy.rest, b"GARBAGE\r\n\r\n").split(b"\r\n")[0]
-    finally:
-        proxy.close()
-        stop()
+    stop()
 
 
 def test_a_broken_change_is_told(proxy):
@@ -161,8 +135,7 @@ def test_a_request_that_ends_in_the_middle_reaches_its_own_hook_and_no_robot(pro
     proxy.incomplete_request = lambda side, octets, _forward: came.append((side, octets))
     octets = b"PUT /p HTTP/1.1\r\nHost: a\r\nContent-Length: 10\r\n\r\nabc"
     raw(proxy.rest, octets)
-    assert came == [("rest", octets)]
-    assert robot.seen == []
+    assert (came, robot.seen) == ([("rest", octets)], [])
 
 
 def test_a_serial_robot_waits_for_the_request_before(proxy):
@@ -178,28 +151,22 @@ def test_a_serial_robot_waits_for_the_request_before(proxy):
 
 
 def test_a_prefix_is_taken_off(robot):
-    proxy = Proxy(robot.url, robot.url, prefix="/r2d2/api")
-    try:
+    with closing(Proxy(robot.url, robot.url, prefix="/r2d2/api")) as proxy:
         assert proxy.rest.endswith("/r2d2/api")
         assert request(proxy.rest)[0].status == 200
         assert robot.seen == [("GET", "/robot/pose/", b"")]
         assert request(proxy.rest.removesuffix("/r2d2/api"))[0].status == 404
-    finally:
-        proxy.close()
 
 
 def test_it_speaks_tls_with_a_certificate_of_its_own(robot, tmp_path):
     context, ca_file = certificate(tmp_path)
-    proxy = Proxy(robot.url, robot.url, tls=context)
-    try:
+    with closing(Proxy(robot.url, robot.url, tls=context)) as proxy:
         where = urlsplit(proxy.rest)
         trust = ssl.create_default_context(cafile=str(ca_file))
         connection = http.client.HTTPSConnection(where.hostname, where.port, timeout=30, context=trust)
         connection.request("GET", "/")
         assert connection.getresponse().status == 200
         connection.close()
-    finally:
-        proxy.close()
 
 
 def test_the_token_variant_asks_as_rfc_9110_has_it(proxy):
@@ -211,13 +178,10 @@ def test_the_token_variant_asks_as_rfc_9110_has_it(proxy):
 
 
 def test_a_device_without_soap_has_a_proxy_without_it(robot):
-    proxy = Proxy(robot.url)
-    try:
+    with closing(Proxy(robot.url)) as proxy:
         behind = proxy.before(Robot(Path("pack"), GoodDevice("lamp", lambda _: []), robot.url))
         assert (behind.rest, behind.publishers, list(proxy.listens)) == (proxy.rest, "", ["rest"])
         assert request(behind.rest)[0].status == 200
-    finally:
-        proxy.close()
 
 
 def test_wsdls_are_at_the_proxy_under_their_own_paths(proxy, robot):

@@ -18,24 +18,29 @@ def run(command, *words):
     return CliRunner().invoke(command, list(words))
 
 
-def test_mutants_are_listed():
-    done = run(selftest, "--list", "--faults", "wsdl-*")
-    assert done.exit_code == 0
-    assert "wsdl-float" in done.output
+LAMP = str(Path(__file__).parents[3] / "examples" / "lamp")
+
+
+@pytest.mark.parametrize(
+    ("command", "words", "code", "said"),
+    [
+        (selftest, "--list --faults wsdl-*", 0, "wsdl-float"),
+        (selftest, "--faults no-such-*", 2, "no-such-*"),
+        (selftest, f"--contract {LAMP} --target candle", 2, "no good device 'candle': lamp"),
+        (contract, f"coverage --contract {LAMP}", 0, "`test_lamp::fades`"),
+    ],
+    ids=["mutants are listed", "no such mutant", "no such device", "coverage of a small pack"],
+)
+def test_what_a_command_says(command, words, code, said):
+    done = run(command, *words.split())
+    assert (done.exit_code, said in done.output) == (code, True), done.output
     assert "pose-stale" not in done.output
-
-
-def test_a_pattern_that_fits_nothing_is_an_error_of_usage():
-    done = run(selftest, "--faults", "no-such-*")
-    assert done.exit_code == 2
-    assert "no-such-*" in done.output
 
 
 def test_without_ros_it_says_what_to_do(monkeypatch):
     monkeypatch.setattr("conformance.selftest.robots.find_spec", lambda _: None)
     done = run(selftest, "--faults", "pose-gone", "--seeds", "0", "--no-compare")
-    assert done.exit_code == 3
-    assert "--target baroque" in done.output
+    assert (done.exit_code, "--target baroque" in done.output) == (3, True), done.output
 
 
 def test_a_mutant_is_killed(tmp_path):
@@ -65,14 +70,10 @@ def test_an_interrupted_self_test_keeps_what_it_has(tmp_path, faults):
     assert "interrupted" in document["notes"][0]
 
 
-LAMP = str(Path(__file__).parents[3] / "examples" / "lamp")
-
-
 def test_a_small_packs_mutants_are_made_by_rule_and_judged(tmp_path):
     words = ["--contract", LAMP, "--generated", "2", "--faults", "failing:*Lamp:answer", "--parallel", "1"]
     done = run(selftest, *words, "--out", str(tmp_path))
-    assert done.exit_code == 0, done.output
-    assert "Mutants by rule killed: 2 of 2" in done.output
+    assert (done.exit_code, "Mutants by rule killed: 2 of 2" in done.output) == (0, True), done.output
     document = json.loads((tmp_path / "selftest.json").read_text())
     assert {mutant["outcome"] for mutant in document["generated"]["mutants"]} == {"caught"}
     assert "--target lamp --contract lamp" in (tmp_path / "selftest.md").read_text()
@@ -87,21 +88,8 @@ def test_a_small_packs_controls_run_without_mutants_by_hand(tmp_path):
 def test_a_pack_that_does_not_say_how_its_device_starts_is_told_what_it_needs(tmp_path):
     (tmp_path / "openapi.yaml").write_text(Path(LAMP, "openapi.yaml").read_text())
     done = run(selftest, "--contract", str(tmp_path), "--generated", "1")
-    assert done.exit_code == 2
-    assert "selftest.py" in done.output
+    assert (done.exit_code, "selftest.py" in done.output) == (2, True), done.output
     assert "status:getLamp:200-500" in run(selftest, "--contract", str(tmp_path), "--generated", "900", "--list").output
-
-
-def test_a_device_that_the_pack_does_not_have_is_an_error_of_usage():
-    done = run(selftest, "--contract", LAMP, "--target", "candle")
-    assert done.exit_code == 2
-    assert "no good device 'candle': lamp" in done.output
-
-
-def test_coverage_of_a_small_pack_is_shown():
-    done = run(contract, "coverage", "--contract", LAMP)
-    assert done.exit_code == 0
-    assert "`test_lamp::fades`" in done.output
 
 
 def test_requirements_are_listed():

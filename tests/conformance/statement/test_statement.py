@@ -1,6 +1,5 @@
 """A statement is read as it stands, and refused with the offending value."""
 
-import re
 from dataclasses import replace
 
 import pytest
@@ -58,8 +57,7 @@ def test_a_full_statement(tmp_path):
     assert statement.endpoints.ca_file == str(tmp_path / "ca.pem")
     assert statement.claimed(CONTRACT) == ("rest-resources", "rest-delivery", "soap-delivery", "safety")
     assert (statement.limits.linear_m_s, statement.limits.hold_s, statement.limits.settle_s) == (1.0, 0.5, 2.0)
-    assert statement.motion.arena == (0.0, 0.0, 10.0, 5.0)
-    assert statement.ros.domain_id == 7
+    assert (statement.motion.arena, statement.ros.domain_id) == ((0.0, 0.0, 10.0, 5.0), 7)
     assert statement.load.max_rate == 100
     assert statement.load.thresholds == (Threshold(Operation.POSE, ApiStyle.REST, Quantile.P99, 5.0),)
 
@@ -77,10 +75,22 @@ def test_a_full_statement(tmp_path):
         ("[claims]\nclasses = 'http'", "[claims] classes = 'http' must be a list, each item a string"),
         ("[limits]\nlinear_m_s = 'fast'", "[limits] linear_m_s = 'fast' must be a number, and not negative"),
         ("[limits]\nlinear_m_s = true", "[limits] linear_m_s = True must be a number, and not negative"),
-        ("[limits]\nsettle_s = nan", "[limits] settle_s = nan must be a number from 0 to 5"),
-        ("[limits]\nsettle_s = inf", "[limits] settle_s = inf must be a number from 0 to 5"),
+        *(
+            (f"[limits]\n{line}", f"[limits] {line} must be a number {bounds}")
+            for line, bounds in (
+                ("settle_s = nan", "from 0 to 5"),
+                ("settle_s = inf", "from 0 to 5"),
+                ("settle_s = 5.1", "from 0 to 5"),
+                ("hold_s = 0.1", "from 0.2 to 10"),
+                ("hold_s = 11", "from 0.2 to 10"),
+                ("tolerance = 1000", "from 0 to 0.25"),
+                ("tolerance_abs = 0.11", "from 0 to 0.1"),
+                ("tolerance_linear_m_s = 0.11", "from 0 to 0.1"),
+                ("tolerance_angular_rad_s = 0.21", "from 0 to 0.2"),
+            )
+        ),
         ("[limits]\nodometry_hz = 0", "[limits] odometry_hz = 0 must be a positive number"),
-        ("[limits.noise]\nposition_m = 0.06", "position_m = 0.06 must be"),
+        ("[limits.noise]\nposition_m = 0.06", "position_m = 0.06 must be a number from 0 to 0.05"),
         ("[limits.noise]\nangular_rad_s = 0.2", "angular_rad_s = 0.2 must be"),
         ("[motion]\narena = [1, 2]", "[motion] arena = [1, 2] must be 4 numbers"),
         ("[motion]\ngoals = [[1, 2, 'x']]", "[motion] goals[0][2] = 'x' must be a finite number"),
@@ -123,14 +133,9 @@ def test_noise_rate_and_clock_are_declared_among_the_limits(tmp_path):
     limits = _load(tmp_path, text).limits
     assert (limits.odometry_hz, limits.time_scale) == (10, 2)
     assert limits.noise == Noise(position_m=0.01, linear_m_s=0.02)
-    assert limits.tolerances == {
-        "tolerance": 0.05,
-        "tolerance_abs": 0.02,
-        "tolerance_linear_m_s": 0.02,
-        "tolerance_angular_rad_s": 0.02,
-        "noise_position_m": 0.01,
-        "noise_linear_m_s": 0.02,
-    }
+    declared = dict.fromkeys(("tolerance_abs", "tolerance_linear_m_s", "tolerance_angular_rad_s"), 0.02)
+    declared |= {"tolerance": 0.05, "noise_position_m": 0.01, "noise_linear_m_s": 0.02}
+    assert limits.tolerances == declared
     assert Statement().limits.odometry_hz is None
 
 
@@ -153,23 +158,3 @@ def test_without_claims_the_classes_follow_from_the_addresses():
     assert "soap-delivery" not in only_rest.claimed(ONLY_REST)
     both = Endpoints(rest="http://r2", publishers_wsdl="x", subscribers_wsdl="y")
     assert Statement(endpoints=both).claimed(CONTRACT) == tuple(CONTRACT.classes)
-
-
-@pytest.mark.parametrize(
-    ("line", "told"),
-    [
-        ("settle_s = 5.1", "settle_s = 5.1 must be a number from 0 to 5"),
-        ("hold_s = 0.1", "hold_s = 0.1 must be a number from 0.2 to 10"),
-        ("hold_s = 11", "hold_s = 11 must be a number from 0.2 to 10"),
-        ("tolerance = 1000", "tolerance = 1000 must be a number from 0 to 0.25"),
-        ("tolerance_abs = 0.11", "tolerance_abs = 0.11 must be a number from 0 to 0.1"),
-        ("tolerance_linear_m_s = 0.11", "tolerance_linear_m_s = 0.11 must be a number from 0 to 0.1"),
-        ("tolerance_angular_rad_s = 0.21", "tolerance_angular_rad_s = 0.21 must be a number from 0 to 0.2"),
-        ("noise.position_m = 0.06", "position_m = 0.06 must be a number from 0 to 0.05"),
-    ],
-)
-def test_a_statement_declares_within_the_contract_s_bounds(tmp_path, line, told):
-    path = tmp_path / "robot.toml"
-    path.write_text(f"[limits]\n{line}\n", encoding="utf-8")
-    with pytest.raises(StatementError, match=re.escape(told)):
-        load_statement(path, CONTRACT)

@@ -3,36 +3,25 @@ import socket
 import statistics
 import threading
 import time
-from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from contextlib import closing
 
 import pytest
+from toy_server import Handler, server_of
 
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError
 from conformance.transport.parallel import Outgoing, send_together
 
 
-class _Server(ThreadingHTTPServer):
+class _Handler(Handler):
     """Counts connections, and ends each after so many answers without saying so."""
-
-    def __init__(self, answers: int) -> None:
-        super().__init__(("127.0.0.1", 0), _Handler)
-        self.answers = answers
-        self.body = b""
-        self.opened = 0
-        self.ended = threading.Semaphore(0)
-
-
-class _Handler(BaseHTTPRequestHandler):
-    protocol_version = "HTTP/1.1"
 
     def setup(self) -> None:
         super().setup()
         self.server.opened += 1
         self.left = self.server.answers
 
-    def do_GET(self) -> None:
+    def answer(self) -> None:
         self.send_response(200)
         self.send_header("Content-Length", str(len(self.server.body)))
         self.end_headers()
@@ -46,74 +35,66 @@ class _Handler(BaseHTTPRequestHandler):
         self.server.shutdown_request(self.request)
         self.server.ended.release()
 
-    def log_message(self, *_: object) -> None:
-        return
+
+@pytest.fixture
+def asking():
+    """A server, which can be told after how many answers it ends a connection, and a client of it."""
+    to_server = server_of(_Handler, answers=1000, body=b"", opened=0, ended=threading.Semaphore(0))
+    with to_server as server, closing(HttpClient(server.url, Connection())) as client:
+        yield server, client
 
 
-@contextmanager
-def _asking(answers: int = 1000):
-    server = _Server(answers)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    client = HttpClient(f"http://127.0.0.1:{server.server_port}", Connection())
-    yield server, client
-    client.close()
-    server.shutdown()
-    server.server_close()
+def test_requests_follow_each_other_on_one_connection(asking):
+    server, client = asking
+    for _ in range(5):
+        assert client.send("GET", "/").response.status == 200
+    assert server.opened == 1
 
 
-def test_requests_follow_each_other_on_one_connection():
-    with _asking() as (server, client):
-        for _ in range(5):
-            assert client.send("GET", "/").response.status == 200
-        assert server.opened == 1
-
-
-def test_a_connection_that_the_server_has_ended_is_not_used_again():
-    with _asking(answers=2) as (server, client):
-        for turn in range(6):
-            assert client.send("GET", "/").response.status == 200
-            if turn % 2:
-                assert server.ended.acquire(timeout=5)
-        assert server.opened == 3
-        # None of them was sent on a closed connection and then once more.
-        assert client.connection.sent == 6
+def test_a_connection_that_the_server_has_ended_is_not_used_again(asking):
+    server, client = asking
+    server.answers = 2
+    for turn in range(6):
+        assert client.send("GET", "/").response.status == 200
+        if turn % 2:
+            assert server.ended.acquire(timeout=5)
+    # None of them was sent on a closed connection and then once more.
+    assert (server.opened, client.connection.sent) == (3, 6)
 
 
 @pytest.mark.parametrize("closes", ["the client", "its request"])
-def test_what_is_asked_for_on_its_own_connection_leaves_none_open(closes):
-    with _asking() as (server, client):
-        client.send("GET", "/", fresh=closes == "its request")
-        if closes == "the client":
-            client.close()
-        assert server.ended.acquire(timeout=5)
-        assert client.send("GET", "/").response.status == 200
-        assert server.opened == 2
+def test_what_is_asked_for_on_its_own_connection_leaves_none_open(asking, closes):
+    server, client = asking
+    client.send("GET", "/", fresh=closes == "its request")
+    if closes == "the client":
+        client.close()
+    assert server.ended.acquire(timeout=5)
+    assert client.send("GET", "/").response.status == 200
+    assert server.opened == 2
 
 
-def test_a_server_that_awaits_an_acknowledgement_in_mid_answer_gets_it_at_once():
-    with _asking() as (server, client):
-        server.body = b"the second segment, which Nagle's algorithm keeps back"
-        times = []
-        for _ in range(21):
-            began = time.monotonic()
-            assert client.send("GET", "/").response.body == server.body
-            times.append(time.monotonic() - began)
+def test_a_server_that_awaits_an_acknowledgement_in_mid_answer_gets_it_at_once(asking):
+    server, client = asking
+    server.body = b"the second segment, which Nagle's algorithm keeps back"
+    times = []
+    for _ in range(21):
+        began = time.monotonic()
+        assert client.send("GET", "/").response.body == server.body
+        times.append(time.monotonic() - began)
     if hasattr(socket, "TCP_QUICKACK"):
         # A delayed acknowledgement takes 0.04 s, and on a busy machine some take as long without.
         assert statistics.quantiles(times)[0] < 0.02
 
 
-class _Stale(BaseHTTPRequestHandler):
+class _Stale(Handler):
     """Reads a second request on a connection and closes it in place of a response; or reads none, and closes."""
-
-    protocol_version = "HTTP/1.1"
 
     def setup(self) -> None:
         super().setup()
         self.answered = 0
 
-    def _answer(self) -> None:
-        self.rfile.read(int(self.headers.get("Content-Length", 0)))
+    def answer(self) -> None:
+        self.content()
         self.server.seen.append(self.command)
         if self.path == "/broken" or self.answered:
             self.close_connection = True
@@ -122,22 +103,11 @@ class _Stale(BaseHTTPRequestHandler):
         self.send_response(204)
         self.end_headers()
 
-    do_GET = do_HEAD = do_OPTIONS = do_PUT = do_DELETE = do_POST = _answer  # noqa: N815 - http.server's names
-
-    def log_message(self, *_: object) -> None:
-        return
-
 
 @pytest.fixture
 def stale():
-    server = ThreadingHTTPServer(("127.0.0.1", 0), _Stale)
-    server.daemon_threads, server.seen = True, []
-    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
-    client = HttpClient(f"http://127.0.0.1:{server.server_port}", Connection(timeout_s=2))
-    yield server, client
-    client.close()
-    server.shutdown()
-    server.server_close()
+    with server_of(_Stale, seen=[]) as server, closing(HttpClient(server.url, Connection(timeout_s=2))) as client:
+        yield server, client
 
 
 @pytest.mark.parametrize("method", ["GET", "HEAD", "OPTIONS", "PUT", "DELETE"])
@@ -161,8 +131,7 @@ def test_a_request_that_is_not_idempotent_and_was_read_is_not_sent_again(stale):
     client.send("GET", "/")
     with pytest.raises(NoAnswerError, match=r"closed the connection without a response$"):
         client.send("POST", "/", body=b"order")
-    assert server.seen == ["GET", "POST"]
-    assert client.connection.resent == 0
+    assert (server.seen, client.connection.resent) == (["GET", "POST"], 0)
 
 
 def test_a_connection_that_is_closed_again_is_told_with_the_response_before(stale):
@@ -215,6 +184,5 @@ def test_a_request_that_nobody_can_have_read_is_sent_again_whatever_its_method()
 def test_what_several_clients_send_again_is_counted(stale):
     server, client = stale
     rounds = [[Outgoing(client, "GET", "/")] * 2] * 2
-    answered = send_together(rounds)
-    assert [attempt.response.status for attempts in answered for attempt in attempts] == [204] * 4
+    assert [attempt.response.status for attempts in send_together(rounds) for attempt in attempts] == [204] * 4
     assert (client.connection.resent, len(server.seen)) == (2, 6)

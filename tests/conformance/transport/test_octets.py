@@ -2,6 +2,7 @@
 
 import re
 import socket
+from contextlib import closing
 
 import pytest
 
@@ -44,9 +45,9 @@ def _sent(listening, method: str, path: str, base: str = "", token: str | None =
     """The octets of one request, with HOST for the address that differs from run to run."""
     recorder = _Recorder(_NOTHING)
     url = listening(recorder)
-    client = HttpClient(url + base, Connection(token=token))
-    assert client.send(method, path, **options).response.status == 204
-    client.close()
+    with closing(HttpClient(url + base, Connection(token=token))) as client:
+        exchange = client.send(method, path, **options)
+    assert (exchange.response.status, exchange.request.url.endswith(base.rstrip("/") + path)) == (204, True)
     (octets,) = recorder.requests
     return octets.replace(url.removeprefix("http://").encode(), b"HOST")
 
@@ -95,13 +96,9 @@ def test_a_body_has_its_length_even_when_it_is_empty(listening, method):
 
 def test_fields_keep_their_order_their_letters_and_their_double(listening):
     fields = [("x-B", "1"), ("X-a", "é"), ("x-b", ""), ("Cookie", "c=d"), ("accept", "a/b;q=0, c/d"), ("X-a", "2")]
-    assert (
-        _sent(listening, "GET", "/", headers=fields)
-        == (
-            "GET / HTTP/1.1\r\nHost: HOST\r\nx-B: 1\r\nX-a: é\r\nx-b: \r\nCookie: c=d\r\n"
-            "accept: a/b;q=0, c/d\r\nX-a: 2\r\n\r\n"
-        ).encode()
-    )
+    expected = "GET / HTTP/1.1\r\nHost: HOST\r\nx-B: 1\r\nX-a: é\r\nx-b: \r\nCookie: c=d\r\n"
+    expected += "accept: a/b;q=0, c/d\r\nX-a: 2\r\n\r\n"
+    assert _sent(listening, "GET", "/", headers=fields) == expected.encode()
 
 
 def test_what_the_caller_says_of_host_and_length_is_not_said_twice(listening):
@@ -138,8 +135,7 @@ def test_the_environment_changes_nothing(listening, monkeypatch, tmp_path):
 @pytest.mark.parametrize("location", [b"/elsewhere", b"http://[::1", b"http://%00/", b"\xff\xfe", b""])
 def test_no_redirect_is_followed_and_none_hides_an_answer(listening, location):
     recorder = _Recorder(b"HTTP/1.1 302 Found\r\nLocation: " + location + b"\r\nContent-Length: 0\r\n\r\n")
-    client = HttpClient(listening(recorder), Connection())
-    assert client.send("GET", "/").response.status == 302
+    assert HttpClient(listening(recorder), Connection()).send("GET", "/").response.status == 302
     assert len(recorder.requests) == 1
 
 
@@ -150,8 +146,7 @@ def test_no_cookie_is_sent_back_and_no_content_is_decoded(listening):
     client = HttpClient(listening(recorder), Connection())
     for _ in range(2):
         assert client.send("GET", "/").response.body == b"abc"
-    assert len(set(recorder.requests)) == 1
-    assert len(recorder.requests) == 2
+    assert (len(set(recorder.requests)), len(recorder.requests)) == (1, 2)
 
 
 @pytest.mark.parametrize("size", [0, 12_000])

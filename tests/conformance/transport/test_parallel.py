@@ -1,9 +1,10 @@
 """Requests of several clients leave at one moment, and each has its own answer."""
 
 import threading
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from contextlib import closing
 
 import pytest
+from toy_server import Handler, server_of
 
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Listener, NoAnswerError
@@ -12,32 +13,16 @@ from conformance.transport.parallel import Outgoing, is_busy, send_together
 CLIENTS = 4
 
 
-class Server(ThreadingHTTPServer):
+class Together(Handler):
     """Answers when CLIENTS requests are there, or never: who sends one after the other waits in vain."""
 
-    daemon_threads = True
-
-    def __init__(self):
-        super().__init__(("127.0.0.1", 0), Handler)
-        self.all_here = threading.Barrier(CLIENTS, timeout=5.0)
-
-
-class Handler(BaseHTTPRequestHandler):
-    protocol_version = "HTTP/1.1"
-
-    def do_GET(self):
+    def answer(self):
         self.server.all_here.wait()
         status = int(self.path.partition("?")[2] or 200)
         if status == 0:
             self.close_connection = True
             return
-        self.send_response(status)
-        self.send_header("Content-Length", str(len(self.path)))
-        self.end_headers()
-        self.wfile.write(self.path.encode())
-
-    def log_message(self, *_):
-        pass
+        self.send(status, self.path.encode())
 
 
 class Heard(Listener):
@@ -50,13 +35,10 @@ class Heard(Listener):
 
 @pytest.fixture
 def client():
-    server = Server()
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    client = HttpClient(f"http://127.0.0.1:{server.server_port}", Connection(timeout_s=5.0, listeners=[Heard()]))
-    yield client
-    client.close()
-    server.shutdown()
-    server.server_close()
+    connection = Connection(timeout_s=5.0, listeners=[Heard()])
+    to_server = server_of(Together, all_here=threading.Barrier(CLIENTS, timeout=5.0))
+    with to_server as server, closing(HttpClient(server.url, connection)) as client:
+        yield client
 
 
 def test_each_request_has_its_answer_and_all_are_there_at_once(client):

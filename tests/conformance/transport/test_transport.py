@@ -124,16 +124,3 @@ def test_a_rate_ceiling_is_kept(listening):
     for _ in range(11):
         client.send("GET", "/")
     assert time.monotonic() - started >= 10 / 50
-
-
-def test_the_base_path_and_an_odd_target_are_sent_as_given(listening):
-    seen = []
-
-    def reply(connection):
-        seen.append(connection.recv(65536))
-        connection.sendall(b"HTTP/1.1 204 No Content\r\n\r\n")
-
-    exchange = _client(listening(reply) + "/r2d2/api/").send("GET", "/a/../%zz?x=+1&y=NaN", headers=[("Accept", "")])
-    assert seen[0].startswith(b"GET /r2d2/api/a/../%zz?x=+1&y=NaN HTTP/1.1\r\n")
-    assert b"accept" not in seen[0].lower()
-    assert exchange.request.url.endswith("/r2d2/api/a/../%zz?x=+1&y=NaN")

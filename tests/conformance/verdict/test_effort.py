@@ -1,8 +1,15 @@
-"""How much is tried depends on how fast a robot answers, by classes and not by chance."""
+"""How much is tried depends on how fast a robot answers, by classes; exploring ends with its time, and that is told."""
+
+import time
 
 import pytest
+from hypothesis import strategies as st
 
+from conformance.verdict import effort
 from conformance.verdict.effort import SPEEDS, Effort
+from conformance.verdict.evidence import RefutedError
+from conformance.verdict.explorer import Explorer
+from conformance.verdict.run import Run
 
 
 @pytest.mark.parametrize(
@@ -37,3 +44,27 @@ def test_what_was_left_out_is_told_with_the_class_and_no_figure_of_this_run():
     assert Effort().seen(60).speed.remark == Effort().seen(70).speed.remark
     assert "one in 5" in Effort().seen(60).speed.remark
     assert "more than about 800 ms" in SPEEDS[-1].remark
+
+
+def test_cases_for_which_no_time_is_left_stand_on_the_certificate(monkeypatch):
+    monkeypatch.setitem(effort._BUDGETS_S, "standard", 0.05)  # noqa: SLF001 - instead of ten seconds
+    run = Run()
+    tried = []
+    explore = Explorer(0, "test_x.py::test_slow", run.effort, run.cut_short)
+    explore(st.integers(), lambda value: (tried.append(value), time.sleep(0.02)), cases=20)
+    assert len(tried) < 20
+    assert run.cut_short == {"test_x.py::test_slow": 20 - len(tried)}
+    (remark,) = run.remarks
+    assert f"test_x.py::test_slow ({20 - len(tried)} cases)" in remark
+
+
+def test_attempts_to_make_a_failure_smaller_are_no_cases(monkeypatch):
+    monkeypatch.setitem(effort._BUDGETS_S, "standard", 0.05)  # noqa: SLF001 - instead of ten seconds
+    run = Run()
+
+    def refuted(_value: int) -> None:
+        time.sleep(0.02)
+        raise RefutedError
+
+    Explorer(0, "test_x.py::test_wrong", run.effort, run.cut_short)(st.integers(), refuted, cases=20)
+    assert (run.cut_short, run.remarks) == ({}, ())

@@ -134,8 +134,7 @@ def test_ipv6_and_a_base_path(toy):
     robot = toy("--prefix", "/fleet/7", host="::1")
     connection = connect(robot)
     assert connection.endpoint.authority == f"[::1]:{robot.port}"
-    request = rest_request(connection.endpoint, "pose", {}, None)
-    assert connection.call(request).status == 200
+    assert connection.call(rest_request(connection.endpoint, "pose", {}, None)).status == 200
     assert connection.call(get(Endpoint.parse(f"http://[::1]:{robot.port}"))).status == 404
 
 
@@ -169,11 +168,7 @@ def test_a_server_that_floods_an_idle_connection_does_not_keep_the_loop_busy():
     [
         "robot:7003",
         "ftp://robot",
-        "http://",
-        "http://robot:99999",
-        "http://robot:x",
-        "http://me:secret@robot",
-        "http://a b/",
+        *(f"http://{rest}" for rest in ("", "robot:99999", "robot:x", "me:secret@robot", "a b/")),
     ],
 )
 def test_urls_that_are_none(url):

@@ -74,8 +74,7 @@ def test_rest_and_soap_take_turns_in_random_abba_quartets():
         quartet = duel[index : index + 4]
         assert len({(segment.phase, segment.client) for segment in quartet}) == 1
         sides = [(segment.interface, segment.label) for segment in quartet]
-        assert sides[0] == sides[3]
-        assert sides[1] == sides[2]
+        assert (sides[0], sides[1]) == (sides[3], sides[2])
         assert sides[0] != sides[1]
         orders[sides[0]] += 1
         assert [segment.pair for segment in quartet] == [index // 2] * 2 + [index // 2 + 1] * 2
@@ -121,14 +120,10 @@ def test_the_number_of_blocks_is_bounded_whatever_the_run(duration, rate):
 def test_workers_and_operations_get_their_even_share_of_short_blocks():
     plan = replace(varied(workers=2, rate=75.0), least_block_s=SHORT_BLOCK_S)
     made = [everything(plan, worker, 2) for worker in range(2)]
+    whose = [(segment.phase, segment.interface, segment.client) for segment in plan.segments]
     for interface, client in (("rest", "wire"), ("soap", "wire"), ("soap", "zeep")):
         met = [
-            Counter(
-                operation
-                for segment, _, operation, _ in share
-                if (plan.segments[segment].phase, plan.segments[segment].interface, plan.segments[segment].client)
-                == ("duel", interface, client)
-            )
+            Counter(operation for segment, _, operation, _ in share if whose[segment] == ("duel", interface, client))
             for share in made
         ]
         assert abs(met[0].total() - met[1].total()) <= 1
@@ -140,8 +135,7 @@ def test_a_quick_robots_interfaces_take_turns_sooner_and_each_block_still_has_it
     slow, quick = varied(rate=400.0), replace(varied(rate=400.0), least_block_s=SHORT_BLOCK_S)
     assert slow.block_s == pytest.approx(BLOCK_S, rel=0.02)
     assert quick.block_s == pytest.approx(SHORT_BLOCK_S, rel=0.02)
-    counts = Counter(segment for segment, *_ in everything(quick))
-    assert min(counts.values()) >= 5
+    assert min(Counter(segment for segment, *_ in everything(quick)).values()) >= 5
     assert replace(varied(rate=100.0), least_block_s=SHORT_BLOCK_S).block_s == pytest.approx(0.08, rel=0.02)
 
 
@@ -246,7 +240,6 @@ def test_a_generator_that_was_held_up_starts_nothing_in_segments_that_are_over()
     pacer.start(Schedule(plan, 0, 1), now_ns() - 10**9, open_model=False)
     with gevent.Timeout(30):
         pacer.done.wait()
-    assert crowd.taken == []
-    assert pacer.waiting == 3
+    assert (crowd.taken, pacer.waiting) == ([], 3)
     gevent.killall(crowd.greenlets)
     pacer.close()

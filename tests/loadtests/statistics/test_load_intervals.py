@@ -143,8 +143,7 @@ def simulated(plan, stall_from, stall_s, service_ms=1.0, *, open_model=True):
 @pytest.mark.parametrize("stall_from", [2.0, 7.3, 11.05, 16.6])
 def test_a_stall_of_two_seconds_in_twenty_shows_in_the_p99(stall_from):
     measured = simulated(STALL, stall_from, 2.0)
-    worst = max(entry.response_ms["p99"] for entry in series(measured, {}) if entry.response_ms["p99"])
-    assert worst > 1200
+    assert max(entry.response_ms["p99"] for entry in series(measured, {}) if entry.response_ms["p99"]) > 1200
     points = [point for entry in time_series(measured)["series"] for point in entry["points"]]
     assert max(point["max_ms"] for point in points) > 1800
 

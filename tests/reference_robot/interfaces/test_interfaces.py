@@ -148,8 +148,7 @@ def test_the_actions_are_nav2s_and_transforms_tf2s(message, definition):
 def test_a_package_is_what_colcon_expects(name):
     folder = INTERFACES / name
     manifest = etree.parse(folder / "package.xml")
-    assert manifest.getroot().get("format") == "3"
-    assert manifest.findtext("name") == name
+    assert (manifest.getroot().get("format"), manifest.findtext("name")) == ("3", name)
     assert manifest.findtext("export/build_type") == "ament_cmake"
     assert manifest.findtext("member_of_group") == "rosidl_interface_packages"
     cmake = (folder / "CMakeLists.txt").read_text()

@@ -63,15 +63,9 @@ class Observer:
         )
 
     def is_connected(self):
-        return (
-            self.odometry
-            and self.goals
-            and self.velocities.get_subscription_count()
-            and self.requests.get_subscription_count()
-            and self.navigate.server_is_ready()
-            and self.compute.server_is_ready()
-            and self.plans.service_is_ready()
-        )
+        heard = (self.velocities.get_subscription_count, self.requests.get_subscription_count)
+        served = (self.navigate.server_is_ready, self.compute.server_is_ready, self.plans.service_is_ready)
+        return self.odometry and self.goals and all(each() for each in (*heard, *served))
 
     @property
     def pose(self):

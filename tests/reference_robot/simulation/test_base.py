@@ -26,8 +26,7 @@ def test_a_setpoint_is_reached_held_for_a_second_and_given_up(robot):
     assert held[0] - commanded < 0.6
     assert held[-1] - commanded < 1.6
     # The last report of it may be older than a second: on a busy machine there are gaps between reports.
-    given_up = next(at for at, _ in robot.odometry if at > held[-1])
-    assert given_up - commanded > HOLD_S
+    assert next(at for at, _ in robot.odometry if at > held[-1]) - commanded > HOLD_S
 
 
 @REAL_TIME
@@ -45,8 +44,7 @@ def test_a_renewed_setpoint_goes_on(robot):
     reached = driven.index(0.3)
     assert len(driven[reached:]) > 20
     assert set(driven[reached:]) == {0.3}
-    distance = math.dist(robot.pose[:2], here[:2])
-    assert 0.3 < distance < 0.3 * (time.monotonic() - told[0]) + 0.05
+    assert 0.3 < math.dist(robot.pose[:2], here[:2]) < 0.3 * (time.monotonic() - told[0]) + 0.05
 
 
 @pytest.mark.parametrize("robot", [{"velocity": "Twist"}, {"velocity": "TwistStamped"}], indirect=True)

@@ -90,7 +90,6 @@ def test_a_flood_hides_no_mission_that_waits_or_drives():
     for number in range(500):
         missions.add(request(number), (number, 0))
     told = states(missions)
-    assert len(told) == 100
-    assert told[-3:] == ["queued", "queued", "active"]
+    assert (len(told), told[-3:]) == (100, ["queued", "queued", "active"])
     assert (missions.taken, missions.dropped) == (501, 498)
     assert states(missions) == []

@@ -28,8 +28,7 @@ def test_a_goal_is_reached_with_feedback_and_shown_while_it_is_active(robot):
     assert handle.accepted
     shown = until(lambda: robot.current_goal)
     assert shown["goal_id"] == bytes(handle.goal_id.uuid).hex()
-    assert shown["status"] == GoalStatus.STATUS_EXECUTING
-    assert shown["pose"]["header"]["frame_id"] == "map"
+    assert (shown["status"], shown["pose"]["header"]["frame_id"]) == (GoalStatus.STATUS_EXECUTING, "map")
     assert shown["pose"]["pose"]["position"] == {"x": 71.0, "y": 36.0, "z": 0.0}
     assert robot.end_of(handle) == GoalStatus.STATUS_SUCCEEDED
     until(lambda: robot.current_goal is None)
@@ -45,8 +44,7 @@ def test_a_cancelled_goal_leaves_the_robot_at_rest_within_the_settle_time(robot)
     handle = robot.send(pose(81.0, 39.0))
     until(lambda: robot.velocity[0] > 0.5)
     cancelled_at = time.monotonic()
-    response = robot.ask(handle.cancel_goal_async)
-    assert len(response.goals_canceling) == 1
+    assert len(robot.ask(handle.cancel_goal_async).goals_canceling) == 1
     assert robot.end_of(handle) == GoalStatus.STATUS_CANCELED
     until(lambda: robot.rests)
     assert robot.odometry[-1][0] - cancelled_at < 0.6

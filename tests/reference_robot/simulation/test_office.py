@@ -19,8 +19,7 @@ def test_the_papers_places_are_free_for_the_whole_body(place):
 
 
 def test_around_the_start_a_metre_is_free_in_every_direction():
-    angles = np.linspace(-math.pi, math.pi, 72)
-    assert OFFICE.distances(*DEPOT, angles, 12.0).min() > 1.5
+    assert OFFICE.distances(*DEPOT, np.linspace(-math.pi, math.pi, 72), 12.0).min() > 1.5
 
 
 def test_the_map_is_an_office_floor():

@@ -32,8 +32,7 @@ def planned(start, goal):
 @settings(deadline=None)
 def test_a_plan_has_exact_ends_and_small_steps_and_clears_the_walls(start, goal):
     path = planned(start, goal)
-    assert tuple(path[0]) == start
-    assert tuple(path[-1]) == goal
+    assert (tuple(path[0]), tuple(path[-1])) == (start, goal)
     for (x, y, _), (next_x, next_y, _) in itertools.pairwise(path):
         assert math.dist((x, y), (next_x, next_y)) <= STEP + 1e-9
     assert OFFICE.grown(BODY_RADIUS - 1e-6).free_lines(path[:-1, :2], path[1:, :2]).all()
@@ -75,8 +74,7 @@ def test_the_papers_places_reach_each_other_quickly(start, goal):
 
 
 def test_a_goal_where_the_robot_stands_is_a_turn():
-    path = PLANNER.plan((*DEPOT, 0.0), (*DEPOT, 1.5))
-    assert path.tolist() == [[*DEPOT, 0.0], [*DEPOT, 1.5]]
+    assert PLANNER.plan((*DEPOT, 0.0), (*DEPOT, 1.5)).tolist() == [[*DEPOT, 0.0], [*DEPOT, 1.5]]
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from observer import Observer, pose, until
+from processes import ended
 
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
@@ -23,13 +24,8 @@ COMMAND = [sys.executable, "-m", "reference_robot.simulation"]
 
 @contextmanager
 def simulation(domain_id):
-    process = subprocess.Popen(
-        [*COMMAND, "--domain-id", str(domain_id)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    process = subprocess.Popen([*COMMAND, "--domain-id", str(domain_id)], **pipes, text=True)
     try:
         assert process.stdout.readline() == "ready\n"
         yield process
@@ -68,9 +64,8 @@ def test_it_lets_the_web_services_go_first(domain_id):
     [(["--names", "missing.toml"], "missing.toml"), (["--domain-id", "102"], "102"), (["--time-scale", "0"], "0")],
 )
 def test_what_it_cannot_use_it_names(arguments, named):
-    done = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 2
-    assert named in done.stderr
+    done = ended(*COMMAND, *arguments)
+    assert (done.returncode, named in done.stderr) == (2, True), done.stderr
     assert "Traceback" not in done.stderr
 
 

@@ -55,8 +55,7 @@ def trace(seed: int) -> list[tuple[tuple[float, float], tuple[float, float]]]:
 
 
 def pairs(seed: int) -> list[tuple[tuple[float, float], tuple[float, float]]]:
-    found = places(driven(seed, (0.5, 0.3), 30.0)[1])
-    return list(itertools.pairwise(found))
+    return list(itertools.pairwise(places(driven(seed, (0.5, 0.3), 30.0)[1])))
 
 
 @pytest.mark.parametrize("belief", [Motion(1.0, 2.0, 3.0), Motion(1.0, 2.0, 3.0, 0.7, -2.5)])

@@ -71,15 +71,8 @@ class ForeignRobot(Node):
             DeliveryRequestMsg, "/DeliveryRequestMsg/from_json", self._delivery, QoSProfile(depth=1000)
         )
         self.create_subscription(velocity, "cmd_vel", self._velocity, 10)
-        self._server = ActionServer(
-            self,
-            NavigateToPose,
-            "navigate_to_pose",
-            execute_callback=self._drive,
-            goal_callback=self._goal,
-            cancel_callback=self._cancel,
-            callback_group=group,
-        )
+        calls = {"goal_callback": self._goal, "cancel_callback": self._cancel, "callback_group": group}
+        self._server = ActionServer(self, NavigateToPose, "navigate_to_pose", self._drive, **calls)
 
     def _publish(self) -> None:
         odometry = self.odometry
@@ -165,6 +158,19 @@ class ForeignRobot(Node):
             self.finished.set()
 
 
+def spin(node: Any, context: Context) -> tuple[MultiThreadedExecutor, threading.Thread]:
+    """Spin a node and have it obey each line of stdin, until that ends. Returns its executor, in its thread."""
+    executor = MultiThreadedExecutor(4, context=context)
+    executor.add_node(node)
+    spinner = threading.Thread(target=executor.spin, daemon=True)
+    spinner.start()
+    tell(ready=True)
+    for line in sys.stdin:
+        node.obey(json.loads(line))
+        tell(obeyed=True)
+    return executor, spinner
+
+
 def main() -> None:
     domain, velocity, *rest = sys.argv[1:]
     context = Context()
@@ -172,14 +178,7 @@ def main() -> None:
     robot = ForeignRobot(context, {"Twist": Twist, "TwistStamped": TwistStamped}[velocity], silent="silent" in rest)
     if "planner" in rest:
         robot.plan_like_nav2()
-    executor = MultiThreadedExecutor(4, context=context)
-    executor.add_node(robot)
-    spinner = threading.Thread(target=executor.spin, daemon=True)
-    spinner.start()
-    tell(ready=True)
-    for line in sys.stdin:
-        robot.obey(json.loads(line))
-        tell(obeyed=True)
+    executor, spinner = spin(robot, context)
     robot.finished.set()
     time.sleep(0.05)
     executor.shutdown()

@@ -12,7 +12,6 @@ nothing else, ``{"server": true}`` makes another one; tells ``server`` when that
 client: ``{"goal": X}`` sends a goal to x = X, as RViz does; tells ``accepted`` with its id, ``ended`` with its status.
 """
 
-import json
 import sys
 import threading
 from typing import Any
@@ -20,7 +19,7 @@ from typing import Any
 import rclpy
 from action_msgs.msg import GoalStatus
 from builtin_interfaces.msg import Time
-from foreign_robot import tell
+from foreign_robot import spin, tell
 from geometry_msgs.msg import Twist, TwistStamped
 from lifecycle_msgs.msg import State
 from lifecycle_msgs.srv import GetState
@@ -29,7 +28,6 @@ from nav_msgs.msg import Odometry
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
-from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
@@ -79,27 +77,17 @@ class Navigator(Node):
         group = ReentrantCallbackGroup()
         for name in ("bt_navigator", "planner_server"):
             self.create_service(GetState, f"{name}/get_state", self._get_state, callback_group=group)
-        self._planner = ActionServer(
-            self,
-            ComputePathToPose,
-            "compute_path_to_pose",
-            execute_callback=self._plan,
-            goal_callback=lambda _: GoalResponse.ACCEPT if self._state == "active" else GoalResponse.REJECT,
-            callback_group=group,
-        )
+        calls = {"goal_callback": self._taken_when_active, "callback_group": group}
+        self._planner = ActionServer(self, ComputePathToPose, "compute_path_to_pose", self._plan, **calls)
         self._group = group
         self._server: ActionServer | None = self._serve()
 
+    def _taken_when_active(self, _goal: Any) -> GoalResponse:
+        return GoalResponse.ACCEPT if self._state == "active" else GoalResponse.REJECT
+
     def _serve(self) -> ActionServer:
-        return ActionServer(
-            self,
-            NavigateToPose,
-            "navigate_to_pose",
-            execute_callback=self._drive,
-            goal_callback=self._goal,
-            cancel_callback=self._cancel,
-            callback_group=self._group,
-        )
+        calls = {"goal_callback": self._goal, "cancel_callback": self._cancel, "callback_group": self._group}
+        return ActionServer(self, NavigateToPose, "navigate_to_pose", self._drive, **calls)
 
     def _get_state(self, _request: GetState.Request, response: GetState.Response) -> GetState.Response:
         response.current_state = State(id=STATES[self._state], label=self._state)
@@ -116,7 +104,7 @@ class Navigator(Node):
         self._finished.clear()
         tell(goal=goal.pose.pose.position.x)
         self._answers.wait()
-        return GoalResponse.ACCEPT if self._state == "active" else GoalResponse.REJECT
+        return self._taken_when_active(goal)
 
     def _cancel(self, handle: Any) -> CancelResponse:
         tell(cancel=handle.request.pose.pose.position.x)
@@ -177,15 +165,7 @@ def main() -> None:
     option = rest.pop(0) if rest and not rest[0].startswith("-") else "Twist"
     context = Context()
     rclpy.init(args=rest, context=context, domain_id=int(domain))
-    node = NODES[role](context, option)
-    executor = MultiThreadedExecutor(4, context=context)
-    executor.add_node(node)
-    spinner = threading.Thread(target=executor.spin, daemon=True)
-    spinner.start()
-    tell(ready=True)
-    for line in sys.stdin:
-        node.obey(json.loads(line))
-        tell(obeyed=True)
+    _, spinner = spin(NODES[role](context, option), context)
     context.try_shutdown()
     spinner.join(2)
 

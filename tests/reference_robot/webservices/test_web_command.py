@@ -9,8 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from processes import ended
 from web_messages import delivery_envelope, delivery_path, goal, twist
-from web_robot import eventually, ros_environment, running_robot, usage_error
+from web_robot import eventually, problem, ros_environment, running_robot, usage_error
 
 COMMAND = [sys.executable, "-m", "reference_robot", "--rest-port=0", "--soap-port=0"]
 READY = re.compile(
@@ -77,9 +78,8 @@ def test_the_robot_ends_with_its_simulation(domain_id):
 @pytest.mark.parametrize("package", ["rclpy", "mybot_delivery_app", "nav2_msgs", "httptools"])
 def test_a_missing_package_is_named_with_its_remedy(package):
     program = f"import sys; sys.modules[{package!r}] = None; from reference_robot.cli import robot; robot(['--attach'])"
-    done = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, text=True, timeout=240)
-    assert done.returncode == 2
-    assert package in done.stderr
+    done = ended(sys.executable, "-c", program)
+    assert (done.returncode, package in done.stderr) == (2, True), done.stderr
     assert "pip install" in done.stderr
     assert "Traceback" not in done.stderr
 
@@ -89,9 +89,7 @@ def test_a_port_in_use_and_an_address_that_is_not_ours_are_named():
         port = taken.getsockname()[1]
         for named, option in ((str(port), f"--soap-port={port}"), ("192.0.2.1", "--host=192.0.2.1")):
             command = [*COMMAND, "--attach", "--insecure", option]
-            done = subprocess.run(
-                command, capture_output=True, text=True, env=ros_environment(), timeout=240, check=False
-            )
+            done = ended(*command, env=ros_environment())
             assert (done.returncode, done.stdout) == (2, "")
             assert named in done.stderr
             assert "Traceback" not in done.stderr
@@ -156,8 +154,7 @@ def test_the_simulated_robot_behind_the_web(domain_id):
         assert served.call("GET", "/robot/navigation/service/plan?x=0&y=0").status_code == 422
 
         outside = served.call("PUT", "/robot/navigation/action/goal/", json=goal(x=-500.0))
-        assert outside.status_code == 422
-        assert "outside the map" in outside.json()["detail"]
+        assert "outside the map" in problem(outside, 422)
 
         assert served.call("PUT", "/robot/velocity/", json=twist(x=0.4)).status_code == 200
         eventually(lambda: abs(served.call("GET", "/robot/velocity/").json()["linear"]["x"] - 0.4) < 0.02)

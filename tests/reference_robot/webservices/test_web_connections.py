@@ -71,8 +71,7 @@ def test_pipelined_requests_are_answered_in_order(served):
     two = (
         b"GET /robot/pose HTTP/1.1\r\nHost: a\r\n\r\nGET /robot/pose/ HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n"
     )
-    answer = served.raw(two)
-    assert re.findall(rb"HTTP/1\.1 (\d+)", answer) == [b"404", b"200"]
+    assert re.findall(rb"HTTP/1\.1 (\d+)", served.raw(two)) == [b"404", b"200"]
 
 
 def test_a_client_that_expects_100_is_told_to_continue(served, foreign):

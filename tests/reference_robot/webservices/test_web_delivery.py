@@ -47,8 +47,8 @@ def test_percent_encoded_numbers_are_numbers(served, foreign):
 
 
 def test_a_body_on_the_put_is_ignored(served, foreign):
-    answer = served.call("PUT", delivery_path(), content=b"\xff{", headers={"Content-Type": "image/png"})
-    assert answer.status_code == 204
+    content = {"content": b"\xff{", "headers": {"Content-Type": "image/png"}}
+    assert served.call("PUT", delivery_path(), **content).status_code == 204
     assert foreign.next("delivery") == as_bits(EXAMPLE, 4)
 
 

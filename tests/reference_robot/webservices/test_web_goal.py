@@ -3,7 +3,7 @@
 import pytest
 from lxml import etree
 from web_messages import goal, query_envelope, twist
-from web_robot import eventually
+from web_robot import eventually, problem
 
 PATH = "/robot/navigation/action/goal/"
 
@@ -33,9 +33,7 @@ def test_a_repeat_is_a_no_op_and_another_pose_a_conflict(served, foreign):
     assert served.call("PUT", PATH, json=goal()).status_code == 201
     foreign.next("goal")
     assert served.call("PUT", PATH, json=goal()).status_code == 200
-    conflict = served.call("PUT", PATH, json=goal(x=9.0))
-    assert conflict.status_code == 409
-    assert "one" in conflict.json()["detail"]
+    assert "one" in problem(served.call("PUT", PATH, json=goal(x=9.0)), 409)
     assert foreign.heard_nothing()
     assert served.call("GET", PATH).json()["goal"]["target_pose"]["pose"]["position"]["x"] == 3.0
 
@@ -98,15 +96,12 @@ def test_any_id_comes_back_unchanged(served, foreign, identity):
     ],
 )
 def test_a_goal_of_the_wrong_shape_or_value_is_refused(served, foreign, sent, named):
-    answer = served.call("PUT", PATH, json=sent)
-    assert answer.status_code == 422
-    assert named in answer.json()["detail"]
+    assert named in problem(served.call("PUT", PATH, json=sent), 422)
     assert foreign.heard_nothing()
 
 
 def test_a_goal_that_the_robot_refuses_is_422(served, foreign):
-    answer = served.call("PUT", PATH, json=goal(x=1000.0))
-    assert answer.status_code == 422
+    problem(served.call("PUT", PATH, json=goal(x=1000.0)), 422)
     assert foreign.next("goal")["x"] == 1000.0
     assert served.call("GET", PATH).status_code == 404
 

@@ -114,8 +114,7 @@ def test_errors_are_problem_details_in_the_format_asked_for(served):
     answer = served.call("PUT", "/robot/velocity/", json=twist(x=9), headers={"Accept": "application/xml"})
     assert answer.headers["Content-Type"] == "application/problem+xml"
     problem = etree.fromstring(answer.content)
-    assert problem.tag == "{urn:ietf:rfc:7807}problem"
-    assert problem.findtext("{urn:ietf:rfc:7807}status") == "422"
+    assert (problem.tag, problem.findtext("{urn:ietf:rfc:7807}status")) == ("{urn:ietf:rfc:7807}problem", "422")
 
 
 @pytest.mark.parametrize("url", ["rest", "publishers"])
@@ -128,8 +127,7 @@ def test_every_answer_is_dated_and_timed(served, url):
 def test_lists_have_an_element_for_each_entry(served):
     served.call("PUT", delivery_path())
     xml = etree.fromstring(served.call("GET", "/robot/app/delivery/", headers={"Accept": "application/xml"}).content)
-    assert xml.tag == "Deliveries"
-    assert {child.tag for child in xml} == {"delivery"}
+    assert (xml.tag, {child.tag for child in xml}) == ("Deliveries", {"delivery"})
     text = served.call("GET", "/robot/app/delivery/", headers={"Accept": "text/plain"}).text
     assert yaml.safe_load(text) == served.call("GET", "/robot/app/delivery/").json()
 

@@ -94,8 +94,7 @@ def test_each_format_is_written_beforehand_for_those_who_ask_for_it(robot, odome
         if x == 2.0:
             assert odometry.written(once) == 2.0
     robot.come(4.0)
-    assert often.wrote == [1.0, 2.0, 3.0, 4.0]
-    assert once.wrote == [2.0]
+    assert (often.wrote, once.wrote) == ([1.0, 2.0, 3.0, 4.0], [2.0])
 
 
 def test_a_value_that_is_not_finite_is_told_to_whoever_asks_and_stops_nothing(robot, odometry):

@@ -4,36 +4,31 @@ import ssl
 
 import pytest
 from web_certificate import pair
-from web_protocol import BIG, PATIENCE, closed, request, runs, served, statuses, until
+from web_protocol import BIG, PATIENCE, closed, request, runs, statuses, until
 
 from reference_robot.webservices.http.messages import BODY_LIMIT
 from reference_robot.webservices.http.tls import server_context
 
 
 @pytest.mark.parametrize("declared", [True, False])
-@runs
-async def test_content_over_the_limit_is_refused_dropped_and_the_connection_goes_on(declared):
-    async with served() as robot:
-        body = b"x" * (BODY_LIMIT + 1)
-        head = request(method="PUT", body=body) if declared else b""
-        if not declared:
-            head = request("/now", "Transfer-Encoding: chunked", method="PUT") + b"%x\r\n%b\r\n0\r\n\r\n" % (
-                len(body),
-                body,
-            )
-        assert statuses(await robot.ask(head + request("/now?next"))) == [413, 200]
-        assert robot.interface.seen == [("GET", b"/now", b"")]
-        assert robot.port.held.size == 0
+@runs()
+async def test_content_over_the_limit_is_refused_dropped_and_the_connection_goes_on(robot, declared):
+    body = b"x" * (BODY_LIMIT + 1)
+    head = request(method="PUT", body=body) if declared else b""
+    if not declared:
+        head = request("/now", "Transfer-Encoding: chunked", method="PUT")
+        head += b"%x\r\n%b\r\n0\r\n\r\n" % (len(body), body)
+    assert statuses(await robot.ask(head + request("/now?next"))) == [413, 200]
+    assert (robot.interface.seen, robot.port.held.size) == ([("GET", b"/now", b"")], 0)
 
 
-@runs
-async def test_refused_content_without_end_is_not_read_for_ever():
-    async with served() as robot:
-        _, writer = await robot.connect()
-        writer.write(request("/now", "Transfer-Encoding: chunked", method="PUT"))
-        with pytest.raises(ConnectionError):
-            await send_for_ever(writer, b"10000\r\n" + b"x" * 0x10000 + b"\r\n")
-        assert robot.port.held.size == 0
+@runs()
+async def test_refused_content_without_end_is_not_read_for_ever(robot):
+    _, writer = await robot.connect()
+    writer.write(request("/now", "Transfer-Encoding: chunked", method="PUT"))
+    with pytest.raises(ConnectionError):
+        await send_for_ever(writer, b"10000\r\n" + b"x" * 0x10000 + b"\r\n")
+    assert robot.port.held.size == 0
 
 
 async def send_for_ever(writer, octets):
@@ -45,69 +40,58 @@ async def send_for_ever(writer, octets):
 @pytest.mark.parametrize(
     ("between", "status"), [(b"", []), (b"\r\n", []), (b"\n\r\n", []), (b"GET", [408]), (b"GET / HTTP/1.1\r\n", [408])]
 )
-@runs
-async def test_whatever_is_left_half_done_after_an_answer_runs_out_of_time(between, status):
-    async with served(keep_alive=PATIENCE) as robot:
-        reader, writer = await robot.connect()
-        writer.write(request())
+@runs(keep_alive=PATIENCE)
+async def test_whatever_is_left_half_done_after_an_answer_runs_out_of_time(robot, between, status):
+    async with robot.talk(request()) as (reader, writer):
         await reader.readuntil(b"\r\n\r\n")
         writer.write(between)
         assert statuses(await closed(reader)) == status
+
+
+@runs()
+async def test_a_client_that_sends_nothing_or_only_line_ends_is_closed(robot):
+    for octets in (b"", b"\r\n", b"\n\n"):
+        async with robot.talk(octets) as (reader, _):
+            assert await closed(reader) == b""
+
+
+@runs()
+async def test_a_client_that_asks_and_never_reads_is_dropped(robot):
+    for asked in (request("/big") * 50, request("/big", "Connection: close")):
+        reader, writer = await robot.connect()
+        writer.transport.pause_reading()
+        writer.write(asked)
+        await until(lambda: robot.interface.seen)
+        await robot.port.is_empty.wait()
+        writer.transport.resume_reading()
+        with pytest.raises(ConnectionResetError):  # and so the kernel, too, keeps nothing for it
+            await reader.read()
+        assert len(robot.interface.seen) < 5  # nothing is answered while nobody reads
+        robot.interface.seen.clear()
         writer.close()
 
 
-@runs
-async def test_a_client_that_sends_nothing_or_only_line_ends_is_closed():
-    async with served() as robot:
-        for octets in (b"", b"\r\n", b"\n\n"):
-            reader, writer = await robot.connect()
-            writer.write(octets)
-            assert await closed(reader) == b""
-            writer.close()
-
-
-@runs
-async def test_a_client_that_asks_and_never_reads_is_dropped():
-    async with served() as robot:
-        for asked in (request("/big") * 50, request("/big", "Connection: close")):
-            reader, writer = await robot.connect()
-            writer.transport.pause_reading()
-            writer.write(asked)
-            await until(lambda: robot.interface.seen)
-            await robot.port.is_empty.wait()
-            writer.transport.resume_reading()
-            with pytest.raises(ConnectionResetError):  # and so the kernel, too, keeps nothing for it
-                await reader.read()
-            assert len(robot.interface.seen) < 5  # nothing is answered while nobody reads
-            robot.interface.seen.clear()
-            writer.close()
-
-
-@runs
-async def test_a_slow_reader_gets_everything():
-    async with served() as robot:
-        reader, writer = await robot.connect()
-        writer.write(request("/big") * 3 + request("/now?end", "Connection: close"))
+@runs()
+async def test_a_slow_reader_gets_everything(robot):
+    async with robot.talk(request("/big") * 3 + request("/now?end", "Connection: close")) as (reader, _):
         answer = await closed(reader)
         assert statuses(answer) == [200] * 4
         assert len(answer) > 3 * len(BIG)
-        writer.close()
 
 
-@runs
-async def test_connections_beyond_the_cap_are_told_so():
-    async with served(connections=2) as robot:
-        kept = [await robot.connect() for _ in range(2)]
-        for _, writer in kept:
-            writer.write(request())
-        for reader, _ in kept:
-            assert statuses(await reader.readuntil(b"\r\n\r\n")) == [200]
-        reader, writer = await robot.connect()
-        answer = await closed(reader)
-        assert statuses(answer) == [503]
-        assert b"retry-after: 1" in answer
-        for _, each in [*kept, (reader, writer)]:
-            each.close()
+@runs(connections=2)
+async def test_connections_beyond_the_cap_are_told_so(robot):
+    kept = [await robot.connect() for _ in range(2)]
+    for _, writer in kept:
+        writer.write(request())
+    for reader, _ in kept:
+        assert statuses(await reader.readuntil(b"\r\n\r\n")) == [200]
+    reader, writer = await robot.connect()
+    answer = await closed(reader)
+    assert statuses(answer) == [503]
+    assert b"retry-after: 1" in answer
+    for _, each in [*kept, (reader, writer)]:
+        each.close()
 
 
 HALF = request("/now", "Content-Length: 900", method="PUT") + b"x" * 800
@@ -122,43 +106,40 @@ KEPT = {
 
 
 @pytest.mark.parametrize("octets", KEPT.values(), ids=KEPT)
-@runs
-async def test_whatever_clients_make_the_robot_keep_is_bounded_for_all_and_given_back(octets):
-    async with served(held=1000) as robot:
-        _, holding = await robot.connect()
-        holding.transport.pause_reading()
-        holding.write(octets)
-        await until(robot.port.is_full)
-        assert statuses(await robot.ask(request(method="PUT", body=b"y" * 300))) == [503]
-        holding.transport.abort()
-        robot.interface.let_go.set()
-        await until(lambda: robot.port.held.size == 0)
-        assert statuses(await robot.ask(request(method="PUT", body=b"y" * 300))) == [200]
-        assert robot.port.held.size == 0
+@runs(held=1000)
+async def test_whatever_clients_make_the_robot_keep_is_bounded_for_all_and_given_back(robot, octets):
+    _, holding = await robot.connect()
+    holding.transport.pause_reading()
+    holding.write(octets)
+    await until(robot.port.is_full)
+    assert statuses(await robot.ask(request(method="PUT", body=b"y" * 300))) == [503]
+    holding.transport.abort()
+    robot.interface.let_go.set()
+    await until(lambda: robot.port.held.size == 0)
+    assert statuses(await robot.ask(request(method="PUT", body=b"y" * 300))) == [200]
+    assert robot.port.held.size == 0
 
 
-@runs
-async def test_a_client_that_does_not_read_is_dropped_at_once_where_too_much_is_kept():
-    async with served(held=1000) as robot:
-        reader, writer = await robot.connect()
-        writer.transport.pause_reading()
-        writer.write(request("/big"))
-        await until(lambda: robot.interface.seen and not robot.port.held.size)
-        writer.transport.resume_reading()
-        assert len(await closed(reader)) < len(BIG)
-        writer.close()
+@runs(held=1000)
+async def test_a_client_that_does_not_read_is_dropped_at_once_where_too_much_is_kept(robot):
+    reader, writer = await robot.connect()
+    writer.transport.pause_reading()
+    writer.write(request("/big"))
+    await until(lambda: robot.interface.seen and not robot.port.held.size)
+    writer.transport.resume_reading()
+    assert len(await closed(reader)) < len(BIG)
+    writer.close()
 
 
-@runs
-async def test_tls_that_is_never_agreed_on_ends_and_counts_as_a_connection(tmp_path):
+def test_tls_that_is_never_agreed_on_ends_and_counts_as_a_connection(tmp_path):
     certificate, key = pair(tmp_path, "robot")
     trusted = ssl.create_default_context(cafile=str(certificate))
-    async with served(tls=server_context(certificate, key), connections=2) as robot:
+
+    @runs(tls=server_context(certificate, key), connections=2)
+    async def judged(robot):
         for octets in (b"", b"\x16\x03\x01", request()):
-            reader, writer = await robot.connect()
-            writer.write(octets)
-            assert b"HTTP" not in await closed(reader)
-            writer.close()
+            async with robot.talk(octets) as (reader, _):
+                assert b"HTTP" not in await closed(reader)
         silent = [await robot.connect() for _ in range(2)]
         third, _ = await robot.connect()
         assert await closed(third, PATIENCE / 2) == b""
@@ -167,12 +148,10 @@ async def test_tls_that_is_never_agreed_on_ends_and_counts_as_a_connection(tmp_p
             writer.close()
 
         # And where it is: whoever is refused in the middle of a request can read why; half a goodbye is one.
-        reader, writer = await robot.connect(ssl=trusted)
-        writer.write(b"GET /" + b"x" * 9000)
-        assert statuses(await closed(reader)) == [414]
-        writer.close()
-        reader, writer = await robot.connect(ssl=trusted)
-        writer.write(request("/later"))
-        await until(lambda: robot.interface.seen)
-        writer.close()
+        async with robot.talk(b"GET /" + b"x" * 9000, ssl=trusted) as (reader, _):
+            assert statuses(await closed(reader)) == [414]
+        async with robot.talk(request("/later"), ssl=trusted) as (reader, _):
+            await until(lambda: robot.interface.seen)
         await robot.port.is_empty.wait()
+
+    judged()

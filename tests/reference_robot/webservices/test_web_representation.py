@@ -81,8 +81,7 @@ def test_a_value_for_a_list_is_refused(kind, value):
 
 
 def resident_megabytes() -> float:
-    pages = int(FilePath("/proc/self/statm").read_text().split()[1])
-    return pages * resource.getpagesize() / 1e6
+    return int(FilePath("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 1e6
 
 
 def test_names_of_strangers_do_not_fill_the_memory():

@@ -1,14 +1,12 @@
 """Messages and faults, by SOAP 1.1 and the WS-I Basic Profile 1.1; the services' descriptions."""
 
-import httpx
 import pytest
 import zeep
 from lxml import etree
-from web_messages import ENVELOPE, NAMESPACE, delivery_envelope, goal, query_envelope
+from web_messages import ENVELOPE, NAMESPACE, SOAP, delivery_envelope, fault_of, goal, query_envelope
 
 from conformance.packs.table1.delivery import EXAMPLE
 
-SOAP = "{http://schemas.xmlsoap.org/soap/envelope/}"
 GOOD = delivery_envelope()
 UNKNOWN = '<s:Header><x:token xmlns:x="urn:x" {}/></s:Header>'
 ADDRESSING = (
@@ -16,20 +14,6 @@ ADDRESSING = (
     '<a:Action s:mustUnderstand="1">urn:anything</a:Action><a:MessageID>urn:uuid:1</a:MessageID>'
     '<a:ReplyTo s:mustUnderstand="1"><a:Address>http://127.0.0.1:1/</a:Address></a:ReplyTo></s:Header>'
 )
-
-
-def fault_of(answer: httpx.Response) -> str:
-    """Return the local fault code of a well-formed fault."""
-    assert answer.status_code == 500, answer.text
-    assert answer.headers["Content-Type"].startswith("text/xml")
-    root = etree.fromstring(answer.content)
-    fault = root.find(f"{SOAP}Body/{SOAP}Fault")
-    assert [child.tag for child in fault] == ["faultcode", "faultstring"]
-    assert fault.findtext("faultstring")
-    assert "Traceback" not in answer.text
-    prefix, _, code = fault.findtext("faultcode").partition(":")
-    assert fault.nsmap[prefix] == SOAP.strip("{}")
-    return code
 
 
 CLIENTS_FAULTS = {

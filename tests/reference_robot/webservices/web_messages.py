@@ -2,9 +2,14 @@
 
 from typing import Any
 
+import httpx
+from lxml import etree
+
 from conformance.packs.table1.delivery import EXAMPLE, PATH_NAMES, XSD_FIELDS
 
 ENVELOPE = '<s:Envelope xmlns:s="http://schemas.xmlsoap.org/soap/envelope/">{}<s:Body>{}</s:Body></s:Envelope>'
+SOAP = "{http://schemas.xmlsoap.org/soap/envelope/}"
+SOAP = "{http://schemas.xmlsoap.org/soap/envelope/}"
 NAMESPACE = "http://soap.turtlebot.mybot.org/"
 
 
@@ -21,6 +26,20 @@ def delivery_envelope(operation: str = "ExecuteDeliveryRequest", header: str = "
 
 def query_envelope(operation: str, content: str = "", header: str = "") -> str:
     return ENVELOPE.format(header, f'<t:{operation} xmlns:t="{NAMESPACE}">{content}</t:{operation}>')
+
+
+def fault_of(answer: httpx.Response) -> str:
+    """Return the local fault code of a well-formed fault."""
+    assert answer.status_code == 500, answer.text
+    assert answer.headers["Content-Type"].startswith("text/xml")
+    root = etree.fromstring(answer.content)
+    fault = root.find(f"{SOAP}Body/{SOAP}Fault")
+    assert [child.tag for child in fault] == ["faultcode", "faultstring"]
+    assert fault.findtext("faultstring")
+    assert "Traceback" not in answer.text
+    prefix, _, code = fault.findtext("faultcode").partition(":")
+    assert fault.nsmap[prefix] == SOAP.strip("{}")
+    return code
 
 
 def twist(x: object = 0.1, z: object = 0.0) -> dict[str, Any]:

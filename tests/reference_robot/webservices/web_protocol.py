@@ -1,7 +1,7 @@
 """The HTTP server by itself, in front of an interface that a test steers, and a client that sends octets."""
 
 import asyncio
-import functools
+import inspect
 import itertools
 import re
 from contextlib import asynccontextmanager
@@ -60,12 +60,17 @@ class Served:
 
     async def ask(self, octets):
         """Send octets and the end of them; return all that comes back."""
-        reader, writer = await self.connect()
+        async with self.talk(octets) as (reader, writer):
+            writer.write_eof()
+            return await asyncio.wait_for(reader.read(), TIMEOUT)
+
+    @asynccontextmanager
+    async def talk(self, octets, **options):
+        """Send octets on a connection, which is closed at the end."""
+        reader, writer = await self.connect(**options)
         writer.write(octets)
-        writer.write_eof()
-        answer = await asyncio.wait_for(reader.read(), TIMEOUT)
+        yield reader, writer
         writer.close()
-        return answer
 
 
 @asynccontextmanager
@@ -81,14 +86,22 @@ async def served(tls=None, **limits):
         await asyncio.wait_for(serving, TIMEOUT)
 
 
-def runs(test):
-    """Run a test that is a coroutine function, on the event loop that the robot runs on."""
+def runs(**limits):
+    """Run a test that is a coroutine function, with a robot of these limits, on the event loop that it runs on."""
 
-    @functools.wraps(test)
-    def run(*arguments, **named):
-        uvloop.run(asyncio.wait_for(test(*arguments, **named), TIMEOUT))
+    def decorated(test):
+        async def with_robot(named):
+            async with served(**limits) as robot:
+                await test(robot, **named)
 
-    return run
+        def run(**named):
+            uvloop.run(asyncio.wait_for(with_robot(named), TIMEOUT))
+
+        names = list(inspect.signature(test).parameters.values())[1:]
+        run.__name__, run.__signature__ = test.__name__, inspect.Signature(names)
+        return run
+
+    return decorated
 
 
 async def until(condition):

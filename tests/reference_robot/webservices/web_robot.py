@@ -68,13 +68,9 @@ class RosProcess:
     """Another process: what it has seen over ROS, and what it is to do."""
 
     def __init__(self, script: str, *arguments: str, **environment: str) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, str(Path(__file__).with_name(script)), *arguments],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env=ros_environment() | environment,
-        )
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+        command = [sys.executable, str(Path(__file__).with_name(script)), *arguments]
+        self.process = subprocess.Popen(command, env=ros_environment() | environment, **pipes)
         self._events: queue.Queue[dict[str, Any]] = queue.Queue()
         self._obeyed = threading.Semaphore(0)
         threading.Thread(target=self._read, daemon=True).start()
@@ -168,6 +164,14 @@ def running_robot(domain_id: int, *options: str, verify: ssl.SSLContext | bool =
         finally:
             process.terminate()
             process.communicate(timeout=_PATIENCE)
+
+
+def problem(answer: httpx.Response, status: int) -> str:
+    """Assert that a response is a problem with this status, and when to try again after a 503; return its detail."""
+    assert answer.status_code == status, answer.text
+    assert (answer.headers["Content-Type"], answer.json()["status"]) == ("application/problem+json", status)
+    assert status != 503 or int(answer.headers["Retry-After"]) > 0
+    return answer.json()["detail"]
 
 
 def eventually(condition: Callable[[], Any]) -> Any:

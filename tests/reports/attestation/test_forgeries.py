@@ -120,6 +120,8 @@ def nothing(_):
     pass
 
 
+INCONCLUSIVE = {"verdict": "inconclusive", "classes": {"http": "pass", "safety": "inconclusive"}}
+OLDER = {"name": "1.0", "digest": "sha256:" + "0" * 64}
 # Signed by the vendor's key, each is genuine, and not what was asked for.
 RESULTS = [
     ("edited page", edited("certificate.html"), {}, {"certificate.html"}),
@@ -131,20 +133,10 @@ RESULTS = [
     ("old firmware", signed_with(statement__robot__version="1.0"), {"firmware": "2.4.1"}, {"firmware"}),
     ("dropped class", signed_with(classes={"http": "pass"}), {}, {"classes"}),
     ("fewer classes than asked", nothing, {"classes": ("http", "describe")}, {"classes"}),
-    (
-        "inconclusive class",
-        signed_with(verdict="inconclusive", classes={"http": "pass", "safety": "inconclusive"}),
-        {},
-        {"verdicts", "classes"},
-    ),
+    ("inconclusive class", signed_with(**INCONCLUSIVE), {}, {"verdicts", "classes"}),
     ("patched suite", signed_with(suite__digest="sha256:" + "6" * 64), {}, {"suites"}),
     ("requirements of one's own", signed_with(requirement_set=None), {}, {"requirement_sets"}),
-    (
-        "old requirements",
-        signed_with(requirement_set={"name": "1.0", "digest": "sha256:" + "0" * 64}),
-        {},
-        {"requirement_sets"},
-    ),
+    ("old requirements", signed_with(requirement_set=OLDER), {}, {"requirement_sets"}),
     ("patched requirements", signed_with(requirement_set__digest="sha256:" + "0" * 64), {}, {"requirement_sets"}),
     ("quick effort", signed_with(effort="quick"), {}, {"efforts"}),
     ("no motion", signed_with(statement__motion_allowed=False), {}, {"motion"}),

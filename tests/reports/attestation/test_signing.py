@@ -11,6 +11,7 @@ import sys
 
 import pytest
 from click.testing import CliRunner
+from processes import ended
 from vendors import Door, requirement
 
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key, signer_of
@@ -36,7 +37,7 @@ def test_openssl_verifies_the_signature(desk, tmp_path):
     (tmp_path / "signature").write_bytes(base64.b64decode(document["signatures"][0]["sig"]))
     command = ["openssl", "pkeyutl", "-verify", "-pubin", "-inkey", desk.keys / PUBLIC_NAME, "-rawin"]
     command += ["-in", tmp_path / "signed", "-sigfile", tmp_path / "signature"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = ended(*command)
     assert done.returncode == 0, done.stderr
     (tmp_path / "signed").write_bytes(encoded + b" ")
     assert subprocess.run(command, capture_output=True, check=False).returncode != 0
@@ -57,8 +58,7 @@ def test_a_private_key_is_for_its_owner_and_never_overwritten(tmp_path):
     before = private.read_bytes()
     assert private.stat().st_mode & 0o777 == 0o600
     again = run(keygen, tmp_path / "keys")
-    assert again.exit_code == 2
-    assert str(private) in again.stderr
+    assert (again.exit_code, str(private) in again.stderr) == (2, True), again.stderr
     assert private.read_bytes() == before
 
 
@@ -87,15 +87,10 @@ def test_keys_are_not_taken_for_one_another(tmp_path):
 
 def test_subjects_are_the_files_that_the_run_was_made_with(desk):
     subjects = {item["name"]: item["digest"]["sha256"] for item in json.loads(desk.payload)["subject"]}
-    assert list(subjects) == [
-        "result.json",
-        "certificate.html",
-        "certificate-print.html",
-        "statement",
-        "contract/openapi.yaml",
-    ]
+    files = ["result.json", "certificate.html", "certificate-print.html"]
+    assert list(subjects) == [*files, "statement", "contract/openapi.yaml"]
     assert subjects["statement"] == "1" * 64
-    done = subprocess.run(["sha256sum", desk.folder / "result.json"], capture_output=True, text=True, check=True)
+    done = ended("sha256sum", desk.folder / "result.json", check=True)
     assert done.stdout.split()[0] == subjects["result.json"]
 
 
@@ -160,17 +155,14 @@ def test_commands_from_key_to_verdict(desk, tmp_path):
     lenient = tmp_path / "policy.toml"
     lenient.write_text("max_age_days = 100000\n")
     accepted = run(verify, *arguments, "--policy", lenient, "--result", desk.folder)
-    assert accepted.exit_code == 0, accepted.output
-    assert "ACCEPTED" in accepted.stdout
+    assert (accepted.exit_code, "ACCEPTED" in accepted.stdout) == (0, True), accepted.stdout
     assert "the holder of this key vouches that this run took place" in " ".join(accepted.stdout.split())
     assert "Not proved: that the robot is genuine" in " ".join(accepted.stdout.split())
     refused = run(verify, *arguments, "--policy", lenient, "--nonce", "monday")
-    assert refused.exit_code == 1
-    assert "REFUSED by your policy: nonce" in refused.stdout
+    assert (refused.exit_code, "REFUSED by your policy: nonce" in refused.stdout) == (1, True), refused.stdout
     desk.edit(signatures=[])
     forged = run(verify, *arguments)
-    assert forged.exit_code == 1
-    assert "Nothing is proved" in forged.stdout
+    assert (forged.exit_code, "Nothing is proved" in forged.stdout) == (1, True), forged.stdout
 
 
 def test_what_cannot_be_read_is_no_verdict(desk, tmp_path):
@@ -208,7 +200,7 @@ def test_the_page_of_certificates_shows_the_default_policy(tmp_path, pytestconfi
 def test_verifying_is_cold_under_a_second(desk):
     command = [sys.executable, "-m", "roaas", "verify", desk.envelope, "--key", desk.keys / PUBLIC_NAME]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = ended(*command)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     assert done.returncode == 1, done.stderr
     assert "which the policy does not trust" in done.stdout, "the suite of the test is not the one that is installed"
@@ -218,5 +210,5 @@ def test_verifying_is_cold_under_a_second(desk):
 
 def test_verifying_imports_nothing_heavy():
     code = "import sys, reports.cli.attestation; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = ended(sys.executable, "-c", code, check=True)
     assert not {"jinja2", "jsonschema", "lxml", "numpy", "matplotlib", "rclpy"} & set(done.stdout.split())

@@ -1,12 +1,12 @@
 """A failure that the baseline expects, from the robot to junit.xml: one meaning in every file on the way."""
 
 import json
-import subprocess
 import sys
 from collections.abc import Iterator
 
 import pytest
 from lxml import etree
+from processes import ended, independent_robot
 
 EXPECTED = "soap-delivery/reachable"  # the robot's SOAP services are claimed and not named
 BASELINE = '[[expected]]\nrequirement = "{}"\nreason = "ticket 7"\nexpires = {}\n'
@@ -15,15 +15,8 @@ BASELINE = '[[expected]]\nrequirement = "{}"\nreason = "ticket 7"\nexpires = {}\
 @pytest.fixture(scope="module")
 def robot() -> Iterator[str]:
     """Yield the REST address of an independent robot."""
-    command = [
-        sys.executable,
-        *["-m", "conformance.packs.table1.independent_robots", "plain", "--rest-port=0", "--soap-port=0"],
-    ]
-    with subprocess.Popen([*command, "--soap-port=0"], stdout=subprocess.PIPE, text=True) as process:
-        try:
-            yield process.stdout.readline().split()[1].removeprefix("rest=")
-        finally:
-            process.kill()
+    with independent_robot("plain") as (_, rest, _):
+        yield rest
 
 
 def certified(robot, folder, expires):
@@ -31,13 +24,7 @@ def certified(robot, folder, expires):
     baseline = folder / "known.toml"
     baseline.write_text(BASELINE.format(EXPECTED, expires), encoding="utf-8")
     command = [sys.executable, "-m", "roaas", "certify", f"--rest={robot}", "--class=soap-delivery", "--effort=quick"]
-    done = subprocess.run(
-        [*command, f"--baseline={baseline}", f"--out={folder}"],
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-    )
+    done = ended(*command, f"--baseline={baseline}", f"--out={folder}")
     assert "Traceback" not in done.stderr
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     requirement = next(item for item in result["requirements"] if item["id"] == EXPECTED)
@@ -61,7 +48,6 @@ def test_an_expected_failure_is_skipped_with_its_reason(robot, tmp_path):
 
 def test_a_failure_whose_entry_has_expired_is_a_failure(robot, tmp_path):
     requirement, case = certified(robot, tmp_path, "2020-12-31")
-    assert requirement["verdict"] == "fail"
-    assert requirement["whole run"] == (1, "not-conformant", None)
+    assert (requirement["verdict"], requirement["whole run"]) == ("fail", (1, "not-conformant", None))
     assert "expected_failure" not in requirement
     assert case.find("failure") is not None

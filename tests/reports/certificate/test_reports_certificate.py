@@ -131,9 +131,8 @@ def test_only_a_conformant_robot_gets_a_certificate(result):
 def test_it_promises_no_more_than_it_can(result):
     for document in (result, conformant(result)):
         shown = text(page(document))
-        assert "It is no proof." in shown
-        assert "suite version 0.1.0" in shown
-        assert "no assessment of functional safety" in shown
+        for said in ("It is no proof.", "suite version 0.1.0", "no assessment of functional safety"):
+            assert said in shown
 
 
 @pytest.mark.parametrize("render", [certificate_html, certificate_markdown])
@@ -154,9 +153,8 @@ def test_hostile_text_stays_text(hostile):
     assert not document.findall(".//img")
     assert not [name for element in document.iter() for name in element.attrib if name.startswith("on")]
     shown = document.text_content()
-    assert "<script>alert(1)</script>" in shown
-    assert "{{7*7}}" in shown
-    assert "\\u202e" in shown
+    for said in ("<script>alert(1)</script>", "{{7*7}}", "\\u202e"):
+        assert said in shown
     assert not set(shown) & set("\x00\x1b\x7f\u202e\u2066\u200b\ufeff\ufffe")
     certificate_html(hostile).encode("utf-8")
 
@@ -208,9 +206,8 @@ def test_nothing_was_executed(result):
     result["statement"] = {"robot": {}, "claims": [], "motion_allowed": False}
     result["target"] = {"rest": None}
     shown = text(page(result))
-    assert "? Inconclusive No case was executed" in shown
-    assert "Unnamed robot" in shown
-    assert "Nothing was tested" in shown
+    for said in ("? Inconclusive No case was executed", "Unnamed robot", "Nothing was tested"):
+        assert said in shown
     assert "Inconclusive" in certificate_markdown(result)
 
 

@@ -5,25 +5,13 @@ import math
 
 import numpy as np
 import pytest
+from latencies import scaled
 
 from reports.errors import ResultsIncompatibleError
 from reports.latency.comparison import compare, judge, ratio_interval, widened
 from reports.latency.comparison_page import comparison_html, comparison_markdown, table, verdict
 
 NAMES = ("old.json", "new.json")
-
-
-def scaled(latency, factor, *, interface="soap"):
-    """Return a copy in which one interface takes `factor` times as long."""
-    changed = copy.deepcopy(latency)
-    for series in changed["series"]:
-        if series["interface"] != interface:
-            continue
-        for group in ("service_ms", "response_ms"):
-            series[group] = {name: value and value * factor for name, value in series[group].items()}
-        for group in ("ci95_ms", "response_ci95_ms"):
-            series[group] = {name: value and [v * factor for v in value] for name, value in series[group].items()}
-    return changed
 
 
 def compared(old, new, threshold=0.05):
@@ -39,7 +27,7 @@ def test_same_result_is_no_change(latency):
 
 
 def test_slower_is_found_where_it_is(latency):
-    found = compared(latency, scaled(latency, 1.2))
+    found = compared(latency, scaled(latency, 1.2, "soap"))
     assert found.slower
     slower = found.with_verdict("slower")
     assert {change.interface for change in slower} == {"soap"}
@@ -49,7 +37,7 @@ def test_slower_is_found_where_it_is(latency):
 
 
 def test_faster_is_no_failure(latency):
-    found = compared(latency, scaled(latency, 0.7))
+    found = compared(latency, scaled(latency, 0.7, "soap"))
     assert not found.slower
     assert found.with_verdict("faster")
     assert verdict(found).words == "It got faster"
@@ -57,16 +45,15 @@ def test_faster_is_no_failure(latency):
 
 @pytest.mark.parametrize(("threshold", "slower"), [(0.05, True), (0.15, True), (0.25, False)])
 def test_threshold(latency, threshold, slower):
-    assert compared(latency, scaled(latency, 1.2), threshold).slower is slower
+    assert compared(latency, scaled(latency, 1.2, "soap"), threshold).slower is slower
 
 
 def test_noise_floor_raises_the_threshold(latency):
-    noisy = scaled(latency, 1.2)
+    noisy = scaled(latency, 1.2, "soap")
     for noise in noisy["noise_floor"]:
         noise["ci95"] = [0.7, 1.3]
     found = compared(latency, noisy)
-    thresholds = {c.threshold for c in found.changes if c.quantile == "p50" and c.client == "wire"}
-    assert thresholds == {1 / 0.7 - 1}
+    assert {c.threshold for c in found.changes if c.quantile == "p50" and c.client == "wire"} == {1 / 0.7 - 1}
     assert not [change for change in found.with_verdict("slower") if change.client == "wire"]
 
 
@@ -91,12 +78,8 @@ def test_noise_makes_nothing_the_same():
 
 def test_ratio_interval_is_that_of_independent_estimates():
     old, new, arm_old, arm_new = 1.0, 1.5, 0.03, 0.04
-    low, high = ratio_interval(
-        old,
-        (old * math.exp(-arm_old), old * math.exp(arm_old)),
-        new,
-        (new * math.exp(-arm_new), new * math.exp(arm_new)),
-    )
+    bounds = ((value * math.exp(-arm), value * math.exp(arm)) for value, arm in ((old, arm_old), (new, arm_new)))
+    low, high = ratio_interval(old, next(bounds), new, next(bounds))
     assert (low, high) == (pytest.approx(1.5 * math.exp(-0.05)), pytest.approx(1.5 * math.exp(0.05)))
 
 
@@ -184,12 +167,11 @@ def test_invalid_result_gives_no_answer(latency):
 
 def test_pages_draw_both(latency):
     latency["series"] = latency["series"][:2]
-    found = compared(latency, scaled(latency, 1.2))
+    found = compared(latency, scaled(latency, 1.2, "soap"))
     source = comparison_html(found, NAMES)
     assert len(source) < 1_500_000
-    assert 'id="change-figure"' in source
-    assert 'id="ratios-figure"' in source
-    assert "It got slower" in source
+    for said in ('id="change-figure"', 'id="ratios-figure"', "It got slower"):
+        assert said in source
     assert "It got slower" in comparison_markdown(found, NAMES)
 
 
@@ -223,14 +205,12 @@ def test_no_false_alarm_among_many_quantiles(latency):
                     series[bounds][name] = [bound * math.exp(error) for bound in interval]
         return changed
 
-    alarms = sum(compared(drawn(), drawn(), 0.0).slower for _ in range(60))
-    assert alarms <= 6
+    assert sum(compared(drawn(), drawn(), 0.0).slower for _ in range(60)) <= 6
 
 
 def test_difference_within_the_generators_lag_is_none_of_the_robots(latency):
-    changed = scaled(latency, 1.5)
-    slower = {c.time for c in compared(latency, changed).with_verdict("slower")}
-    assert slower == {"service", "response"}
+    changed = scaled(latency, 1.5, "soap")
+    assert {c.time for c in compared(latency, changed).with_verdict("slower")} == {"service", "response"}
     changed["generator"]["lag_ms"].update(p50=5.0, p99=500.0)
     assert {c.time for c in compared(latency, changed).with_verdict("slower")} == {"service"}
 
@@ -240,5 +220,4 @@ def test_noise_of_a_quantile_that_was_not_measured(latency):
     noisy["noise_floor"] = [n for n in noisy["noise_floor"] if n["quantile"] == "p50"]
     for noise in noisy["noise_floor"]:
         noise["ci95"] = [0.8, 1.1]
-    found = {c.threshold for c in compared(noisy, noisy).changes if c.client == "wire"}
-    assert found == {1 / 0.8 - 1}
+    assert {c.threshold for c in compared(noisy, noisy).changes if c.client == "wire"} == {1 / 0.8 - 1}

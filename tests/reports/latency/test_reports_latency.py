@@ -99,8 +99,7 @@ def test_markdown_is_short_and_has_the_answer(latency):
 def test_only_what_must_be_there(latency):
     latency["series"] = latency["series"][:2]
     required = ("format", "valid", "invalid_because", "headline", "environment", "plan", "series", "comparisons")
-    document = page({key: latency[key] for key in required})
-    assert figures(document) == ["ratios", "spectrum", "spans"]
+    assert figures(page({key: latency[key] for key in required})) == ["ratios", "spectrum", "spans"]
 
 
 def emptied(latency):
@@ -108,18 +107,10 @@ def emptied(latency):
     nothing = dict.fromkeys(("mean", "p50", "p90", "p95", "p99", "p999", "max"))
     latency.update(heat_map={"width_s": 1.0, "edges_ms": [], "series": []}, blocks=[])
     for series in latency["series"]:
-        series.update(
-            count=0,
-            service_ms=nothing,
-            response_ms=nothing,
-            ci95_ms={"p50": None, "p99": None},
-            histogram="",
-            response_histogram="",
-            spans_ms=dict.fromkeys(("build", "wire", "server", "parse")),
-            response_ci95_ms={"p50": None, "p99": None},
-            reasons={"p50": "0 samples"},
-            modes=None,
-        )
+        unknown = {"p50": None, "p99": None}
+        series.update(service_ms=nothing, response_ms=nothing, ci95_ms=unknown, response_ci95_ms=unknown, modes=None)
+        series.update(count=0, histogram="", response_histogram="", reasons={"p50": "0 samples"})
+        series["spans_ms"] = dict.fromkeys(("build", "wire", "server", "parse"))
     for comparison in latency["comparisons"]:
         comparison.update(soap_minus_rest_ms=None, ratio=None, ci95=None, ci95_difference_ms=None, reason="0 samples")
     latency.update(time_series={"width_s": 1.0, "series": []}, steps=[], knee=[], thresholds=[], noise_floor=[])
@@ -153,8 +144,7 @@ def test_invalid_run_says_so_first(latency):
 def test_one_interface_alone(latency):
     latency["series"] = [s for s in latency["series"] if s["interface"] == "rest"][:1]
     latency.update(comparisons=[], steps=[])
-    document = page(latency)
-    assert "difference" not in figures(document)
+    assert "difference" not in figures(page(latency))
 
 
 def test_a_robot_that_works_longer_over_one_interface_is_told_of(latency):

@@ -1,4 +1,4 @@
-"""A read that a robot puts off for a moment is sent again, a few times in a run; nothing else is."""
+"""Reads that are put off for a moment are sent again, and responses that went to another request are told apart."""
 
 from types import SimpleNamespace
 
@@ -7,6 +7,7 @@ import pytest
 from conformance.api.rest import calls
 from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.questions import Question, misplaced
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.transport.exchange import Exchange, Request, Response
@@ -57,3 +58,25 @@ def test_a_robot_that_is_always_about_to_have_odometry_is_waited_for_a_few_times
     robot = _robot((503, "1"))
     assert {_POSE.send(robot).response.status for _ in range(20)} == {503}
     assert len(slept) == 5
+
+
+def _answer(status):
+    return Response(status, (), b"", 1.0)
+
+
+@pytest.mark.parametrize(
+    ("alone", "misplaced_too"),
+    [
+        (200, True),  # it is still there: the 404 was for somebody else
+        (404, False),  # it has ceased to be there
+        (503, True),
+    ],
+)
+def test_an_answer_is_another_one_s_unless_the_robot_gives_it_alone_as_well(alone, misplaced_too):
+    def send(method, path, **_):
+        return Exchange(Request(method, f"http://r2{path}"), _answer(alone))
+
+    api = RestInterface(Run(contract=Contract.load()), SimpleNamespace(send=send))
+    goal = Question("/goal/", "application/json", lambda answer: "" if answer.status == 200 else f"{answer.status}")
+    assert misplaced(api, goal, _answer(200)) == ""
+    assert bool(misplaced(api, goal, _answer(404))) is misplaced_too

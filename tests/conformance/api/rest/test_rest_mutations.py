@@ -68,12 +68,7 @@ def test_near_misses_hold_what_the_valid_body_asks_for():
     body = next(item for item in TAKING if item.id == "putVelocity").bodies["application/json"]
     made = near_misses(body.examples[0], body.schema, ("linear", "x"))
     names = {item.what for item in made}
-    assert names >= {
-        "a body cut short",
-        "an array as root",
-        "NaN at linear.x",
-        "x missing at linear",
-        "linear twice at the body",
-    }
+    wanted = {"a body cut short", "an array as root", "NaN at linear.x", "x missing at linear"}
+    assert names >= wanted | {"linear twice at the body"}
     assert not names & {"no bytes", "null as root", "null at angular.z"}
     assert all(is_invalid(item.made, body.schema) for item in made)

@@ -1,27 +1,21 @@
+"""Formats: which of them Accept chooses, and that each of them reads as the same value."""
+
 import json
 
 import pytest
 
+from conformance.api.rest.accept import quality
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import operations_of
 from conformance.documents.representation import UnreadableError, flattened, read
 
-SCHEMA = {
-    "type": "object",
-    "required": ["name", "on", "count", "values", "parts"],
-    "properties": {
-        "name": {"type": "string"},
-        "on": {"type": "boolean"},
-        "count": {"type": "integer"},
-        "values": {"type": "array", "items": {"type": "number"}},
-        "parts": {
-            "type": "array",
-            "items": {"type": "object", "required": ["x"], "properties": {"x": {"type": "number"}}},
-        },
-    },
-}
+NUMBER = {"type": "number"}
+PART = {"type": "object", "required": ["x"], "properties": {"x": NUMBER}}
+FIELDS = {name: {"type": kind} for name, kind in (("name", "string"), ("on", "boolean"), ("count", "integer"))}
+FIELDS |= {name: {"type": "array", "items": item} for name, item in (("values", NUMBER), ("parts", PART))}
+SCHEMA = {"type": "object", "required": list(FIELDS), "properties": FIELDS}
 VALUE = {"name": "12", "on": True, "count": 7, "values": [0.1, 1e-05], "parts": [{"x": 1.5}, {"x": -0.0}]}
 FRONT = "<m><name>12</name><on>true</on><count>7</count>"
 
@@ -117,3 +111,22 @@ def test_a_list_has_a_root_of_any_name():
 )
 def test_what_is_wrong_with_json(body, field):
     assert getattr(read_json(body), field)
+
+
+@pytest.mark.parametrize(
+    ("media_type", "accept", "expected"),
+    [
+        ("application/json", None, 1.0),
+        ("application/json", "", 1.0),
+        ("application/json", "*/*", 1.0),
+        ("application/json", "text/plain", 0.0),
+        ("application/json", "APPLICATION/JSON ; Q=0.3", 0.3),
+        ("application/json", "*/*, application/json;q=0.1", 0.1),
+        ("text/plain", "*/*;q=0.1, text/*;q=0.2", 0.2),
+        ("text/plain", "text/plain;q=0, text/*", 0.0),
+        ("application/xml", ", application/xml;version=1;q=0.5,", 0.5),
+        ("application/json", "application/json;q=2", 0.0),
+    ],
+)
+def test_the_most_specific_range_tells(media_type, accept, expected):
+    assert quality(media_type, accept) == expected

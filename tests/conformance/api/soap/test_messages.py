@@ -11,10 +11,11 @@ from conformance.api.soap.envelope import envelope, read
 from conformance.api.soap.forms import written_float, written_integer
 from conformance.api.soap.messages import ordinary, simple_leaves, variants, with_text
 from conformance.api.soap.mutations import invalid_ones, mutations
-from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes, xml_styles
+from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes, value_styles, xml_styles
 from conformance.documents.wsdl import read_file
 from conformance.documents.xml import parse
-from conformance.documents.xml_names import clark
+from conformance.documents.xml_names import ENVELOPE, clark
+from conformance.documents.xml_node import Node
 from conformance.documents.xsd import SchemaDocument, Types
 from conformance.documents.xsd_lexical import plain, unreadable
 from conformance.packs.table1.files import CONTRACT_DIR
@@ -64,19 +65,8 @@ def test_variants_of_the_contract_are_valid_and_finite(message):
 
 def test_mutations_are_of_every_kind_and_invalid_to_both():
     found = list(invalid_ones(mutations(ORDER, ordinary(ORDER, optional=True)), TYPES))
-    kinds = {mutant.kind for mutant in found}
-    assert kinds == {
-        "missing",
-        "unknown",
-        "duplicate",
-        "order",
-        "namespace",
-        "lexical",
-        "range",
-        "nil",
-        "non-finite",
-        "body",
-    }
+    kinds = {"missing", "unknown", "duplicate", "order", "namespace", "lexical", "range", "nil", "non-finite", "body"}
+    assert {mutant.kind for mutant in found} == kinds
     for mutant in found:
         if mutant.kind not in {"body", "non-finite"}:
             element = parse(mutant.made[0].written())
@@ -144,3 +134,27 @@ def test_any_style_says_the_same(style):
 def test_every_simple_type_has_an_ordinary_value():
     for path, simple in simple_leaves(ORDER, ordinary(ORDER, optional=True)):
         assert plain(simple) not in unreadable(simple), path
+
+
+_MESSAGE = envelope([Node(clark("urn:a", "order"), children=(Node("x", "12.5"), Node("name", "a < b & c")))])
+
+
+@pytest.mark.parametrize(("what", "style"), single_changes())
+def test_values_are_the_same_in_every_style(what, style):
+    root = parse(serialize(_MESSAGE, style).encode())
+    assert root.tag == clark(ENVELOPE, "Envelope"), what
+    for name, text in (("x", "12.5"), ("name", "a < b & c")):
+        assert "".join(next(root.iter(name)).itertext()).strip() == text
+
+
+def test_an_attribute_of_another_namespace_is_qualified():
+    style = next(style for what, style in single_changes() if "attribute" in what)
+    (name,) = parse(serialize(_MESSAGE, style).encode()).attrib
+    assert name.startswith("{")
+    assert name.endswith("}Id")
+
+
+def test_styles_by_which_values_are_mistaken_come_first():
+    plain = [style.text == "plain" for style in value_styles()]
+    assert plain == sorted(plain)
+    assert len(plain) == len(single_changes())

@@ -31,17 +31,17 @@ def addressed(location: str) -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("body", "status", "problem"),
+    ("problem", "answer"),
     [
-        (b"", "405 Method Not Allowed", "405"),
-        (b"<html><br></html>", "200 OK", "not well-formed XML"),
-        (b"<html/>", "200 OK", "instead of wsdl:definitions"),
-        (b"\xff\xfe\x00", "200 OK", "not well-formed XML"),
-        (b'<!DOCTYPE a [<!ENTITY b "&b;">]><a>&b;</a>', "200 OK", "no"),
+        ("405", (b"", "405 Method Not Allowed")),
+        ("not well-formed XML", (b"<html><br></html>",)),
+        ("instead of wsdl:definitions", (b"<html/>",)),
+        ("not well-formed XML", (b"\xff\xfe\x00",)),
+        ("no", (b'<!DOCTYPE a [<!ENTITY b "&b;">]><a>&b;</a>',)),
     ],
 )
-def test_without_a_wsdl_the_service_is_at_its_url(listening, body, status, problem):
-    base = listening(answered(body, status))
+def test_without_a_wsdl_the_service_is_at_its_url(listening, problem, answer):
+    base = listening(answered(*answer))
     service = opened(f"{base}/robot_ws?wsdl")
     assert service.endpoint == f"{base}/robot_ws"
     assert service.own is None

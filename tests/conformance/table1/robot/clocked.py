@@ -3,6 +3,8 @@
 from types import SimpleNamespace
 from typing import Any, Final
 
+from toy_messages import exchange
+
 from conformance.observe.clock import SimulatedClock
 from conformance.packs.table1.limits import DeclaredLimits
 from conformance.packs.table1.robot import drive
@@ -11,13 +13,13 @@ from conformance.packs.table1.robot.drive_trace import Command, Turn
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.robot import STILL, Odometry, Velocity
 from conformance.scenarios.rule import Case
-from conformance.transport.exchange import Exchange, Request, Response
+from conformance.transport.exchange import Exchange
 
 WANTED: Final = Velocity(linear_x=0.5)
 SETTLE_S: Final = 1.2
 SAMPLE_S: Final = 0.2
 _LOOK_S = 0.02
-_EXCHANGE = Exchange(Request("GET", "http://robot/"), Response(200, (), b"", 1.0))
+_EXCHANGE = exchange()
 
 
 class Body:
@@ -27,18 +29,11 @@ class Body:
     refuses ``stops`` another one, and another one ``loses`` the first that it is told.
     """
 
-    def __init__(
-        self,
-        clock: SimulatedClock,
-        takes_s: float,
-        hold_s: float,
-        *,
-        renews: bool = True,
-        stops: bool = False,
-        loses: bool = False,
-    ) -> None:
+    def __init__(self, clock: SimulatedClock, takes_s: float, hold_s: float, **faults: bool) -> None:
         self.clock, self.takes_s, self.hold_s = clock, takes_s, hold_s
-        self.renews, self.stops, self.loses = renews, stops, loses
+        self.renews, self.stops, self.loses = (
+            faults.get(name, name == "renews") for name in ("renews", "stops", "loses")
+        )
         self.told: list[float] = []
 
     def tell(self) -> None:

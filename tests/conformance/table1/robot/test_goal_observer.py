@@ -1,6 +1,7 @@
 import json
 
 import pytest
+from toy_messages import goal
 
 from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.robot.goal_observer import GoalObserver
@@ -16,16 +17,6 @@ _JSON = (("Content-Type", "application/json"),)
 @pytest.fixture
 def api() -> RestInterface:
     return RestInterface(Run(statement=Statement()), HttpClient(_BASE, Connection()))
-
-
-def goal(id_: str, stamp: int, x: float, header: int | None = None) -> dict:
-    pose = {"position": {"x": x, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
-    return {
-        "header": {"stamp": {"sec": stamp if header is None else header, "nanosec": 0}, "frame_id": "map"},
-        "goal_id": {"stamp": {"sec": stamp, "nanosec": 7}, "id": id_},
-        "goal": {"target_pose": {"header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": "map"}, "pose": pose}},
-        "status": {"code": 2, "text": ""},
-    }
 
 
 def refuted(api: RestInterface, *rounds: list[dict]) -> set[str]:

@@ -1,25 +1,10 @@
 """What is done at once while a goal is active: in time, at another attempt, or not at all."""
 
-from contextlib import contextmanager
+from toy_body import interface_of
+from toy_messages import odometry
 
-from toy_body import serving
-
-from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.robot.goals import meanwhile
 from conformance.packs.table1.robot.robot import GOAL_PATH, PLAN, Robot
-from conformance.packs.table1.statement import Statement
-from conformance.transport.client import Connection, HttpClient
-from conformance.verdict.run import Run
-
-_ODOMETRY = {
-    "header": {"stamp": {"sec": 1, "nanosec": 0}, "frame_id": "odom"},
-    "child_frame_id": "base_link",
-    "pose": {
-        "pose": {"position": dict.fromkeys("xyz", 0.0), "orientation": {**dict.fromkeys("xyz", 0.0), "w": 1.0}},
-        "covariance": [0.0] * 36,
-    },
-    "twist": {"twist": {part: dict.fromkeys("xyz", 0.0) for part in ("linear", "angular")}, "covariance": [0.0] * 36},
-}
 
 
 class _Body:
@@ -35,15 +20,7 @@ class _Body:
         if method == "PUT":
             self.asked.append(path)
             return (202 if self.takes else 422), None
-        return (404, None) if path == GOAL_PATH else (200, _ODOMETRY)
-
-
-@contextmanager
-def _robot(body: _Body):
-    with serving(body) as url:
-        client = HttpClient(url, Connection())
-        yield Robot(RestInterface(Run(statement=Statement(), allow_motion=True), client))
-        client.close()
+        return (404, None) if path == GOAL_PATH else (200, odometry())
 
 
 def _tried(body: _Body, *in_time: bool) -> tuple[bool, list[tuple[str, str, bool]]]:
@@ -56,8 +33,8 @@ def _tried(body: _Body, *in_time: bool) -> tuple[bool, list[tuple[str, str, bool
         assert there["position"]["x"] == pose.x > 0.5
         return next(answers)
 
-    with _robot(body) as robot:
-        return meanwhile(robot, "goal", act), acts
+    with interface_of(body) as api:
+        return meanwhile(Robot(api), "goal", act), acts
 
 
 def test_what_is_done_in_time_is_done_once():

@@ -1,5 +1,4 @@
 import math
-import subprocess
 import sys
 import time
 
@@ -7,6 +6,7 @@ import pytest
 import rclpy
 from geometry_msgs.msg import Twist
 from mybot_delivery_app.msg import DeliveryRequestMsg
+from processes import ended
 from rclpy.context import Context
 from rclpy.node import Node
 
@@ -67,5 +67,4 @@ def test_a_domain_without_a_robot_is_told(domain_id):
 def test_the_suite_loads_no_ros():
     modules = "conformance.packs.table1.robot.probe.client, conformance.packs.table1.rules.equivalence.test_ros_graph"
     program = f"import sys, {modules}; print('rclpy' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"
+    assert ended(sys.executable, "-c", program, check=True).stdout.strip() == "False"

@@ -88,6 +88,11 @@ class Robot:
         return seen
 
 
+def sender_of(fault, status=204) -> DeliverySender:
+    robot = Robot(fault, status)
+    return DeliverySender(robot, robot, robot)
+
+
 def order(number, how) -> Order:
     delivery = Delivery(3, *(1 / 3 + number + place for place in range(6)))
     return Order(how, delivery, ("3", *map(repr, delivery[1:])))
@@ -101,8 +106,7 @@ def judged(sender, first=0) -> Judge:
 
 
 def found(fault) -> set[str]:
-    robot = Robot(fault)
-    sender = DeliverySender(robot, robot, robot)
+    sender = sender_of(fault)
     sender.send([order(number, how) for number, how in enumerate(("rest", "soap", "coffee", "same") * 3)])
     return {id_.split("/")[1] for id_ in judged(sender).refuted()}
 
@@ -149,8 +153,7 @@ def test_a_second_message_is_found_whenever_it_comes(late):
         first.append(seen)
         return [seen, first[0]] if number == late else [seen]
 
-    robot = Robot(again)
-    sender = DeliverySender(robot, robot, robot)
+    sender = sender_of(again)
     sender.send([order(number, "rest") for number in range(2)])
     assert not judged(sender).refuted()
     for turn in (1, 2):
@@ -161,8 +164,7 @@ def test_a_second_message_is_found_whenever_it_comes(late):
 
 @pytest.mark.parametrize(("batches", "requirements"), [(1, set()), (2, {"delivery-only"})])
 def test_messages_that_the_suite_did_not_cause_fail_only_when_they_come_repeatedly(batches, requirements):
-    robot = Robot(lambda number, seen: [seen, Seen(order(900 + number, "rest").delivery)])
-    sender = DeliverySender(robot, robot, robot)
+    sender = sender_of(lambda number, seen: [seen, Seen(order(900 + number, "rest").delivery)])
     for number in range(batches):
         sender.send([order(number, "rest")])
     assert {id_.split("/")[1] for id_ in judged(sender).refuted()} == requirements
@@ -170,8 +172,7 @@ def test_messages_that_the_suite_did_not_cause_fail_only_when_they_come_repeated
 
 @pytest.mark.parametrize(("status", "arrives", "found"), [(500, True, True), (500, False, False), (504, True, False)])
 def test_a_delivery_that_is_not_accepted_and_arrives_is_told_as_that(status, arrives, found):
-    robot = Robot(lambda _, seen: [seen] if arrives else [], status)
-    sender = DeliverySender(robot, robot, robot)
+    sender = sender_of(lambda _, seen: [seen] if arrives else [], status)
     sender.send([order(1, "rest"), order(2, "rest")])
     findings = judged(sender).evidence["equivalence/delivery-only"].findings
     assert len(findings) == found

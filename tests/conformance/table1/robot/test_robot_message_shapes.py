@@ -1,26 +1,12 @@
+import copy
 import json
 
 import pytest
+from toy_messages import STILL, odometry
 
 from conformance.documents.representation import projected
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, SENSORS, TWIST, read_as
 from conformance.transport.exchange import Response
-
-_VECTOR = {"x": 0, "y": 1.5, "z": -2e3}
-
-
-def twist() -> dict:
-    return {"linear": dict(_VECTOR), "angular": dict(_VECTOR)}
-
-
-def odometry() -> dict:
-    pose = {"position": dict(_VECTOR), "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
-    return {
-        "header": {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": "odom"},
-        "child_frame_id": "base_link",
-        "pose": {"pose": pose, "covariance": [0] * 36},
-        "twist": {"twist": twist(), "covariance": [0.0] * 36},
-    }
 
 
 def answer(body: bytes, status: int = 200) -> Response:
@@ -28,8 +14,8 @@ def answer(body: bytes, status: int = 200) -> Response:
 
 
 def test_a_complete_message_has_no_fault_whatever_a_robot_adds_to_it():
-    message = odometry() | {"battery": 0.5}
-    message["pose"]["pose"]["position"]["w"] = None
+    message = copy.deepcopy(odometry()) | {"battery": 0.5}
+    message["pose"]["pose"]["position"] = {"x": 0, "y": 1.5, "z": -2e3, "w": None}
     assert ODOMETRY.problem(message) == ""
     assert "battery" not in projected(message, ODOMETRY.schema)
 
@@ -48,7 +34,7 @@ def test_a_complete_message_has_no_fault_whatever_a_robot_adds_to_it():
     ],
 )
 def test_a_fault_is_told_by_the_offending_field(change, told):
-    message = odometry()
+    message = copy.deepcopy(odometry())
     change(message)
     assert ODOMETRY.problem(message).startswith(told)
 
@@ -68,5 +54,5 @@ def test_hostile_bodies_are_told_and_never_raised(body):
 
 
 def test_another_status_is_no_message():
-    assert read_as(answer(json.dumps(twist()).encode(), 500), TWIST) == (None, "status 500")
-    assert read_as(answer(json.dumps(twist()).encode()), TWIST) == (twist(), "")
+    assert read_as(answer(json.dumps(STILL).encode(), 500), TWIST) == (None, "status 500")
+    assert read_as(answer(json.dumps(STILL).encode()), TWIST) == (STILL, "")

@@ -3,6 +3,7 @@ import time
 from dataclasses import replace
 
 import pytest
+from toy_messages import STILL, ZERO, odometry
 
 from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.limits import DeclaredLimits
@@ -14,19 +15,6 @@ from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.run import Run
 
 _BASE = "http://robot:7003/r2d2"
-_ZERO = dict.fromkeys("xyz", 0.0)
-
-
-def odometry(second: int = 1, **orientation: float) -> dict:
-    return {
-        "header": {"stamp": {"sec": second, "nanosec": 0}, "frame_id": "odom"},
-        "child_frame_id": "base_link",
-        "pose": {
-            "pose": {"position": _ZERO, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1} | orientation},
-            "covariance": [0] * 36,
-        },
-        "twist": {"twist": {"linear": _ZERO, "angular": _ZERO}, "covariance": [0] * 36},
-    }
 
 
 def opened(statement: Statement) -> RestInterface:
@@ -51,16 +39,7 @@ def api() -> RestInterface:
     return opened(Statement(declared=DeclaredLimits(linear_m_s=0.5, angular_rad_s=2.0)))
 
 
-def see(
-    api: RestInterface,
-    path: str,
-    value: object,
-    *,
-    status: int = 200,
-    headers=(("Accept", "*/*"),),
-    method="GET",
-    after="",
-):
+def see(api, path, value, *, status=200, headers=(("Accept", "*/*"),), method="GET", after=""):
     body = value if isinstance(value, bytes) else json.dumps(value).encode()
     request = Request(method, _BASE + path, (("Host", "robot:7003"), *headers))
     said = (("Content-Type", "application/json"), *((("Retry-After", after),) if after else ()))
@@ -76,8 +55,8 @@ def found(api: RestInterface) -> set[str]:
 def test_good_readings_are_cases(api):
     for second in (1, 1, 2):
         see(api, "/robot/pose/", odometry(second))
-    see(api, "/robot/velocity/", {"linear": _ZERO, "angular": _ZERO, "unit": "m/s"})
-    see(api, "/robot/velocity/linear/", _ZERO)
+    see(api, "/robot/velocity/", STILL | {"unit": "m/s"})
+    see(api, "/robot/velocity/linear/", ZERO)
     assert not found(api)
     assert api.run.judge.evidence["rest-resources/pose-type"].cases == 3
     assert api.run.judge.evidence["rest-resources/linear-type"].cases == 1
@@ -91,7 +70,7 @@ def test_good_readings_are_cases(api):
         ("/robot/pose/", odometry(6, w=1.01), "rest-resources/pose-quaternion"),
         ("/robot/pose/", odometry(6, w=0), "rest-resources/pose-quaternion"),
         ("/robot/pose/", odometry(0), "rest-resources/pose-stamp"),
-        ("/robot/velocity/", {"linear": _ZERO}, "rest-resources/velocity-type"),
+        ("/robot/velocity/", {"linear": ZERO}, "rest-resources/velocity-type"),
         ("/robot/velocity/linear/", [0, 0, 0], "rest-resources/linear-type"),
     ],
 )
@@ -104,9 +83,9 @@ def test_one_bad_reading_among_good_ones_is_found(api, path, value, requirement)
 @pytest.mark.parametrize(
     ("path", "value"),
     [
-        ("/robot/velocity/", {"linear": _ZERO | {"x": 0.6}, "angular": _ZERO}),
-        ("/robot/velocity/", {"linear": _ZERO, "angular": _ZERO | {"z": -2.2}}),
-        ("/robot/velocity/linear/", _ZERO | {"y": 1.0}),
+        ("/robot/velocity/", STILL | {"linear": ZERO | {"x": 0.6}}),
+        ("/robot/velocity/", STILL | {"angular": ZERO | {"z": -2.2}}),
+        ("/robot/velocity/linear/", ZERO | {"y": 1.0}),
     ],
 )
 def test_a_robot_is_too_fast_by_several_samples_never_by_one(api, path, value):
@@ -147,19 +126,15 @@ def test_an_odometry_that_was_seen_long_ago_is_old(api, monkeypatch):
 @pytest.mark.parametrize(("status", "found_"), [(200, {"rest-resources/pose-fresh"}), (503, set())])
 def test_without_odometry_there_is_no_velocity(api, status, found_):
     see(api, "/robot/pose/", {}, status=503, after="1")
-    see(api, "/robot/velocity/", {"linear": _ZERO, "angular": _ZERO}, status=status, after="1")
+    see(api, "/robot/velocity/", STILL, status=status, after="1")
     see(api, "/robot/pose/", {}, status=503, after="1")
     assert found(api) == found_
 
 
 @pytest.mark.parametrize(
     "odd",
-    [
-        {"headers": (("Accept", "application/xml"),)},
-        {"headers": (("X-Odd", "1"),)},
-        {"method": "HEAD"},
-        {"status": 429},
-    ],
+    [{"headers": ((name, value),)} for name, value in (("Accept", "application/xml"), ("X-Odd", "1"))]
+    + [{"method": "HEAD"}, {"status": 429}],
 )
 def test_odd_requests_are_left_to_others(api, odd):
     see(api, "/robot/pose/", b"", **odd)
@@ -174,16 +149,15 @@ def test_without_the_token_nothing_is_judged(api):
 
 def test_undeclared_limits_are_not_known():
     api = opened(Statement())
-    see(api, "/robot/velocity/", {"linear": _ZERO | {"x": 3.0}, "angular": _ZERO})
+    see(api, "/robot/velocity/", STILL | {"linear": ZERO | {"x": 3.0}})
     assert not found(api)
 
 
 def test_a_limit_declared_as_high_as_one_that_nobody_declared_is_judged(api):
     undeclared = Statement().limits
-    declared = DeclaredLimits(linear_m_s=undeclared.linear_m_s)
-    api.run.statement = Statement(declared=declared)
-    fast = _ZERO | {"x": 2 * undeclared.linear_m_s}
+    api.run.statement = Statement(declared=DeclaredLimits(linear_m_s=undeclared.linear_m_s))
+    fast = {"linear": ZERO | {"x": 2 * undeclared.linear_m_s}, "angular": ZERO | {"z": 9.0}}
     for second in range(1, 4):
         see(api, "/robot/pose/", odometry(second))
-        see(api, "/robot/velocity/", {"linear": fast, "angular": _ZERO | {"z": 9.0}})
+        see(api, "/robot/velocity/", fast)
     assert found(api) == {"safety/limits-hold"}

@@ -3,16 +3,16 @@ import random
 from dataclasses import replace
 
 import pytest
+from toy_messages import exchange
 
 from conformance.packs.table1.limits import Noise
 from conformance.packs.table1.robot.geometry import Pose, length_of, quaternion_of, wrapped, yaw_of
 from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import Odometry, Velocity
-from conformance.transport.exchange import Exchange, Request, Response
 
 _NONE = Noise()
 _START = Pose(1.0, 2.0, 0.3)
-_EVIDENCE = Exchange(Request("GET", "http://robot/robot/pose/"), Response(200, (), b"", 1.0))
+_EVIDENCE = exchange()
 
 
 def drive(v: float, w: float, start: Pose, change=lambda pose: pose, seconds: float = 1.0) -> tuple[list, list]:
@@ -26,6 +26,16 @@ def drive(v: float, w: float, start: Pose, change=lambda pose: pose, seconds: fl
             pose.x + v / 50 * math.cos(heading), pose.y + v / 50 * math.sin(heading), wrapped(pose.yaw + w / 50)
         )
     return trace, [velocity] * len(trace)
+
+
+def later(one: Odometry, by_s: float, **changes) -> Odometry:
+    times = {name: getattr(one, name) + by_s for name in ("sent", "received", "stamp")}
+    return replace(one, **times | changes)
+
+
+def still(one: Odometry, count: int) -> list[Odometry]:
+    """A robot that was at rest before a reading, for so many readings."""
+    return [later(one, -i / 50) for i in range(count, 0, -1)]
 
 
 def judged(trace, measured, noise=_NONE) -> dict[str, bool]:
@@ -69,13 +79,8 @@ def test_a_pose_that_moves_otherwise_is_refuted(change, v, w, found):
 def test_what_nobody_saw_is_not_judged():
     """A robot that stood still while its answers were held up for two seconds, and drove on."""
     first, measured = drive(0.5, 0.5, _START)
-    gap = 2.0
     then, more = drive(0.5, 0.5, first[-1].pose)
-    late = [
-        replace(one, sent=one.sent + 1 + gap, received=one.received + 1 + gap, stamp=one.stamp + 1 + gap)
-        for one in then
-    ]
-    found = judged(first + late, measured + more)
+    found = judged(first + [later(one, 1 + 2.0) for one in then], measured + more)
     assert "pose-motion" in found
     assert False not in found.values()
 
@@ -86,22 +91,11 @@ def _held_up(w, at, lost, change=lambda pose: pose, rest=0):
     Its clock goes on meanwhile, readings go on showing the last sample, and ``lost`` of the way is not made.
     """
     trace, measured = drive(0.0, w, _START, seconds=1.5)
-    still = [
-        replace(trace[0], sent=-i / 50, received=-i / 50, stamp=trace[0].stamp - i / 50) for i in range(rest, 0, -1)
-    ]
     before, after = trace[:at], trace[at:]
-    same = [replace(before[-1], sent=before[-1].sent + i / 50, received=before[-1].sent + i / 50) for i in range(1, 20)]
-    later = [
-        replace(
-            one,
-            sent=one.sent + 0.4,
-            received=one.received + 0.4,
-            stamp=one.stamp + 0.4,
-            pose=one.pose._replace(yaw=wrapped(one.pose.yaw + 0.4 * w * (1 - lost))),
-        )
-        for one in after
-    ]
-    found = [replace(one, pose=change(one.pose)) for one in (*still, *before, *same, *later)]
+    same = [later(before[-1], i / 50, stamp=before[-1].stamp) for i in range(1, 20)]
+    unmade = 0.4 * w * (1 - lost)
+    after = [later(one, 0.4, pose=one.pose._replace(yaw=wrapped(one.pose.yaw + unmade))) for one in after]
+    found = [replace(one, pose=change(one.pose)) for one in (*still(trace[0], rest), *before, *same, *after)]
     return found, [Velocity()] * rest + measured[:at] + [measured[0]] * len(same) + measured[at:]
 
 
@@ -122,25 +116,20 @@ def test_odometry_that_was_held_up_once_excuses_nobody(at):
 
 def test_one_jump_while_many_readings_show_a_robot_at_rest_fails_nobody():
     trace, measured = drive(0.5, 0.0, _START)
-    still = [
-        replace(trace[0], sent=-i / 50, received=-i / 50, stamp=trace[0].stamp - i / 50) for i in range(200, 0, -1)
-    ]
     moved = [one if i < 5 else replace(one, pose=one.pose._replace(y=one.pose.y + 0.2)) for i, one in enumerate(trace)]
-    found = judged(still + moved, [Velocity()] * len(still) + measured)
+    found = judged(still(trace[0], 200) + moved, [Velocity()] * 200 + measured)
     assert "pose-motion" in found
     assert False not in found.values()
 
 
 def test_a_robot_that_did_not_move_is_not_judged():
-    found = judged(*drive(0.0, 0.0, Pose(0, 0, 0)))
-    assert found == {}
+    assert judged(*drive(0.0, 0.0, Pose(0, 0, 0))) == {}
 
 
 def test_a_simulation_at_half_speed_goes_by_its_stamps():
     trace, measured = drive(0.3, 0.0, Pose(0, 0, 0))
     slow = [Odometry(2 * o.sent, 2 * o.received, o.stamp, o.pose, o.velocity, o.exchange) for o in trace]
-    found = judged(slow, measured)
-    assert False not in found.values()
+    assert False not in judged(slow, measured).values()
 
 
 @pytest.mark.parametrize("yaw", [0.0, 1.0, -3.0, math.pi / 2])
@@ -173,8 +162,7 @@ def _to_and_fro(v: float, w: float, scale: float, noise: float = 0.0) -> tuple[l
                 linear_x=one.velocity.linear_x + by.gauss(0, noise),
                 angular_z=one.velocity.angular_z + by.gauss(0, noise),
             )
-            trace.append(replace(one, sent=one.sent + second, received=one.received + second, stamp=one.stamp + second))
-            trace[-1] = replace(trace[-1], pose=there, velocity=velocity)
+            trace.append(later(one, second, pose=there, velocity=velocity))
             measured.append(velocity)
         ends = velocities[0]
         shown = shown.ahead(scale * ends.linear_x)._replace(yaw=wrapped(shown.yaw + scale * ends.angular_z))
@@ -184,20 +172,17 @@ def _to_and_fro(v: float, w: float, scale: float, noise: float = 0.0) -> tuple[l
 
 @pytest.mark.parametrize(("v", "w"), [(0.7, 0.0), (0.0, 1.5)])
 def test_driving_back_makes_up_for_no_scale(v, w):
-    found = judged(*_to_and_fro(v, w, 1.3))
-    assert False in found.values()
+    assert False in judged(*_to_and_fro(v, w, 1.3)).values()
 
 
 @pytest.mark.parametrize(("v", "w"), [(0.7, 0.0), (0.0, 1.5)])
 @pytest.mark.parametrize("noise", [0.0, 0.02, 0.05])
 def test_noise_on_the_way_there_at_rest_and_back_fails_nobody(v, w, noise):
-    found = judged(*_to_and_fro(v, w, 1.0, noise), Noise(noise, noise, noise, noise))
-    assert False not in found.values()
+    assert False not in judged(*_to_and_fro(v, w, 1.0, noise), Noise(noise, noise, noise, noise)).values()
 
 
 @pytest.mark.parametrize(("v", "w"), [(0.7, 0.0), (0.0, 1.5)])
 def test_what_readings_far_apart_do_not_show_is_held_against_nobody(v, w):
     # Over a slow link: the velocity had ended in between for half of the time, there and back.
     trace, measured = _to_and_fro(v, w, 0.5)
-    found = judged(trace[::20], measured[::20])
-    assert False not in found.values()
+    assert False not in judged(trace[::20], measured[::20]).values()

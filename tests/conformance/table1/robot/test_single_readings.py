@@ -1,15 +1,15 @@
 """Readings of the velocity that are out now and then: of no sample that the odometry had, and of one that was out."""
 
 import pytest
+from toy_messages import exchange, odometry
 
 from conformance.packs.table1.limits import DeclaredLimits, Noise
 from conformance.packs.table1.robot.robot import STILL, Velocity
 from conformance.packs.table1.robot.single_readings import BesideOdometry, OneSample
-from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.evidence import Judge
 from conformance.verdict.run import Run
 
-_EXCHANGE = Exchange(Request("GET", "http://robot/"), Response(200, (), b"", 1.0))
+_EXCHANGE = exchange()
 _ID = "rest-resources/velocity-odometry"
 _SAMPLE = "rest-resources/pose-sample"
 _FAST = Velocity(linear_x=0.3)
@@ -124,12 +124,6 @@ def test_a_velocity_that_is_gone_while_the_robot_drives_is_judged():
     assert run.refuted == 3
 
 
-def _odometry(x: float) -> dict[str, object]:
-    zero = dict.fromkeys("xyz", 0.0)
-    pose = {"position": {**zero, "x": x}, "orientation": {**zero, "w": 1.0}}
-    return {"pose": {"pose": pose}, "twist": {"twist": {"linear": zero, "angular": zero}}}
-
-
 @pytest.mark.parametrize(
     ("told", "cases", "failures"),
     [
@@ -146,6 +140,6 @@ def test_one_sample_is_told_in_one_way(told, cases, failures):
     judge: Judge = Run().judge
     sample = OneSample(judge, DeclaredLimits(tolerance_abs=0.02).resolved())
     for stamp, x in told:
-        sample.odometry((stamp, 0), _odometry(x), _EXCHANGE)
+        sample.odometry((stamp, 0), odometry(x=x), _EXCHANGE)
     assert judge.counts([_SAMPLE])[_SAMPLE] == cases
     assert judge.refuted().get(_SAMPLE, 0) == failures

@@ -1,18 +1,14 @@
 import time
-from contextlib import contextmanager
 
 import pytest
-from toy_body import serving
+from toy_body import interface_of
+from toy_messages import STILL, ZERO, goal
 
 from conformance.api.rest.interface import RestInterface
-from conformance.packs.table1.limits import DeclaredLimits
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.robot.standstill import Standstill, watch_rest
 from conformance.packs.table1.robot.standstill_trace import Rest, stays
-from conformance.packs.table1.statement import Statement
-from conformance.transport.client import Connection, HttpClient
-from conformance.verdict.run import Run
 
 _CANCEL, _REFUSED = "safety/cancel-stays", "safety/refused-keeps"
 _WATCH_S = 0.3
@@ -35,34 +31,30 @@ class Body:
             self.told.append(method)
             self.drives_at = self.goal_at = float("inf")
             return 204, None
-        zero = dict.fromkeys("xyz", 0.0)
-        linear = {**zero, "x": 0.3 if now > self.drives_at else 0.0}
+        linear = ZERO | {"x": 0.3 if now > self.drives_at else 0.0}
         if path.endswith("/goal/"):
-            return (200, _GOAL) if now > self.goal_at else (404, None)
+            return (200, goal("again")) if now > self.goal_at else (404, None)
         if path.endswith("/linear/"):
             return 200, linear
         if path.endswith("/velocity/"):
-            return 200, {"linear": linear, "angular": zero}
+            return 200, STILL | {"linear": linear}
         return 503, None
 
 
-_POSE = {"position": dict.fromkeys("xyz", 0.0), "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
-_STAMP = {"sec": 1, "nanosec": 0}
-_GOAL = {
-    "header": {"stamp": _STAMP, "frame_id": "map"},
-    "goal_id": {"stamp": _STAMP, "id": "again"},
-    "goal": {"target_pose": {"header": {"stamp": _STAMP, "frame_id": "map"}, "pose": _POSE}},
-    "status": {"code": 2, "text": ""},
-}
+@pytest.fixture
+def body() -> Body:
+    return Body()
 
 
-@contextmanager
-def _serving(body: Body):
-    declared = DeclaredLimits(linear_m_s=0.7, angular_rad_s=2.5, settle_s=0.3)
-    with serving(body) as url:
-        client = HttpClient(url, Connection())
-        yield RestInterface(Run(statement=Statement(declared=declared), allow_motion=True), client)
-        client.close()
+@pytest.fixture
+def api(body: Body):
+    with interface_of(body, linear_m_s=0.7, angular_rad_s=2.5, settle_s=0.3) as api:
+        yield api
+
+
+@pytest.fixture
+def standstill(api: RestInterface) -> Standstill:
+    return Standstill(api)
 
 
 class Trial:
@@ -90,102 +82,75 @@ def _failures(standstill: Standstill) -> set[str]:
     return {id_ for id_ in (_CANCEL, _REFUSED) if not all(case.holds for case in stays(standstill.watched, id_))}
 
 
-def test_nothing_is_judged_where_nothing_was_tried():
-    body = Body()
-    with _serving(body) as api:
-        standstill = Standstill(api)
-        assert not standstill.lasts
-        standstill.watch()
-        assert _counts(standstill) == {_CANCEL: 0, _REFUSED: 0}
-    assert body.told == []
+def test_nothing_is_judged_where_nothing_was_tried(body, standstill):
+    assert not standstill.lasts
+    standstill.watch()
+    assert (_counts(standstill), body.told) == ({_CANCEL: 0, _REFUSED: 0}, [])
 
 
-def test_a_robot_that_stays_is_watched_as_long_as_the_last_trial_needs():
-    body = Body()
-    with _serving(body) as api:
-        standstill = Standstill(api)
-        trials = [Trial(api, _CANCEL), Trial(api, _REFUSED)]
-        for trial in trials:
-            trial.attempt(standstill, goal=True)
-        begun = time.monotonic()
-        assert standstill.lasts
-        standstill.watch()
-        assert time.monotonic() - begun > 0.9 * _WATCH_S
-        assert _counts(standstill) == {_CANCEL: 1, _REFUSED: 1}
-        assert _failures(standstill) == set()
-        assert [trial.repeated_at for trial in trials] == [[], []]
-        standstill.watch()
-        assert _counts(standstill) == {_CANCEL: 1, _REFUSED: 1}
+def test_a_robot_that_stays_is_watched_as_long_as_the_last_trial_needs(body, api, standstill):
+    trials = [Trial(api, _CANCEL), Trial(api, _REFUSED)]
+    for trial in trials:
+        trial.attempt(standstill, goal=True)
+    begun = time.monotonic()
+    assert standstill.lasts
+    standstill.watch()
+    assert time.monotonic() - begun > 0.9 * _WATCH_S
+    assert (_counts(standstill), _failures(standstill)) == ({_CANCEL: 1, _REFUSED: 1}, set())
+    assert [trial.repeated_at for trial in trials] == [[], []]
+    standstill.watch()
+    assert _counts(standstill) == {_CANCEL: 1, _REFUSED: 1}
     # Neither a command nor a cancellation, which would hide what was tried.
     assert body.told == []
 
 
-def test_of_what_was_tried_the_one_that_moves_the_robot_is_found():
-    body = Body()
-    with _serving(body) as api:
-        standstill = Standstill(api)
-        innocent, guilty = Trial(api, _CANCEL), Trial(api, _REFUSED, body.drive)
-        innocent.attempt(standstill)
-        guilty.attempt(standstill)
-        standstill.watch()
-        assert _failures(standstill) == {_REFUSED}
-        assert len(innocent.repeated_at) == len(guilty.repeated_at) == 1
+def test_of_what_was_tried_the_one_that_moves_the_robot_is_found(body, api, standstill):
+    innocent, guilty = Trial(api, _CANCEL), Trial(api, _REFUSED, body.drive)
+    innocent.attempt(standstill)
+    guilty.attempt(standstill)
+    standstill.watch()
+    assert _failures(standstill) == {_REFUSED}
+    assert len(innocent.repeated_at) == len(guilty.repeated_at) == 1
 
 
-def test_what_moves_the_robot_once_is_anybodys_fault():
-    body = Body()
-    with _serving(body) as api:
-        standstill = Standstill(api)
-        trials = [Trial(api, _CANCEL), Trial(api, _REFUSED)]
-        for trial in trials:
-            trial.attempt(standstill)
-        body.drive()
-        standstill.watch()
-        assert _failures(standstill) == {_CANCEL, _REFUSED}
-        assert all(len(trial.repeated_at) == 1 for trial in trials)
+def test_what_moves_the_robot_once_is_anybodys_fault(body, api, standstill):
+    trials = [Trial(api, _CANCEL), Trial(api, _REFUSED)]
+    for trial in trials:
+        trial.attempt(standstill)
+    body.drive()
+    standstill.watch()
+    assert _failures(standstill) == {_CANCEL, _REFUSED}
+    assert all(len(trial.repeated_at) == 1 for trial in trials)
 
 
 @pytest.mark.parametrize("counts", [True, False])
-def test_a_goal_that_comes_back_counts_where_one_was_cancelled(counts):
-    body = Body()
-    with _serving(body) as api:
-        standstill = Standstill(api)
-        Trial(api, _CANCEL).attempt(standstill, goal=counts)
-        body.goal_at = time.monotonic() + _LATER_S
-        standstill.watch()
-        assert _failures(standstill) == ({_CANCEL} if counts else set())
+def test_a_goal_that_comes_back_counts_where_one_was_cancelled(body, api, standstill, counts):
+    Trial(api, _CANCEL).attempt(standstill, goal=counts)
+    body.goal_at = time.monotonic() + _LATER_S
+    standstill.watch()
+    assert _failures(standstill) == ({_CANCEL} if counts else set())
 
 
 @pytest.mark.parametrize("what", ["drives_at", "goal_at"])
-def test_a_robot_that_moves_or_has_a_goal_is_not_left_as_it_is(what):
-    body = Body()
-    with _serving(body) as api:
-        standstill = Standstill(api)
-        Trial(api, _CANCEL).attempt(standstill)
-        setattr(body, what, 0.0)
-        assert not standstill.lasts
+def test_a_robot_that_moves_or_has_a_goal_is_not_left_as_it_is(body, api, standstill, what):
+    Trial(api, _CANCEL).attempt(standstill)
+    setattr(body, what, 0.0)
+    assert not standstill.lasts
 
 
-def test_what_moved_while_something_else_was_read_is_found():
-    body = Body()
-    with _serving(body) as api:
-        standstill = Standstill(api)
-        trial = Trial(api, _REFUSED)
-        trial.attempt(standstill)
-        body.drives_at = 0.0
-        standstill.look()
-        body.drives_at = float("inf")
-        standstill.look()
-        standstill.watch()
-        assert _failures(standstill) == {_REFUSED}
+def test_what_moved_while_something_else_was_read_is_found(body, api, standstill):
+    Trial(api, _REFUSED).attempt(standstill)
+    body.drives_at = 0.0
+    standstill.look()
+    body.drives_at = float("inf")
+    standstill.look()
+    standstill.watch()
+    assert _failures(standstill) == {_REFUSED}
 
 
-def test_nobody_looks_when_what_was_tried_would_have_shown():
-    body = Body()
-    with _serving(body) as api:
-        standstill = Standstill(api)
-        standstill.look()
-        standstill.attempted(_REFUSED, "a trial", list, seconds=0.0)
-        body.drives_at = 0.0
-        standstill.look()
-        assert api.client.connection.sent == 0
+def test_nobody_looks_when_what_was_tried_would_have_shown(body, api, standstill):
+    standstill.look()
+    standstill.attempted(_REFUSED, "a trial", list, seconds=0.0)
+    body.drives_at = 0.0
+    standstill.look()
+    assert api.client.connection.sent == 0

@@ -3,25 +3,18 @@
 import json
 import math
 import time
-from contextlib import contextmanager
 from functools import partial
 
 import pytest
-from toy_body import serving
+from toy_body import interface_of
+from toy_messages import header, odometry
 
-from conformance.api.rest.interface import RestInterface
-from conformance.packs.table1.limits import DeclaredLimits
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.robot import GOAL_PATH, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.taken import goal_has_effect, velocity_has_effect
-from conformance.packs.table1.statement import Statement
-from conformance.transport.client import Connection, HttpClient
-from conformance.verdict.run import Run
 
 _SETTLE_S, _HOLD_S = 0.2, 0.25
 _WANTED = Velocity(linear_x=0.3)
-_STAMP = {"sec": 1, "nanosec": 0}
-_ZERO = dict.fromkeys("xyz", 0.0)
 
 
 class Body:
@@ -31,17 +24,18 @@ class Body:
         forgets: whether it does; refuses: with what status it answers such a PUT instead.
         stands: whether it cannot be moved.
         takes_s: how long it takes to move; slow_s: for how long it thinks before it does anything.
+        goal_ends_s: how long it has a goal, after which its heading is another one by yaw_after_goal.
     """
 
-    def __init__(self, *, forgets=False, refuses=0, stands=False, takes_s=0.05, slow_s=0.0) -> None:
-        self.forgets, self.refuses, self.stands = forgets, refuses, stands
-        self.takes_s, self.slow_s = takes_s, slow_s
+    forgets, refuses, stands, takes_s, slow_s = False, 0, False, 0.05, 0.0
+    goal_ends_s, yaw_after_goal = math.inf, 0.0
+
+    def __init__(self, **given: float) -> None:
+        vars(self).update(given)
         self.told = STILL.twist
         self.moves_from = self.until = -math.inf
         self.goal: dict | None = None
-        self.goal_ends_s = math.inf
         self.goal_until = math.inf
-        self.yaw_after_goal = 0.0
         self.yaw = 0.0
 
     def answer(self, method: str, path: str, sent: bytes) -> tuple[int, object]:
@@ -64,9 +58,8 @@ class Body:
             if self.forgets:
                 return 204, None
         if path == GOAL_PATH:
-            value["goal_id"]["stamp"] = value["goal"]["target_pose"]["header"]["stamp"] = _STAMP
-            header = {"stamp": _STAMP, "frame_id": "map"}
-            self.goal = {**value, "header": header, "status": {"code": 2, "text": ""}}
+            value["goal_id"]["stamp"] = value["goal"]["target_pose"]["header"]["stamp"] = header()["stamp"]
+            self.goal = {**value, "header": header(), "status": {"code": 2, "text": ""}}
             self.goal_until = now + self.goal_ends_s
             return 202, None
         if value != self.told or now > self.until:
@@ -80,25 +73,11 @@ class Body:
             return 200, twist
         if path == GOAL_PATH:
             return (404, None) if self.goal is None else (200, self.goal)
-        turned = {"x": 0.0, "y": 0.0, "z": math.sin(self.yaw / 2), "w": math.cos(self.yaw / 2)}
-        covariance = [0.0] * 36
-        pose = {"pose": {"position": _ZERO, "orientation": turned}, "covariance": covariance}
-        header = {"stamp": {"sec": int(now), "nanosec": int(now % 1 * 1e9)}, "frame_id": "odom"}
-        return 200, {
-            "header": header,
-            "child_frame_id": "base_link",
-            "pose": pose,
-            "twist": {"twist": twist, "covariance": covariance},
-        }
+        return 200, odometry(now, twist, z=math.sin(self.yaw / 2), w=math.cos(self.yaw / 2))
 
 
-@contextmanager
 def _serving(body: Body):
-    declared = DeclaredLimits(linear_m_s=0.7, angular_rad_s=2.5, settle_s=_SETTLE_S, hold_s=_HOLD_S, odometry_hz=50)
-    with serving(body) as url:
-        client = HttpClient(url, Connection())
-        yield RestInterface(Run(statement=Statement(declared=declared), allow_motion=True), client)
-        client.close()
+    return interface_of(body, linear_m_s=0.7, angular_rad_s=2.5, settle_s=_SETTLE_S, hold_s=_HOLD_S, odometry_hz=50)
 
 
 def _odd(robot: Robot, path: str, value: dict):
@@ -158,12 +137,8 @@ def test_a_velocity_that_is_rest_within_the_tolerance_tells_nothing():
 
 
 def test_a_goal_that_is_over_at_once_tells_nothing():
-    body = Body()
-    body.goal_ends_s = 0.0
-    assert _goal(body) is None
+    assert _goal(Body(goal_ends_s=0.0)) is None
 
 
 def test_a_goal_that_was_followed_before_anybody_looked_has_had_its_effect():
-    body = Body()
-    body.goal_ends_s, body.yaw_after_goal = 0.0, 2.5
-    assert _goal(body) is True
+    assert _goal(Body(goal_ends_s=0.0, yaw_after_goal=2.5)) is True

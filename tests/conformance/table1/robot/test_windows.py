@@ -1,12 +1,12 @@
 """Windows over made records: one sample that is out fails nobody, and an error of a tenth fails everybody."""
 
-import json
 import math
 import random
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from toy_messages import exchange
 
 from conformance.packs.table1.limits import DeclaredLimits, Limits, Noise
 from conformance.packs.table1.robot import windows
@@ -15,9 +15,8 @@ from conformance.packs.table1.robot.geometry import Pose, wrapped
 from conformance.packs.table1.robot.letting_go import LetGo
 from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import STILL, Odometry, Velocity
-from conformance.transport.exchange import Exchange, Request, Response
 
-_EXCHANGE = Exchange(Request("GET", "http://robot/"), Response(200, (), json.dumps({}).encode(), 1.0))
+_EXCHANGE = exchange()
 _NOISE = Noise(position_m=0.005, heading_rad=0.005, linear_m_s=0.01, angular_rad_s=0.02)
 _LIMITS = DeclaredLimits(
     linear_m_s=0.7, angular_rad_s=2.5, settle_s=0.6, hold_s=1.0, tolerance=0.05, tolerance_abs=0.01, noise=_NOISE
@@ -66,8 +65,7 @@ def test_what_a_robot_does_is_seen_through_its_noise(hz, seed):
 
 @given(rates, seeds, st.sampled_from((0.9, 1.1)))
 def test_an_error_of_a_tenth_is_seen_through_any_noise(hz, seed, factor):
-    wrong = Velocity(*(factor * value for value in _FAST))
-    assert shown(watched([wrong] * 120, hz, seed), _FAST) is False
+    assert shown(watched([Velocity(*(factor * value for value in _FAST))] * 120, hz, seed), _FAST) is False
 
 
 @given(rates, outliers, st.integers(1, 40))
@@ -116,8 +114,7 @@ def let_go(holds: float, hz: float = 50, begins: float = 0.1, seed: int | None =
     for index in range(150):
         left = 1 - max(0.0, 0.02 * index - holds) / 0.2
         true.append(Velocity(*(max(0.0, left) * value for value in _FAST)))
-    turns = [one for one in watched(true, hz, seed) if one.at >= begins]
-    return LetGo(_FAST, 0.0, 0.02, tuple(turns))
+    return LetGo(_FAST, 0.0, 0.02, tuple([one for one in watched(true, hz, seed) if one.at >= begins]))
 
 
 @few
@@ -152,8 +149,7 @@ def in_silence(holds: float, hz: float = 50, seed: int | None = None) -> LetGo:
     whole = let_go(holds, hz, seed=seed)
     before = tuple(one for one in whole.turns if one.at < 0.95)
     until = LetGo(_FAST, 0.0, 0.02, before).longest(_LIMITS) + 0.02
-    behind = tuple(one for one in whole.turns if one.at > until)
-    return LetGo(_FAST, 0.0, 0.02, before + behind, len(before))
+    return LetGo(_FAST, 0.0, 0.02, before + tuple(one for one in whole.turns if one.at > until), len(before))
 
 
 @few

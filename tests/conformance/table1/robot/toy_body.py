@@ -1,11 +1,16 @@
 """A robot's body behind a small HTTP server, for tests of what moves and stops it."""
 
-import json
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from contextlib import closing, contextmanager
 from typing import Protocol
+
+from toy_server import serving
+
+from conformance.api.rest.interface import RestInterface
+from conformance.packs.table1.limits import DeclaredLimits
+from conformance.packs.table1.statement import Statement
+from conformance.transport.client import Connection, HttpClient
+from conformance.verdict.run import Run
 
 
 class Body(Protocol):
@@ -15,30 +20,8 @@ class Body(Protocol):
 
 
 @contextmanager
-def serving(body: Body) -> Iterator[str]:
-    """Serve a body on loopback; yields its base URL."""
-
-    class Handler(BaseHTTPRequestHandler):
-        protocol_version = "HTTP/1.1"
-        wbufsize = -1
-
-        def _do(self) -> None:
-            sent = self.rfile.read(int(self.headers.get("Content-Length") or 0))
-            status, value = body.answer(self.command, self.path, sent)
-            content = b"" if value is None else json.dumps(value).encode()
-            self.send_response(status)
-            self.send_header("Content-Type", "application/json")
-            self.send_header("Content-Length", str(len(content)))
-            self.end_headers()
-            self.wfile.write(content)
-
-        do_GET = do_PUT = do_DELETE = _do  # noqa: N815 - http.server's names
-
-        def log_message(self, *_: object) -> None:
-            return
-
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield f"http://127.0.0.1:{server.server_port}"
-    server.shutdown()
-    server.server_close()
+def interface_of(body: Body, **limits: float) -> Iterator[RestInterface]:
+    """Serve a robot that may be moved and declares these limits."""
+    with serving(body.answer) as url, closing(HttpClient(url, Connection())) as client:
+        statement = Statement(declared=DeclaredLimits(**limits))
+        yield RestInterface(Run(statement=statement, allow_motion=True), client)

@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import pytest
+from toy_messages import exchange
 
 from conformance.packs.table1.limits import DeclaredLimits
 from conformance.packs.table1.robot.concurrent_puts import (
@@ -16,20 +17,15 @@ from conformance.packs.table1.robot.robot import STILL, Velocity
 from conformance.packs.table1.rules.rest_resources import test_several_clients as rules
 from conformance.packs.table1.statement import Statement
 from conformance.scenarios.rule import Case, Note
-from conformance.transport.exchange import Exchange, Request, Response
 
 _STATEMENT = Statement(declared=DeclaredLimits(settle_s=1.0, hold_s=3.0, tolerance_abs=0.02))
 _ONE, _OTHER = Velocity(linear_x=0.5, angular_z=-0.5), Velocity(linear_x=-0.5, angular_z=0.5)
 _MIXTURE, _NEITHER = Velocity(linear_x=0.5, angular_z=0.5), Velocity(linear_x=0.1)
 
 
-def _exchange(status=204):
-    return Exchange(Request("PUT", "http://robot/"), Response(status, (), b"", 1.0))
-
-
 def _goal(*statuses, differs="", cancelled=("no goal",)):
-    reads = tuple(GoalRead(_exchange(), one) for one in cancelled)
-    return ConcurrentGoal(tuple(map(_exchange, statuses)), GoalRead(_exchange(), differs), reads)
+    reads = tuple(GoalRead(exchange(), one) for one in cancelled)
+    return ConcurrentGoal(tuple(map(exchange, statuses)), GoalRead(exchange(), differs), reads)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +38,7 @@ def _goal(*statuses, differs="", cancelled=("no goal",)):
         (_goal(201, 409), [False, True, True]),
         (_goal(201, differs="position.x 1 for 2"), [True, False, True]),
         (_goal(201, cancelled=("no goal", "")), [True, True, True, False]),
-        (ConcurrentGoal((_exchange(201),), None), [True]),
+        (ConcurrentGoal((exchange(201),), None), [True]),
     ],
 )
 def test_one_goal_of_several_clients_is_one_goal(goal, holds):
@@ -50,8 +46,8 @@ def test_one_goal_of_several_clients_is_one_goal(goal, holds):
 
 
 def _velocities(*reads, last=False, accepted=(_ONE, _OTHER)):
-    made = tuple(VelocityRead(at, at + 0.01, velocity, _exchange()) for at, velocity in reads)
-    return ConcurrentVelocities(tuple(Accepted(one, _exchange()) for one in accepted), 0.0, 0.1, made, last)
+    made = tuple(VelocityRead(at, at + 0.01, velocity, exchange()) for at, velocity in reads)
+    return ConcurrentVelocities(tuple(Accepted(one, exchange()) for one in accepted), 0.0, 0.1, made, last)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Rules on goals, by traces made by hand."""
 
 import pytest
+from toy_messages import exchange
 
 from conformance.packs.table1.robot.goal_trace import FarGoal, GoalStep, Put, RefusedGoals, SpecialGoal
 from conformance.packs.table1.rules.rest_resources import test_goal_ids as ids
@@ -8,11 +9,6 @@ from conformance.packs.table1.rules.rest_resources import test_goal_refused as r
 from conformance.packs.table1.rules.rest_resources import test_goal_walk as walk
 from conformance.packs.table1.rules.strict_input import test_refused_state as refused
 from conformance.packs.table1.scenarios.invalid_goals import InvalidGoal
-from conformance.transport.exchange import Exchange, Request, Response
-
-
-def _exchange(status):
-    return Exchange(Request("PUT", "http://robot/"), Response(status, (), b"", 1.0))
 
 
 def _holds(rule, trace):
@@ -23,7 +19,7 @@ def _holds(rule, trace):
     ("status", "refused", "accepted"), [(201, False, True), (422, True, False), (500, False, False)]
 )
 def test_a_special_goal_is_refused_or_accepted(status, refused, accepted):
-    put = (SpecialGoal("a quaternion of length 2", _exchange(status)),)
+    put = (SpecialGoal("a quaternion of length 2", exchange(status)),)
     assert _holds(rules.goal_quaternion, RefusedGoals(not_unit=put)) == [refused]
     assert _holds(rules.goal_frame, RefusedGoals(unknown_frames=put)) == [refused]
     assert _holds(rules.goal_quaternion_taken, RefusedGoals(unit=put)) == [accepted]
@@ -39,7 +35,7 @@ def test_a_special_goal_is_refused_or_accepted(status, refused, accepted):
     ],
 )
 def test_a_goal_outside_every_map_is_refused_or_ends(status, read, holds, observed):
-    far = FarGoal(_exchange(status), None if read is None else _exchange(read), 10.0)
+    far = FarGoal(exchange(status), None if read is None else exchange(read), 10.0)
     (case,) = rules.goal_unreachable.outcomes(RefusedGoals(far=(far,)), {}.__getitem__)
     assert (case.holds, case.observed) == (holds, observed)
 
@@ -60,14 +56,14 @@ def test_a_goal_outside_every_map_is_refused_or_ends(status, read, holds, observ
     ],
 )
 def test_a_step_of_a_walk_is_judged_by_the_rule_of_its_kind(kind, status, differs, ended, holds):
-    trace = (GoalStep(kind, _exchange(status), differs, ended),)
+    trace = (GoalStep(kind, exchange(status), differs, ended),)
     assert _holds(getattr(walk, kind.replace("-", "_")), trace) == [holds]
     assert not _holds(walk.goal_none, trace)
 
 
 def test_a_goal_is_accepted_and_shown_under_its_id_unless_it_has_ended():
     def put(status, differs="", *, ended=False):
-        return Put(_exchange(status), {"goal_id": {"id": "a"}}, None, _exchange(200), differs, ended)
+        return Put(exchange(status), {"goal_id": {"id": "a"}}, None, exchange(200), differs, ended)
 
     assert _holds(ids.goal_id, (put(201), put(400), put(202, "goal_id.id b for a"))) == [True, False, True, True, False]
     assert _holds(ids.goal_preempt, (put(201, "status 404", ended=True), put(422), put(201))) == [True]
@@ -81,6 +77,6 @@ def test_a_goal_is_accepted_and_shown_under_its_id_unless_it_has_ended():
     ],
 )
 def test_an_invalid_goal_changes_nothing(during, differs, expected):
-    trace = (InvalidGoal("an empty id", during, _exchange(400), differs),)
+    trace = (InvalidGoal("an empty id", during, exchange(400), differs),)
     (case,) = refused.goal_refused.outcomes(trace, {}.__getitem__)
     assert (case.holds, case.expected) == (not differs, expected)

@@ -3,20 +3,16 @@
 from types import SimpleNamespace
 
 import pytest
+from toy_messages import exchange
 
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.plan import Plan, Start
 from conformance.packs.table1.robot.plan_trace import DefaultPlan, FramePlan, PlanRead, PlansFromRobot, PlansFromStart
 from conformance.packs.table1.rules.rest_resources import test_plan as rules
 from conformance.packs.table1.statement import Statement
-from conformance.transport.exchange import Exchange, Request, Response
 
 _HERE, _THERE, _ASIDE = Pose(0.0, 0.0, 0.0), Pose(0.9, 0.0, 0.0), Pose(0.9, 0.5, 0.0)
 _RUN = {"run": SimpleNamespace(statement=Statement())}
-
-
-def _exchange(status=200):
-    return Exchange(Request("GET", "http://robot/"), Response(status, (), b"", 1.0))
 
 
 def _plan(*poses, frame="map"):
@@ -37,31 +33,31 @@ def _holds(rule, trace):
     ],
 )
 def test_a_plan_is_judged_by_its_path(rule, plan):
-    reads = tuple(PlanRead(_THERE, 0.1, _exchange(), "", one) for one in (_plan(), plan))
+    reads = tuple(PlanRead(_THERE, 0.1, exchange(), "", one) for one in (_plan(), plan))
     assert _holds(rule, PlansFromRobot(reads)) == _holds(rule, PlansFromStart(reads)) == [True, False]
 
 
 def test_a_response_without_a_plan_is_judged_by_its_type_only():
-    trace = PlansFromRobot((PlanRead(_THERE, 0.1, _exchange(500), "status 500", None),))
+    trace = PlansFromRobot((PlanRead(_THERE, 0.1, exchange(500), "status 500", None),))
     assert _holds(rules.plan_type, trace) == [False]
     others = (rules.plan_start, rules.plan_end, rules.plan_yaw, rules.plan_continuous, rules.plan_frame)
     assert all(_holds(rule, trace) == [] for rule in others)
 
 
 def test_a_robot_without_any_plan_fails():
-    assert _holds(rules.plan_type, PlansFromRobot(nowhere=_exchange(422))) == [False]
+    assert _holds(rules.plan_type, PlansFromRobot(nowhere=exchange(422))) == [False]
 
 
 @pytest.mark.parametrize(("beyond_m", "holds"), [((-0.1,), True), ((0.3, 0.3, 0.3), False), ((0.3, -0.1, -0.1), True)])
 def test_a_plan_begins_at_the_robot(beyond_m, holds):
-    start = Start(_ASIDE, _HERE, _exchange(), beyond_m)
-    trace = PlansFromRobot((PlanRead(_THERE, 0.1, _exchange(), "", _plan(), start=start),))
+    start = Start(_ASIDE, _HERE, exchange(), beyond_m)
+    trace = PlansFromRobot((PlanRead(_THERE, 0.1, exchange(), "", _plan(), start=start),))
     assert _holds(rules.plan_start, trace) == [holds]
 
 
 @pytest.mark.parametrize(("plan", "holds"), [(_plan(), True), (_plan(_ASIDE, _THERE), False), (None, False)])
 def test_a_plan_begins_at_the_start_in_the_request(plan, holds):
-    read = PlanRead(_THERE, 0.1, _exchange(), "" if plan else "status 500", plan, begin=_HERE)
+    read = PlanRead(_THERE, 0.1, exchange(), "" if plan else "status 500", plan, begin=_HERE)
     assert _holds(rules.plan_given_start, PlansFromStart((read,))) == [holds]
 
 
@@ -77,7 +73,7 @@ def test_a_plan_begins_at_the_start_in_the_request(plan, holds):
     ],
 )
 def test_what_a_request_leaves_out_has_its_default(plan, holds):
-    default = DefaultPlan(_THERE, _exchange(), "" if plan else "status 500", plan, _plan())
+    default = DefaultPlan(_THERE, exchange(), "" if plan else "status 500", plan, _plan())
     assert _holds(rules.plan_defaults, PlansFromStart(defaults=(default,))) == [holds]
 
 
@@ -95,11 +91,11 @@ def test_what_a_request_leaves_out_has_its_default(plan, holds):
     ],
 )
 def test_a_plan_is_in_the_frame_in_the_request_or_refused(status, plan, moved_m, frame, places):
-    trace = (FramePlan("odom", _HERE, _THERE, _exchange(status), "" if plan else f"status {status}", plan, moved_m),)
+    trace = (FramePlan("odom", _HERE, _THERE, exchange(status), "" if plan else f"status {status}", plan, moved_m),)
     assert _holds(rules.plan_in_its_frame, trace) == [frame]
     assert _holds(rules.plan_starts_in_its_frame, trace) + _holds(rules.plan_ends_in_its_frame, trace) == places
 
 
 @pytest.mark.parametrize(("status", "holds"), [(422, True), (404, True), (200, False), (500, False)])
 def test_there_is_no_plan_outside_every_map(status, holds):
-    assert _holds(rules.plan_none, (_exchange(status),)) == [holds]
+    assert _holds(rules.plan_none, (exchange(status),)) == [holds]

@@ -1,8 +1,9 @@
-"""The contract's OpenAPI description is valid, and has all of Table 1."""
+"""The contract's descriptions of REST: its OpenAPI is valid and has all of Table 1, and its WADL names the same."""
 
 import pytest
 from openapi_spec_validator import OpenAPIV31SpecValidator
 
+from conformance.api.rest.description import described_by_wadl, differences
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import shape_of
 from conformance.documents.openapi import operations_of
@@ -67,3 +68,13 @@ def test_reads_come_in_three_formats_and_errors_as_problems():
         for status, content in operation.responses.items():
             if status.startswith(("4", "5")):
                 assert set(content) == {"application/problem+json", "application/problem+xml"}
+
+
+def test_openapi_and_wadl_agree():
+    wadl = described_by_wadl(CONTRACT.wadl_path.read_bytes(), "http://127.0.0.1:7003")
+
+    def seen(item):
+        return item.method, item.template, frozenset((one.where, one.name, one.required) for one in item.parameters)
+
+    assert differences(operations_of(CONTRACT), wadl) == []
+    assert {seen(item.operation) for item in wadl} == {seen(item) for item in operations_of(CONTRACT)}
