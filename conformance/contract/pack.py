@@ -19,6 +19,7 @@ import msgspec
 import yaml
 
 from conformance.contract.classes import FULL, ConformanceClass
+from conformance.contract.described import ORIGINAL_NAME, UNRESOLVED_NAME
 from conformance.contract.generic import LEDGER, ClassEntry, generic_classes, generic_ledger
 from conformance.contract.interfaces import Interface
 from conformance.contract.ledger import LedgerError, Requirement, load_ledger
@@ -41,6 +42,9 @@ class _Manifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     title: Text
     class_: tuple[ClassEntry, ...] = msgspec.field(name="class")
     plugin: Text | None = None
+    without: tuple[str, ...] = ()
+    closed_answers: bool = False
+    described: bool = False
     profiles: dict[str, tuple[str, ...]] = {}
 
 
@@ -121,6 +125,11 @@ class Contract:
             return self.version
         return f"{self.name} {self.version}" if self.manifest else f"own ({self.name})"
 
+    @property
+    def closed_answers(self) -> bool:
+        """Whether ``additionalProperties: false`` of the description binds responses too."""
+        return self.manifest is None or self.manifest.closed_answers
+
     @cached_property
     def classes(self) -> dict[str, ConformanceClass]:
         """The conformance classes by name, in the manifest's order; without a manifest, all generic ones.
@@ -188,6 +197,24 @@ class Contract:
         plain: dict[str, Any] = json.loads(json.dumps(document, default=str))
         return plain
 
+    @property
+    def described(self) -> bool:
+        """Whether the pack is an API's own description, and nothing else is known of the device."""
+        return self.manifest is None or self.manifest.described
+
+    @cached_property
+    def original(self) -> dict[str, Any]:
+        """The OpenAPI document as its author wrote it; that of `openapi` if the pack has no other."""
+        path = self.directory / ORIGINAL_NAME
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else self.openapi
+        return found
+
+    @cached_property
+    def unresolved(self) -> tuple[str, ...]:
+        """The references of the description to other files that lead nowhere."""
+        path = self.directory / UNRESOLVED_NAME
+        return tuple(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else ()
+
     @cached_property
     def ledger(self) -> dict[str, Requirement]:
         """The requirements by id, class by class: the generic ones first, then the pack's own.
@@ -195,7 +222,12 @@ class Contract:
         Raises:
             ContractError: a ledger cannot be read, an id occurs twice, or one of ``only`` is unknown.
         """
-        generic = {id_: item for id_, item in generic_ledger().items() if item.class_ in self.classes}
+        dropped = self.manifest.without if self.manifest else ()
+        generic = {
+            id_: item
+            for id_, item in generic_ledger().items()
+            if item.class_ in self.classes and id_ not in dropped
+        }
         own: dict[str, Requirement] = {}
         path = self.directory / LEDGER
         if path.is_file():

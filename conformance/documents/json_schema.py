@@ -71,12 +71,21 @@ def modern(schema: Any) -> Any:
     if not isinstance(schema, dict):
         return schema
     result = {key: modern(item) for key, item in schema.items()}
-    if result.pop("nullable", None) is True and isinstance(result.get("type"), str):
-        result["type"] = [result["type"], "null"]
+    if result.pop("nullable", None) is True:
+        result = _with_null(result)
     for bound, exclusive in (("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum")):
         if isinstance(result.get(exclusive), bool) and result.pop(exclusive) and bound in result:
             result[exclusive] = result.pop(bound)
     return result
+
+
+def _with_null(schema: Schema) -> Schema:
+    """Return a schema that allows null as well: by its type and its enum, or as a further alternative."""
+    if not isinstance(schema.get("type"), str):
+        # OpenAPI 3.0.3 leaves it open what `nullable` beside `allOf` means; authors mean that null is allowed.
+        return {"anyOf": [schema, {"type": "null"}]} if schema else schema
+    enum = {"enum": [*schema["enum"], None]} if isinstance(schema.get("enum"), list) else {}
+    return {**schema, "type": [schema["type"], "null"], **enum}
 
 
 def opened(schema: Any) -> Any:

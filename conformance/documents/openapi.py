@@ -27,6 +27,8 @@ class Parameter:
         schema: of its value.
         examples: example values in the description; may be empty.
         also: other names of it, for instance in ROS (x-roaas-also).
+        style: how arrays and objects are written.
+        explode: whether their items are written apart.
     """
 
     name: str
@@ -35,6 +37,8 @@ class Parameter:
     schema: Schema
     examples: tuple[Any, ...] = ()
     also: tuple[str, ...] = ()
+    style: str = "simple"
+    explode: bool = False
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,10 @@ class Operation:
             allowed.
         motion: whether it may move the robot or change persistent state.
         optional: whether a robot need not implement it.
+        headers: required flag and schema of response headers, by status and name in lower case.
+        tags: groups that the description puts it in.
+        security: names of the security schemes of each alternative; empty: none is needed.
+        never: whether the description says that a test must not send it (x-roaas-never).
     """
 
     id: str
@@ -78,6 +86,10 @@ class Operation:
     responses: dict[str, dict[str, Schema]] = field(default_factory=dict)
     motion: bool = False
     optional: bool = False
+    headers: dict[str, dict[str, tuple[bool, Schema]]] = field(default_factory=dict)
+    tags: tuple[str, ...] = ()
+    security: tuple[tuple[str, ...], ...] = ()
+    never: bool = False
 
     @property
     def label(self) -> str:
@@ -91,10 +103,13 @@ class Operation:
 
     def declared(self, status: int) -> dict[str, Schema] | None:
         """Return the schemas by media type for a status; None if the status is not declared."""
-        for key in (str(status), f"{status // 100}XX", f"{status // 100}xx", "default"):
-            if key in self.responses:
-                return self.responses[key]
-        return None
+        key = self.response_key(status)
+        return None if key is None else self.responses[key]
+
+    def response_key(self, status: int) -> str | None:
+        """Return the key under which a status is declared: itself, its class or ``default``; None if it is not."""
+        keys = (str(status), f"{status // 100}XX", f"{status // 100}xx", "default")
+        return next((key for key in keys if key in self.responses), None)
 
     @cached_property
     def formats(self) -> tuple[str, ...]:
@@ -135,26 +150,37 @@ def operations_of(contract: Contract) -> tuple[Operation, ...]:
         ContractError: the OpenAPI description is malformed, or a reference has no target.
     """
     try:
-        return tuple(read_operations(contract.openapi))
+        return tuple(read_operations(contract.openapi, closed=contract.closed_answers))
     except (UnresolvedError, AttributeError, TypeError, KeyError) as error:
         raise ContractError(f"{contract.openapi_path} is no usable OpenAPI description: {error}") from error
 
 
-def read_operations(document: Schema) -> list[Operation]:
+def read_operations(document: Schema, *, closed: bool = False) -> list[Operation]:
     """Return the operations of an OpenAPI document.
+
+    Args:
+        document: the document, without references to other files.
+        closed: whether ``additionalProperties: false`` binds responses too; otherwise they may have further members.
 
     Raises:
         UnresolvedError, AttributeError, TypeError, KeyError: the document is malformed.
     """
     found: list[Operation] = []
+    security = document.get("security", ())
     for path, item in document.get("paths", {}).items():
         whole = resolved(document, item)
         shared = whole.get("parameters", [])
-        found += [_operation(path, name.upper(), whole[name], shared) for name in METHODS if name in whole]
+        found += [
+            _operation(path, name.upper(), {"security": security, **whole[name]}, shared, closed=closed)
+            for name in METHODS
+            if name in whole
+        ]
     return found
 
 
-def _operation(path: str, method: str, given: dict[str, Any], shared: list[dict[str, Any]]) -> Operation:
+def _operation(
+    path: str, method: str, given: dict[str, Any], shared: list[dict[str, Any]], *, closed: bool
+) -> Operation:
     own = {(item["name"], item["in"]) for item in given.get("parameters", [])}
     parameters = [item for item in shared if (item["name"], item["in"]) not in own] + given.get("parameters", [])
     body = given.get("requestBody", {})
@@ -170,13 +196,48 @@ def _operation(path: str, method: str, given: dict[str, Any], shared: list[dict[
         body_required=bool(body.get("required", False)),
         responses={
             str(status): {
-                name: opened(modern(content.get("schema", {}))) for name, content in _by_media_type(response).items()
+                name: _answer(content.get("schema", {}), closed=closed)
+                for name, content in _by_media_type(response).items()
             }
             for status, response in given.get("responses", {}).items()
         },
-        motion=bool(given.get("x-roaas-motion", method not in SAFE)),
+        # Of a device with a contract, whatever is not safe may move it; of any other, what is said to.
+        motion=bool(given.get("x-roaas-motion", method not in SAFE and not closed)),
         optional=bool(given.get("x-roaas-optional", False)),
+        headers={str(status): _headers(response) for status, response in given.get("responses", {}).items()},
+        tags=tuple(given.get("tags", ())),
+        security=tuple(tuple(alternative) for alternative in given["security"]),
+        never=bool(given.get("x-roaas-never", False)),
     )
+
+
+def _answer(schema: Any, *, closed: bool) -> Schema:
+    """Return the schema of a response body: as it is if ``closed``, but without members that only requests have."""
+    answer: Schema = _readable(modern(schema)) if closed else opened(modern(schema))
+    return answer
+
+
+def _readable(schema: Any) -> Any:
+    """Return a schema in which no ``writeOnly`` member is required (OpenAPI 3.0, 4.7.24.2)."""
+    if isinstance(schema, list):
+        return [_readable(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    result = {key: _readable(item) for key, item in schema.items()}
+    properties, required = result.get("properties"), result.get("required")
+    if isinstance(properties, dict) and isinstance(required, list):
+        written = {name for name, part in properties.items() if isinstance(part, dict) and part.get("writeOnly")}
+        result["required"] = [name for name in required if name not in written]
+    return result
+
+
+def _headers(response: dict[str, Any]) -> dict[str, tuple[bool, Schema]]:
+    return {
+        name.lower(): (bool(header.get("required", False)), modern(header.get("schema", {})))
+        for name, header in response.get("headers", {}).items()
+        # OpenAPI 3.1, 4.8.17.1: a Content-Type header in this place is ignored.
+        if name.lower() != "content-type"
+    }
 
 
 def _by_media_type(given: dict[str, Any]) -> dict[str, dict[str, Any]]:
@@ -192,6 +253,8 @@ def _parameter(given: dict[str, Any]) -> Parameter:
         modern(given.get("schema", content.get("schema", {}))),
         _examples(given),
         tuple(given.get("x-roaas-also", ())),
+        style := given.get("style", "form" if given["in"] in {"query", "cookie"} else "simple"),
+        bool(given.get("explode", style == "form")),
     )
 
 

@@ -2,6 +2,8 @@
 
 import re
 
+from conformance.transport.exchange import Request
+
 # As much of a body is looked through, octets.
 _LOOKED_THROUGH = 200_000
 _SHOWN = 120
@@ -28,3 +30,15 @@ def inside_shown(body: bytes) -> str:
     """Return the first part of a traceback or of similar internals in a body, or empty."""
     found = _INSIDES.search(body[:_LOOKED_THROUGH])
     return found[0].decode("utf-8", "replace")[:_SHOWN] if found else ""
+
+
+# A file of a program: an absolute path with at least three segments, or with a drive letter.
+_PATH = re.compile(rb"(?<![\w:/.])(?:/(?:home|root|usr|opt|var|srv|app|code|src|work|tmp|mnt|etc|Users)(?:/[\w.@+-]+){2,}|[A-Z]:\\\\?(?:[\w .-]+\\\\?){2,})")
+
+
+def path_shown(body: bytes, request: Request) -> str:
+    """Return the first path of the server's file system in a body that was not in the request, or empty."""
+    for found in _PATH.finditer(body[:_LOOKED_THROUGH]):
+        if found[0] not in request.url.encode() and found[0] not in request.body:
+            return found[0].decode("utf-8", "replace")[:_SHOWN]
+    return ""

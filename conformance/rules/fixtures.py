@@ -10,6 +10,7 @@ import pytest
 
 from conformance.api.interfaces import Interfaces
 from conformance.api.rest.observers import Observer
+from conformance.api.rest.values import Values
 from conformance.api.soap.observer import PASSIVE, SoapObserver, answers_of
 from conformance.api.soap.service import SoapService
 from conformance.transport.client import Connection
@@ -34,6 +35,12 @@ def _watched(run: Run, interfaces: Interfaces, connection: Connection) -> None:
         answers = {service.endpoint: answers_of(service) for service in services}
         observers.append(SoapObserver(run.judge, answers))
     connection.listeners.append(Observers(run.judge, observers))
+
+
+@pytest.fixture(scope="session")
+def values(run: Run) -> Values:
+    """Return the values that the run knows for parameters and bodies: the user's, and those seen in responses."""
+    return Values(run.statement.values)
 
 
 @pytest.fixture

@@ -70,18 +70,34 @@ class Load(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     max_duration_s: Positive | None = None
 
 
+class Calls(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What may be called of an API of which only its description is known.
+
+    Attributes:
+        allow: patterns of operations that may be called although they are not safe.
+        never: patterns of operations that must not be called.
+    """
+
+    allow: tuple[Text, ...] = ()
+    never: tuple[Text, ...] = ()
+
+
 class Statement(msgspec.Struct, frozen=True):
     """What a vendor declares about a device. A pack whose device has more to declare extends it.
 
     Attributes:
         robot: name, vendor, version.
         claims: the claimed conformance classes; None: none were named.
+        values: values to use in requests, by the name of a parameter or member.
+        calls: what may be called.
     """
 
     robot: dict[str, str] = {}
     endpoints: Endpoints = Endpoints()
     claims: tuple[str, ...] | None = None
     load: Load = Load()
+    values: dict[str, tuple[Any, ...]] = {}
+    calls: Calls = Calls()
 
     @property
     def figures(self) -> dict[str, dict[str, float]]:
@@ -161,6 +177,8 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     endpoints: Endpoints = Endpoints()
     claims: _Claims = _Claims()
     load: Load = Load()
+    values: dict[str, tuple[Any, ...]] = {}
+    calls: Calls = Calls()
 
     def read(self, contract: Contract, path: Path) -> Statement:
         """Return the statement.
@@ -182,6 +200,8 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             "endpoints": beside(path.parent, self.endpoints),
             "claims": self.claims.named(contract, path),
             "load": self.load,
+            "values": self.values,
+            "calls": self.calls,
         }
 
 

@@ -48,6 +48,7 @@ class Connection:
         resent: number of requests sent again because the server had closed the kept connection (RFC 9112 9.3.1).
         acted_at: when a request with an unsafe method was last sent or answered, s of the monotonic clock.
         pace: how fast the robot responds.
+        endless: whether a body that does not end is a response, of which only the beginning is read.
     """
 
     timeout_s: float = 10.0
@@ -59,6 +60,7 @@ class Connection:
     resent: int = 0
     acted_at: float = -math.inf
     pace: Pace = field(default_factory=Pace)
+    endless: bool = False
     _next_slot: float = 0.0
 
     def tls(self) -> ssl.SSLContext:
@@ -194,7 +196,7 @@ class HttpClient:
             keep = not fresh and attempt == 1
             connection = self._connections.take() if keep else self._connections.new()
             try:
-                return connection.exchange(request, body, deadline)
+                return connection.exchange(request, body, deadline, endless=self.connection.endless)
             except Exception as error:
                 none = _no_answer(error, seconds + time_to_arrive(len(body)))
                 if none.kind is not NoAnswer.CLOSED:

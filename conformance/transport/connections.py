@@ -4,6 +4,7 @@ They send target, headers and their order exactly as given. h11 parses responses
 framing. Why no common HTTP client is used: docs/design.md.
 """
 
+import math
 import select
 import socket
 import ssl
@@ -26,6 +27,11 @@ _READ: Final = 64 * 1024
 _KEPT: Final = 2
 _EXPIRY_S: Final = 3.0
 _SWITCHING_PROTOCOLS: Final = 101
+# Media types of bodies that never end; as much of one is read, octets and s, and as much of any other body.
+_STREAMS: Final = ("text/event-stream", "multipart/x-mixed-replace", "video/", "audio/")
+_STREAM: Final = 64 * 1024
+_STREAM_S: Final = 1.0
+_DOWNLOAD: Final = 4 * 1024 * 1024
 # A reset follows the data that nobody reads within this time on a network nearby, ms.
 _RESET_MS: Final = 50
 _QUICKACK: Final = getattr(socket, "TCP_QUICKACK", None)  # Linux alone has it
@@ -91,8 +97,10 @@ class HttpConnection:
         """Whether the connection is open."""
         return self._link is not None
 
-    def exchange(self, request: h11.Request, content: bytes, deadline: Deadline) -> Response:
-        """Send a request and return the complete response.
+    def exchange(
+        self, request: h11.Request, content: bytes, deadline: Deadline, *, endless: bool = False
+    ) -> Response:
+        """Send a request and return the complete response; with ``endless``, only the beginning of an endless body.
 
         Raises:
             TimeoutError: the deadline passed.
@@ -106,7 +114,7 @@ class HttpConnection:
             self._link = open_link(*self._server, deadline.to_send_s())
         self._send(self._link, request, content, deadline)
         head = self._head(self._link, deadline)
-        body = self._body(self._link, deadline)
+        body, cut = self._begin(self._link, head, deadline) if endless else (self._body(self._link, deadline), "")
         response = Response(
             head.status_code,
             tuple((name.decode("latin-1"), value.decode("latin-1")) for name, value in head.headers.raw_items()),
@@ -114,6 +122,7 @@ class HttpConnection:
             (time.perf_counter() - started) * 1000,
             f"HTTP/{head.http_version.decode('latin-1')}",
             time.monotonic(),
+            cut,
         )
         if self._state.our_state is h11.DONE and self._state.their_state is h11.DONE:
             self._state.start_next_cycle()
@@ -166,9 +175,33 @@ class HttpConnection:
             pieces.append(bytes(event.data))
         return b"".join(pieces)
 
-    def _event(self, link: socket.socket, deadline: Deadline) -> h11.Event | type[h11.NEED_DATA | h11.PAUSED]:
+    def _begin(self, link: socket.socket, head: h11.Response, deadline: Deadline) -> tuple[bytes, str]:
+        """Return a body, or the beginning of one that does not end, and why it was not read to its end."""
+        fields = {name.lower(): value.decode("latin-1").lower() for name, value in head.headers}
+        kind = fields.get(b"content-type", "")
+        streams = kind.startswith(_STREAMS) and b"content-length" not in fields
+        finite = b"content-length" in fields or kind.startswith("application/json")
+        most, until = (_STREAM, time.monotonic() + _STREAM_S) if streams else (_DOWNLOAD, math.inf)
+        pieces: list[bytes] = []
+        size = 0
+        try:
+            while isinstance(event := self._event(link, deadline, until), h11.Data):
+                pieces.append(bytes(event.data))
+                size += len(event.data)
+                if size > most or time.monotonic() > until:
+                    return b"".join(pieces), f"a body of which {size} bytes were read"
+        except TimeoutError:
+            if not streams and (finite or not size):
+                raise
+            return b"".join(pieces), f"a body that has not ended after {size} bytes"
+        return b"".join(pieces), ""
+
+    def _event(
+        self, link: socket.socket, deadline: Deadline, until: float = math.inf
+    ) -> h11.Event | type[h11.NEED_DATA | h11.PAUSED]:
+        """Return the next event; ``until``: when to give up before the deadline, s of the monotonic clock."""
         while (event := self._state.next_event()) is h11.NEED_DATA:
-            link.settimeout(deadline.left_s())
+            link.settimeout(min(deadline.left_s(), max(0.01, until - time.monotonic())))
             if self._begun and _QUICKACK is not None:
                 # Many a server keeps the rest back until its first piece is acknowledged: a kernel takes 40 ms.
                 link.setsockopt(socket.IPPROTO_TCP, _QUICKACK, 1)

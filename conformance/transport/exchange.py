@@ -128,6 +128,7 @@ class Response:
         elapsed_ms: time from the first byte sent to the last byte received, ms.
         http_version: ``HTTP/1.1`` or ``HTTP/1.0``.
         received_s: when the last byte was received, s on the monotonic clock; 0 if unknown.
+        cut: why the suite stopped reading the body before its end, or empty.
     """
 
     status: int
@@ -136,6 +137,7 @@ class Response:
     elapsed_ms: float
     http_version: str = "HTTP/1.1"
     received_s: float = field(default=0.0, compare=False)
+    cut: str = ""
 
     @cached_property
     def _by_name(self) -> dict[str, list[str]]:

@@ -61,6 +61,8 @@ def answered(api: RestInterface, *ids: str) -> list[Call]:
 
 def allowed(api: RestInterface, operation: Operation) -> bool:
     """Return whether the operation may be sent in this run."""
+    if api.run.contract.described:
+        return api.call_rules.decide(operation).may
     return api.run.allow_motion or not operation.motion
 
 

@@ -4,6 +4,7 @@ Schemathesis's own checks accept 5xx as a refusal and may consider data invalid 
 request is parsed from its bytes (validity.py) and judged by that.
 """
 
+import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -25,6 +26,9 @@ from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange
 
 _BASE = "http://robot.invalid"
+# A header's name and value (RFC 9110 5.1, 5.5), as far as every server takes them.
+_FIELD = re.compile(r"[!#$%&'*+\-.^_`|~0-9A-Za-z]+")
+_VALUE = re.compile(r"[!-~](?:[ -~]*[!-~])?")
 
 
 @dataclass(frozen=True)
@@ -55,8 +59,12 @@ class Target:
 
     def coverage(self) -> Iterator[GeneratedRequest]:
         """Yield requests on both sides of each constraint of the schemas."""
+        yield from _requests(self.covering())
+
+    def covering(self) -> Any:
+        """Return an iterable of Schemathesis cases on both sides of each constraint of the schemas."""
         config = self.schema.config.generation_for(operation=self.operation, phase="coverage")
-        maker = CoverageGenerator(
+        return CoverageGenerator(
             operation=self.operation,
             generation_modes=[GenerationMode.POSITIVE, GenerationMode.NEGATIVE],
             generation_config=config,
@@ -64,16 +72,19 @@ class Target:
             override=Override(),
             feedback=NO_FEEDBACK,
         )
-        yield from _requests(maker)
 
     def fuzzing(self, *, negative: bool) -> SearchStrategy[GeneratedRequest | None]:
         """Return a strategy for requests that fit the schemas, or violate them.
 
         It yields None for a request that cannot be sent.
         """
+        return self.fuzzed(negative=negative).map(as_request)
+
+    def fuzzed(self, *, negative: bool) -> SearchStrategy[Any]:
+        """Return a strategy for Schemathesis cases that fit the schemas, or violate them."""
         mode = GenerationMode.NEGATIVE if negative else GenerationMode.POSITIVE
         strategy: SearchStrategy[Any] = self.operation.as_strategy(generation_mode=mode)
-        return strategy.map(as_request)
+        return strategy
 
 
 def targets(contract: Contract) -> tuple[Target, ...]:
@@ -134,6 +145,15 @@ def as_request(case: Any) -> GeneratedRequest | None:
     if not (content_type.isprintable() and content_type.isascii() and target.isascii() and method.isascii()):
         return None
     return GeneratedRequest(method, target, content_type, body.encode() if isinstance(body, str) else body)
+
+
+def own_headers(case: Any) -> tuple[tuple[str, str], ...] | None:
+    """Return the header and cookie parameters of a case; None if HTTP cannot transmit them."""
+    pairs = [(str(name), str(value)) for name, value in (case.headers or {}).items()]
+    cookies = "; ".join(f"{name}={value}" for name, value in (case.cookies or {}).items())
+    pairs += [("Cookie", cookies)] if cookies else []
+    sendable = all(_FIELD.fullmatch(name) and (value == "" or _VALUE.fullmatch(value)) for name, value in pairs)
+    return tuple(pair for pair in pairs if pair[0].lower() != "content-type") if sendable else None
 
 
 def as_thesis(exchange: Exchange) -> ThesisResponse:

@@ -15,12 +15,14 @@ class GeneratedRequest:
         target: path and query below the base URL.
         content_type: value of Content-Type; empty without it.
         body: bytes.
+        headers: further headers.
     """
 
     method: str
     target: str
     content_type: str
     body: bytes
+    headers: tuple[tuple[str, str], ...] = ()
 
     @property
     def media_type(self) -> str:
@@ -33,5 +35,5 @@ class GeneratedRequest:
         Raises:
             NoAnswerError: no HTTP response was received.
         """
-        fields = [("Content-Type", self.content_type)] if self.content_type else []
+        fields = [*self.headers, *([("Content-Type", self.content_type)] if self.content_type else [])]
         return api.client.send(self.method, self.target, headers=fields, body=self.body)

@@ -2,7 +2,9 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
+from conformance.api.call_rules import CallRules
 from conformance.api.device import Device, device_of
 from conformance.contract.pack import Contract
 from conformance.transport.client import HttpClient
@@ -31,6 +33,12 @@ class RestInterface:
 
     def __post_init__(self) -> None:
         self.device = device_of(self.run)
+
+    @cached_property
+    def call_rules(self) -> CallRules:
+        """What may be called of an API of which only its description is known."""
+        calls = self.run.statement.calls
+        return CallRules(calls.allow, calls.never, motion=self.run.allow_motion)
 
     @property
     def path(self) -> str:

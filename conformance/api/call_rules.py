@@ -1,0 +1,122 @@
+"""Which operations of a described API a run may call, and why not the others."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from fnmatch import fnmatchcase
+from typing import Final
+
+from conformance.documents.openapi import Operation
+
+# Words in a path or operationId that say that a call may do harm, whatever its method.
+_HARMFUL: Final = frozenset(
+    {
+        "shutdown", "poweroff", "reboot", "restart", "delete", "erase", "wipe", "format", "install", "uninstall",
+        "firmware", "flash", "factory", "reset", "upgrade", "auth", "oauth", "login", "logout", "token", "password",
+        "secret", "credentials",
+    }
+)  # fmt: skip
+_WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+_PARAMETER: Final = re.compile(r"\{[^{}]*\}")
+
+
+class Reason(StrEnum):
+    """Why an operation is called or not."""
+
+    SAFE = "its method is safe"
+    ALLOWED = "--call allows it"
+    CHANGES = "it may change something: --call allows it"
+    MOVES = "it moves the device: --allow-motion allows it"
+    NEVER = "--never excludes it"
+    EXCLUDED = "the description excludes it (x-roaas-never)"
+    HARMFUL = "its name warns of harm: --call with its full method and path allows it"
+
+    @property
+    def may(self) -> bool:
+        """Whether the operation is called."""
+        return self in {Reason.SAFE, Reason.ALLOWED}
+
+
+@dataclass(frozen=True)
+class CallRules:
+    """What the user says of what may be called.
+
+    Attributes:
+        allow: patterns of operations that may be called although they are not safe.
+        never: patterns of operations that must not be called.
+        motion: whether the device may be moved.
+    """
+
+    allow: tuple[str, ...] = ()
+    never: tuple[str, ...] = ()
+    motion: bool = False
+
+    def decide(self, operation: Operation) -> Reason:
+        """Return whether an operation may be called, with the reason."""
+        if operation.never:
+            return Reason.EXCLUDED
+        if any(matches(pattern, operation) for pattern in self.never):
+            return Reason.NEVER
+        named = any(is_literal(pattern, operation) for pattern in self.allow)
+        if not named and harmful_words(operation):
+            return Reason.HARMFUL
+        if operation.safe and not operation.motion:
+            return Reason.SAFE
+        if not any(matches(pattern, operation) for pattern in self.allow) and not operation.safe:
+            return Reason.CHANGES
+        return Reason.ALLOWED if self.motion or not operation.motion else Reason.MOVES
+
+    def unused(self, operations: Sequence[Operation]) -> list[str]:
+        """Return the patterns that match no operation."""
+        patterns = (*self.allow, *self.never)
+        return [one for one in patterns if not any(matches(one, operation) for operation in operations)]
+
+
+def matches(pattern: str, operation: Operation) -> bool:
+    """Return whether a pattern means an operation: "METHOD PATH", "PATH", an operationId or a tag; * is any text."""
+    method, _, path = pattern.strip().partition(" ")
+    if path:
+        fits = method in {"*", operation.method} or method.upper() == operation.method
+        return fits and fnmatchcase(operation.template, path.strip())
+    named = (operation.template, operation.id, *operation.tags)
+    return any(fnmatchcase(name, pattern.strip()) for name in named)
+
+
+def is_literal(pattern: str, operation: Operation) -> bool:
+    """Return whether a pattern names one operation without a wildcard, by method and path or by its operationId."""
+    return pattern.strip() in {operation.label, operation.id}
+
+
+def harmful_words(operation: Operation) -> list[str]:
+    """Return the words in an operation's path and id that say that it may do harm."""
+    text = f"{_PARAMETER.sub(' ', operation.template)} {operation.id}"
+    # The id of an operation often ends with its method.
+    words = {word.lower() for word in _WORD.findall(text)} - ({"delete"} if operation.method == "DELETE" else set())
+    return sorted(words & _HARMFUL)
+
+
+def told(rules: CallRules, operations: Sequence[Operation]) -> list[str]:
+    """Return in lines what a run calls and what not, and why."""
+    by_reason: dict[Reason, list[str]] = {}
+    for operation in operations:
+        by_reason.setdefault(rules.decide(operation), []).append(operation.label)
+    called = [label for reason, labels in by_reason.items() if reason.may for label in labels]
+    changing = by_reason.get(Reason.ALLOWED, [])
+    kept = len(operations) - len(called)
+    lines = [
+        f"Calls {len(called)} of {len(operations)} operations; {len(changing)} of them may change something; "
+        f"{kept} are not called."
+    ]
+    for reason in Reason:
+        labels = by_reason.get(reason, [])
+        if labels and reason is not Reason.SAFE:
+            verb = "  Calls" if reason.may else "  Does not call"
+            lines.append(f"{verb} {len(labels)}, because {reason}: {_listed(labels)}")
+    return lines
+
+
+def _listed(labels: Sequence[str], most: int = 6) -> str:
+    return ", ".join(labels[:most]) + (f" and {len(labels) - most} more" if len(labels) > most else "")

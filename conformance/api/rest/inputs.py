@@ -1,0 +1,150 @@
+"""The inputs of one request for an operation, and the request that they make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+from conformance.api.rest.generated_request import GeneratedRequest
+from conformance.api.rest.values import Values, sample
+from conformance.documents.openapi import Operation, is_json, is_xml
+from conformance.documents.serialization import (
+    form_body,
+    header_text,
+    multipart_body,
+    path_text,
+    query_pairs,
+    query_text,
+)
+from conformance.documents.writing import json_text, xml_bytes
+
+FORM: Final = "application/x-www-form-urlencoded"
+MULTIPART: Final = "multipart/form-data"
+
+
+class _Nothing:
+    """The type of NOTHING."""
+
+
+#: The body of a request without one; None is the JSON value null.
+NOTHING: Final = _Nothing()
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The values of one request, before they are written.
+
+    Attributes:
+        path, query, headers, cookies: values by the parameter's name.
+        body: JSON value of the body, bytes to send as they are, or NOTHING.
+        media_type: of the body; empty without one.
+        accept: value of Accept; empty: any format.
+    """
+
+    path: dict[str, Any] = field(default_factory=dict)
+    query: dict[str, Any] = field(default_factory=dict)
+    headers: dict[str, Any] = field(default_factory=dict)
+    cookies: dict[str, Any] = field(default_factory=dict)
+    body: Any = NOTHING
+    media_type: str = ""
+    accept: str = ""
+
+    def at(self, where: str) -> dict[str, Any]:
+        """Return the values of one place: path, query, header or cookie."""
+        return {"path": self.path, "query": self.query, "header": self.headers, "cookie": self.cookies}[where]
+
+    def having(self, where: str, name: str, value: Any) -> Inputs:
+        """Return the inputs with another value of a parameter; NOTHING leaves the parameter out."""
+        values = {key: item for key, item in self.at(where).items() if key != name}
+        if value is not NOTHING:
+            values[name] = value
+        key = {"header": "headers", "cookie": "cookies"}.get(where, where)
+        return replace(self, **{key: values})
+
+
+def written(operation: Operation, inputs: Inputs) -> GeneratedRequest:
+    """Return the request that carries the inputs (OpenAPI 3.1, 4.8.12.2: styles of parameters)."""
+    path, query, headers = operation.template, [], [("Accept", inputs.accept)] if inputs.accept else []
+    cookies = []
+    for item in operation.parameters:
+        values = inputs.at(item.where)
+        if item.name not in values:
+            continue
+        value = values[item.name]
+        match item.where:
+            case "path":
+                text = path_text(value, item.style, item.name, explode=item.explode)
+                path = path.replace(f"{{{item.name}}}", text)
+            case "query":
+                query += query_pairs(item.name, value, item.style, explode=item.explode)
+            case "header":
+                headers.append((item.name, header_text(value, explode=item.explode)))
+            case _:
+                cookies += query_pairs(item.name, value, "form", explode=item.explode)
+    known = {item.name for item in operation.parameters}
+    query += [pair for name, value in inputs.query.items() if name not in known for pair in query_pairs(name, value)]
+    if cookies:
+        headers.append(("Cookie", "; ".join(f"{name}={text}" for name, text in cookies)))
+    content_type, body = _body(operation, inputs)
+    target = f"{path}?{query_text(query)}" if query else path
+    return GeneratedRequest(operation.method, target, content_type, body, tuple(headers))
+
+
+def _body(operation: Operation, inputs: Inputs) -> tuple[str, bytes]:
+    """Return the Content-Type and the bytes of the body."""
+    value, media_type = inputs.body, inputs.media_type
+    if value is NOTHING:
+        return "", b""
+    if isinstance(value, bytes):
+        return media_type, value
+    if media_type == FORM and isinstance(value, dict):
+        return media_type, form_body(value)
+    if media_type == MULTIPART and isinstance(value, dict):
+        return multipart_body(value)
+    if is_xml(media_type):
+        schema = operation.bodies[media_type].schema if media_type in operation.bodies else {}
+        return media_type, xml_bytes(value, str(schema.get("xml", {}).get("name", "root")))
+    if is_json(media_type) or not isinstance(value, str):
+        return media_type, json_text(value).encode()
+    return media_type, value.encode()
+
+
+def usual_inputs(operation: Operation, values: Values) -> list[Inputs]:
+    """Return inputs of valid requests with what is required and nothing else, the most promising first."""
+    base = Inputs()
+    chosen = {item.name: values.of(operation, item) for item in operation.parameters if item.required}
+    for item in operation.parameters:
+        if item.required and chosen[item.name]:
+            base = base.having(item.where, item.name, chosen[item.name][0])
+    bodies: list[tuple[str, Any]] = []
+    for name, body in list(operation.bodies.items())[:1] if operation.bodies else []:
+        found = values.body(body.schema, body.examples)
+        bodies = [(name, _with_files(value, body.schema, name)) for value in found]
+    if bodies:
+        base = replace(base, media_type=bodies[0][0], body=bodies[0][1])
+    found = [base]
+    for item in operation.parameters:
+        found += [base.having(item.where, item.name, one) for one in chosen.get(item.name, [])[1:]]
+    found += [replace(base, body=value) for _, value in bodies[1:]]
+    return found
+
+
+def _with_files(value: Any, schema: dict[str, Any], media_type: str) -> Any:
+    """Return a form's value with bytes where the schema asks for a file."""
+    if media_type != MULTIPART or not isinstance(value, dict):
+        return value
+    properties = schema.get("properties", {})
+    return {name: b"roaas" if is_file(properties.get(name, {})) else item for name, item in value.items()}
+
+
+def is_file(schema: dict[str, Any]) -> bool:
+    """Return whether a member of a form is a file (OpenAPI 3.0 and 3.1, 4.8.14.5)."""
+    binary = schema.get("format") in {"binary", "base64"} or "contentMediaType" in schema
+    return binary or (schema.get("type") == "file")
+
+
+def whole_body(operation: Operation) -> tuple[str, Any]:
+    """Return the media type and a body with all optional members; an empty media type without a body."""
+    for name, body in operation.bodies.items():
+        return name, _with_files(sample(body.schema, whole=True), body.schema, name)
+    return "", NOTHING

@@ -1,0 +1,234 @@
+"""Values for the parameters and bodies of an operation: described, given by the user, or seen in earlier responses."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from conformance.documents.json_schema import Schema, kinds_of, shape_of
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import PARAMETER, Operation, Parameter, is_json
+from conformance.documents.representation import flat
+from conformance.transport.exchange import Exchange
+
+# As many values of one name are remembered, and as many are tried in one place.
+_REMEMBERED, _TRIED = 8, 4
+_DEPTH = 6
+_NAME = re.compile(r"[^a-z0-9]")
+# What identifies an item of a collection, by the usual names of such members.
+_IDS = ("id", "uuid", "name", "key", "slug")
+#: A value of each format that JSON Schema and OpenAPI name.
+FORMATS: Mapping[str, str] = {
+    "uuid": "3fa85f64-5717-4562-b3fc-2c963f66afa6",
+    "date-time": "2026-01-31T12:00:00Z",
+    "date": "2026-01-31",
+    "time": "12:00:00Z",
+    "duration": "PT1S",
+    "email": "someone@example.com",
+    "uri": "http://127.0.0.1/",
+    "url": "http://127.0.0.1/",
+    "hostname": "localhost",
+    "ipv4": "127.0.0.1",
+    "ipv6": "::1",
+    "byte": "AA==",
+}
+
+
+def plain_name(name: str) -> str:
+    """Return a name without case and separators, so that ``job_id`` and ``jobId`` are one."""
+    return _NAME.sub("", name.lower())
+
+
+class Values:
+    """The values that a run knows.
+
+    Args:
+        given: values by the name of a parameter or member, from the user.
+    """
+
+    def __init__(self, given: Mapping[str, Sequence[Any]] | None = None) -> None:
+        self._given = {plain_name(name): list(values) for name, values in (given or {}).items()}
+        self._seen: dict[str, list[Any]] = defaultdict(list)
+        self._ids: dict[str, list[Any]] = defaultdict(list)
+
+    def learn(self, operation: Operation, exchange: Exchange) -> None:
+        """Remember the scalars of a successful response by name, and the ids of what it lists or created."""
+        response = exchange.response
+        location = (response.header("location") or "").split("?", 1)[0].rstrip("/")
+        if response.ok and location:
+            self._remember(self._ids[operation.template.rstrip("/")], location.rsplit("/", 1)[-1])
+        if not response.ok or not is_json(response.media_type):
+            return
+        value = read_json(response.body).value
+        self._learn(value, 0)
+        items = value if isinstance(value, list) else [value]
+        for item in items[:_REMEMBERED]:
+            if isinstance(item, dict):
+                for name in _IDS:
+                    if isinstance(item.get(name), str | int):
+                        self._remember(self._ids[operation.template.rstrip("/")], item[name])
+                        break
+            elif isinstance(item, str | int) and isinstance(value, list):
+                self._remember(self._ids[operation.template.rstrip("/")], item)
+
+    def _learn(self, value: Any, depth: int) -> None:
+        if depth > _DEPTH:
+            return
+        if isinstance(value, dict):
+            for name, item in value.items():
+                if isinstance(item, str | int | float) and not isinstance(item, bool) and item != "":
+                    self._remember(self._seen[plain_name(name)], item)
+                self._learn(item, depth + 1)
+        elif isinstance(value, list):
+            for item in value[:_REMEMBERED]:
+                self._learn(item, depth + 1)
+
+    @staticmethod
+    def _remember(known: list[Any], value: Any) -> None:
+        # The newest first: what was there before may be gone.
+        if value in known:
+            known.remove(value)
+        known.insert(0, value)
+        del known[_REMEMBERED:]
+
+    def known_ids(self, operation: Operation, parameter: Parameter) -> list[Any]:
+        """Return values of a path parameter that an earlier response named."""
+        before = operation.template.split(f"{{{parameter.name}}}", 1)[0].rstrip("/")
+        return [*self._ids.get(before, ()), *self._seen.get(plain_name(parameter.name), ())]
+
+    def of(self, operation: Operation, parameter: Parameter) -> list[Any]:
+        """Return values to try for a parameter, the most promising first: at most four that its schema allows."""
+        given = self._given.get(plain_name(parameter.name), [])
+        learned = self.known_ids(operation, parameter) if parameter.where == "path" else []
+        found = [*given, *parameter.examples, *learned, sample(parameter.schema)]
+        return [value for value in _distinct(found) if value in given or fits(parameter.schema, value)][:_TRIED]
+
+    def body(self, schema: Schema, examples: Sequence[Any] = ()) -> list[Any]:
+        """Return bodies to try, the most promising first: the examples, then one made from the schema."""
+        made = self._filled(sample(schema), schema)
+        return _distinct([*(value for value in examples if not isinstance(value, str)), made])[:_TRIED]
+
+    def _filled(self, value: Any, schema: Schema) -> Any:
+        """Return an object whose members have the values that the user gave, or that a response named."""
+        if not isinstance(value, dict):
+            return value
+        properties = flat(schema).get("properties", {})
+        filled = {}
+        for name, item in value.items():
+            part, key = properties.get(name, {}), plain_name(name)
+            # Ids only: another member's value of the same name may be out of place.
+            seen = self._seen.get(key, []) if key.endswith(("id", "uuid")) else []
+            known = [one for one in [*self._given.get(key, []), *seen] if fits(part, one)]
+            filled[name] = known[0] if known else self._filled(item, part)
+        return filled
+
+
+def _distinct(values: Sequence[Any]) -> list[Any]:
+    found: list[Any] = []
+    for value in values:
+        if not any(value == one and type(value) is type(one) for one in found):
+            found.append(value)
+    return found
+
+
+def fits(schema: Schema, value: Any) -> bool:
+    """Return whether a schema allows a value; a schema that no validator reads allows all."""
+    try:
+        return not shape_of(schema).problem(value)
+    except ValueError:
+        return True
+
+
+def sample(schema: Schema, depth: int = 0, *, whole: bool = False) -> Any:
+    """Return a value that a schema allows, as far as that can be made.
+
+    Args:
+        schema: without references.
+        depth: how deep the value lies in another one.
+        whole: whether objects get their optional members too.
+    """
+    schema = flat(_not_null(schema))
+    for key in ("example", "const", "default"):
+        if key in schema and schema[key] is not None and fits(schema, schema[key]):
+            return schema[key]
+    for key in ("examples", "enum"):
+        values = schema.get(key)
+        for value in values if isinstance(values, list) else ():
+            if value is not None and fits(schema, value):
+                return value
+    kinds = kinds_of(schema)
+    if "object" in kinds:
+        return _object(schema, depth, whole=whole)
+    if "array" in kinds:
+        return _array(schema, depth, whole=whole)
+    if kinds & {"number", "integer"}:
+        return _number(schema, "integer" if "number" not in kinds else "number")
+    if kinds == {"boolean"}:
+        return True
+    return _text(schema)
+
+
+def _not_null(schema: Schema) -> Schema:
+    """Return a schema without the alternatives that allow only null."""
+    unions = {key: schema[key] for key in ("anyOf", "oneOf") if isinstance(schema.get(key), list)}
+    kept = {key: [part for part in parts if part.get("type") != "null"] for key, parts in unions.items()}
+    return {**schema, **{key: parts for key, parts in kept.items() if parts}}
+
+
+def _object(schema: Schema, depth: int, *, whole: bool) -> dict[str, Any]:
+    properties = schema.get("properties", {})
+    required = [name for name in schema.get("required", ()) if not properties.get(name, {}).get("readOnly")]
+    optional = [name for name in properties if name not in required and not properties[name].get("readOnly")]
+    names = required + (optional if whole else []) if depth < _DEPTH else []
+    return {name: sample(properties.get(name, {}), depth + 1, whole=whole) for name in names}
+
+
+def _array(schema: Schema, depth: int, *, whole: bool) -> list[Any]:
+    prefix = schema.get("prefixItems", [])
+    least = max(int(schema.get("minItems", 0)), 1 if whole else 0)
+    items = [sample(part, depth + 1) for part in prefix]
+    rest = schema.get("items") if isinstance(schema.get("items"), dict) else {}
+    while len(items) < min(least, schema.get("maxItems", least), 64):
+        item = sample(rest or {}, depth + 1)
+        # Of unique items, the second differs from the first.
+        items.append(item + len(items) if schema.get("uniqueItems") and isinstance(item, int) else item)
+    return items
+
+
+def _number(schema: Schema, kind: str) -> Any:
+    least, most = schema.get("minimum"), schema.get("maximum")
+    if isinstance(schema.get("exclusiveMinimum"), int | float):
+        least = schema["exclusiveMinimum"] + (1 if kind == "integer" else 1e-3)
+    if isinstance(schema.get("exclusiveMaximum"), int | float):
+        most = schema["exclusiveMaximum"] - (1 if kind == "integer" else 1e-3)
+    value = 1 if least is None and most is None else least if least is not None else min(1, most)  # type: ignore[type-var] # numbers of a schema
+    if isinstance(schema.get("multipleOf"), int | float) and value is not None:
+        step = schema["multipleOf"]
+        value = -(-value // step) * step
+    return value
+
+
+def _text(schema: Schema) -> str:
+    named = FORMATS.get(str(schema.get("format", "")))
+    if named is not None and fits(schema, named):
+        return named
+    length = max(1, int(schema.get("minLength", 1)))
+    plain = ("roaas" if length <= len("roaas") <= schema.get("maxLength", 5) else "a" * length)[: 1 << 16]
+    if "pattern" not in schema or fits(schema, plain):
+        return plain
+    return _matching(schema) or plain
+
+
+def _matching(schema: Schema) -> str:
+    """Return a short text that fits the schema's pattern, or empty."""
+    from hypothesis import find, settings  # noqa: PLC0415 - few schemas have a pattern
+    from hypothesis.errors import HypothesisException  # noqa: PLC0415 - as above
+    from hypothesis.strategies import from_regex  # noqa: PLC0415 - as above
+
+    try:
+        quiet = settings(database=None, derandomize=True, max_examples=200)
+        return find(from_regex(str(schema["pattern"])), lambda text: fits(schema, text) and text.isprintable(), settings=quiet)
+    except (HypothesisException, re.error, ValueError):
+        return ""

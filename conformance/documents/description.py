@@ -1,0 +1,183 @@
+"""Read the description of an API: OpenAPI 3.2, 3.1, 3.0 or Swagger 2.0, as JSON or YAML, in one file or several."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import urljoin, urlsplit
+
+import yaml
+
+from conformance.documents.json_schema import Schema, UnresolvedError
+from conformance.documents.overlay import OverlayError, overlaid
+from conformance.documents.swagger import as_openapi_3
+
+#: Where the contents of other files stand in a description that has been made one document.
+FILES: Final = "x-roaas-files"
+_LOADER: Final[Any] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_MOST_FILES: Final = 200
+_VARIABLE: Final = re.compile(r"\{([^{}]+)\}")
+# Returns the content of a URL or file.
+Load = Callable[[str], bytes]
+
+
+class DescriptionError(ValueError):
+    """Raised for a description that cannot be used; the message names the file and the fault."""
+
+
+@dataclass(frozen=True)
+class Description:
+    """The description of an API.
+
+    Attributes:
+        source: URL or path that it was read from.
+        document: as one OpenAPI 3 document, with the overlays applied.
+        original: as it was read.
+        base_url: absolute URL below which the operations are; empty if the description does not say it.
+        unresolved: each reference to another file that leads nowhere, with the reason.
+        remarks: what a reader of the result should know about it.
+    """
+
+    source: str
+    document: Schema
+    original: Schema
+    base_url: str
+    unresolved: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+def read_description(source: str, load: Load, overlays: Iterable[str] = ()) -> Description:
+    """Return the description at a URL or in a file.
+
+    Args:
+        source: URL or path.
+        load: returns the content of a URL or file; its errors are OSError or ValueError.
+        overlays: URLs or paths of OpenAPI Overlay documents, applied in this order.
+
+    Raises:
+        DescriptionError: it cannot be read, or is neither OpenAPI 3 nor Swagger 2.0.
+    """
+    original = _parsed(source, load)
+    bundle = _Bundle(source, load)
+    document = bundle.with_files(original)
+    for overlay in overlays:
+        try:
+            document = overlaid(document, _parsed(overlay, load))
+        except OverlayError as error:
+            raise DescriptionError(f"{overlay}: {error}") from error
+    version = str(original.get("openapi") or original.get("swagger") or "")
+    if version.startswith("2."):
+        try:
+            document = as_openapi_3(document) | {key: document[key] for key in (FILES,) if key in document}
+        except (UnresolvedError, AttributeError, TypeError, KeyError) as error:
+            raise DescriptionError(f"{source} is no usable Swagger 2.0 description: {error!r}") from error
+    elif not version.startswith("3."):
+        raise DescriptionError(f"{source} is no OpenAPI description: it has neither 'openapi: 3...' nor 'swagger: 2.0'")
+    if not isinstance(document.get("paths"), dict):
+        raise DescriptionError(f"{source} describes no operation: it has no 'paths'")
+    base_url, remarks = _base_url(source, document)
+    return Description(source, document, original, base_url, tuple(bundle.unresolved), remarks)
+
+
+def is_url(source: str) -> bool:
+    """Return whether a source is an HTTP URL rather than a file."""
+    return source.startswith(("http://", "https://"))
+
+
+def _parsed(source: str, load: Load) -> Schema:
+    """Return the object in a JSON or YAML file.
+
+    Raises:
+        DescriptionError: it cannot be read.
+    """
+    try:
+        text = load(source).decode("utf-8-sig")
+        # YAML is read through JSON, so that its dates become the texts that a device can be sent.
+        document = json.loads(text) if text.lstrip().startswith("{") else yaml.load(text, _LOADER)  # noqa: S506 - a safe one
+        plain = json.loads(json.dumps(document, default=str))
+    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
+        raise DescriptionError(f"{source} cannot be read: {error}") from error
+    if not isinstance(plain, dict):
+        raise DescriptionError(f"{source} is no description: it holds no object")
+    return plain
+
+
+@dataclass
+class _Bundle:
+    """Makes one document of a description in several files."""
+
+    source: str
+    load: Load
+    numbers: dict[str, str] = field(default_factory=dict)
+    files: dict[str, Any] = field(default_factory=dict)
+    unresolved: list[str] = field(default_factory=list)
+
+    def with_files(self, document: Schema) -> Schema:
+        """Return the document with the files that it refers to below FILES, and references to there."""
+        whole: Schema = self._walked(document, self.source, "#")
+        return {**whole, FILES: self.files} if self.files else whole
+
+    def _walked(self, value: Any, location: str, root: str) -> Any:
+        if isinstance(value, list):
+            return [self._walked(item, location, root) for item in value]
+        if not isinstance(value, dict):
+            return value
+        found = {key: self._walked(item, location, root) for key, item in value.items()}
+        if isinstance(value.get("$ref"), str):
+            reference = self._moved(value["$ref"], location, root)
+            if reference is None:
+                return {}
+            found["$ref"] = reference
+        return found
+
+    def _moved(self, reference: str, location: str, root: str) -> str | None:
+        """Return a reference as one within the whole document; None if its file cannot be read."""
+        file, _, pointer = reference.partition("#")
+        if not file:
+            return f"{root}{pointer}"
+        target = urljoin(location, file) if is_url(location) else str(Path(location).parent / file)
+        if is_url(location) and urlsplit(target).netloc != urlsplit(location).netloc:
+            self.unresolved.append(f"{reference}: another server's file is not fetched")
+            return None
+        if target == self.source:
+            return f"#{pointer}"
+        if target not in self.numbers:
+            if len(self.numbers) >= _MOST_FILES or is_url(target) != is_url(location):
+                self.unresolved.append(f"{reference}: it is not fetched")
+                return None
+            number = self.numbers[target] = str(len(self.numbers))
+            try:
+                other = _parsed(target, self.load)
+            except DescriptionError as error:
+                self.unresolved.append(f"{reference}: {error}")
+                self.files[number] = {}
+            else:
+                self.files[number] = {}
+                self.files[number] = self._walked(other, target, f"#/{FILES}/{number}")
+        return f"#/{FILES}/{self.numbers[target]}{pointer}"
+
+
+def _base_url(source: str, document: Schema) -> tuple[str, tuple[str, ...]]:
+    """Return the URL below which the operations are, and a remark where the description names another server."""
+    servers = document.get("servers")
+    first = servers[0] if isinstance(servers, list) and servers and isinstance(servers[0], dict) else {}
+    variables = first.get("variables", {}) if isinstance(first.get("variables"), dict) else {}
+
+    def default(found: re.Match[str]) -> str:
+        variable = variables.get(found[1], {})
+        return str(variable.get("default", "")) if isinstance(variable, dict) else ""
+
+    url = _VARIABLE.sub(default, str(first.get("url", "/")))
+    if not is_url(source):
+        return (url.rstrip("/"), ()) if is_url(url) else ("", ())
+    whole = urljoin(source, url)
+    if urlsplit(whole).netloc == urlsplit(source).netloc:
+        return whole.rstrip("/"), ()
+    parts = urlsplit(source)
+    here = f"{parts.scheme}://{parts.netloc}{urlsplit(whole).path}".rstrip("/")
+    remark = f"The description names the server {whole}. Tested was {here}, from where it was read; --base-url changes that."
+    return here, (remark,)

@@ -1,0 +1,172 @@
+"""Faults of a description itself: what is wrong with the file, whatever the device does."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import Any
+
+from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed, resolved, shape_of
+from conformance.documents.openapi import METHODS, PARAMETER
+
+_DEPTH = 40
+
+
+def invalid(original: Schema) -> list[str]:
+    """Return where a description is no valid document of its version; empty if it is.
+
+    The schemas of the OpenAPI Initiative come from Schemathesis, which is a dependency anyway.
+    """
+    version = str(original.get("openapi") or original.get("swagger") or "")[:3]
+    faults = []
+    for error in _validator(version).iter_errors(original):
+        where = "/".join(str(part) for part in error.instance_path)
+        faults.append(f"/{where}: {error.message[:160]}")
+    return [*sorted(set(faults), key=len)[:20], *_path_parameters(original), *_schemas(original)]
+
+
+@lru_cache(maxsize=4)
+def _validator(version: str) -> Any:
+    import jsonschema_rs  # noqa: PLC0415 - with the import below, only where a description is judged
+    from schemathesis.specs.openapi import definitions  # noqa: PLC0415 - costs a fifth of a second
+
+    schemas = {"2.0": definitions.SWAGGER_20, "3.0": definitions.OPENAPI_30, "3.2": definitions.OPENAPI_32}
+    return jsonschema_rs.validator_for(schemas.get(version, definitions.OPENAPI_31))
+
+
+def _operations(document: Schema) -> Iterator[tuple[str, str, Schema, list[Any]]]:
+    """Yield path, method, operation and shared parameters of a description, without those that are malformed."""
+    paths = document.get("paths")
+    for path, item in paths.items() if isinstance(paths, dict) else ():
+        try:
+            whole = resolved(document, item)
+        except UnresolvedError:
+            continue
+        for method in METHODS if isinstance(whole, dict) else ():
+            if isinstance(whole.get(method), dict):
+                shared = whole.get("parameters", [])
+                yield path, method.upper(), whole[method], shared if isinstance(shared, list) else []
+
+
+def _path_parameters(document: Schema) -> Iterator[str]:
+    """Yield path parameters that are in a path and not declared, or the reverse (OpenAPI 3.1, 4.8.8.2)."""
+    for path, method, operation, shared in _operations(document):
+        own = operation.get("parameters", [])
+        given = [*shared, *(own if isinstance(own, list) else [])]
+        declared = {one.get("name") for one in given if isinstance(one, dict) and one.get("in") == "path"}
+        used = set(PARAMETER.findall(path))
+        for name in sorted(used - declared):
+            yield f"{method} {path} does not declare its path parameter {name}"
+        for name in sorted(declared - used, key=str):
+            yield f"{method} {path} declares the path parameter {name}, which is not in the path"
+
+
+def _schemas(document: Schema) -> Iterator[str]:
+    """Yield schemas that no validator can use, such as one with a regular expression that does not compile."""
+    schemas = document.get("components", {}).get("schemas", {}) if isinstance(document.get("components"), dict) else {}
+    for name, schema in schemas.items() if isinstance(schemas, dict) else ():
+        try:
+            shape_of(modern(resolved(document, schema)))
+        except UnresolvedError:
+            continue  # description/references tells that
+        except (ValueError, TypeError, RecursionError) as error:
+            yield f"/components/schemas/{name} is no JSON Schema: {str(error).splitlines()[0][:160]}"
+
+
+def unresolved(document: Schema) -> list[str]:
+    """Return the references within the document that lead nowhere."""
+    found: dict[str, None] = {}
+
+    def walk(value: Any, depth: int) -> None:
+        if depth > _DEPTH:
+            return
+        if isinstance(value, list):
+            for item in value:
+                walk(item, depth + 1)
+        elif isinstance(value, dict):
+            reference = value.get("$ref")
+            if isinstance(reference, str) and reference.startswith("#"):
+                try:
+                    pointed(document, reference if reference != "#" else "#/")
+                except UnresolvedError:
+                    found[reference] = None
+            for key, item in value.items():
+                if key not in {"example", "examples", "default", "enum", "const"}:
+                    walk(item, depth + 1)
+
+    walk(document, 0)
+    return list(found)
+
+
+def repeated_ids(document: Schema) -> list[str]:
+    """Return each ``operationId`` that occurs several times, with its operations."""
+    by_id: dict[str, list[str]] = defaultdict(list)
+    for path, method, operation, _ in _operations(document):
+        if isinstance(operation.get("operationId"), str):
+            by_id[operation["operationId"]].append(f"{method} {path}")
+    return [f"{id_}: {', '.join(labels)}" for id_, labels in by_id.items() if len(labels) > 1]
+
+
+def alike_paths(document: Schema) -> list[str]:
+    """Return the templates that differ only in the names of their parameters."""
+    by_shape: dict[str, list[str]] = defaultdict(list)
+    paths = document.get("paths")
+    for path in paths if isinstance(paths, dict) else ():
+        by_shape[PARAMETER.sub("{}", path)].append(path)
+    return [" and ".join(paths) for paths in by_shape.values() if len(paths) > 1]
+
+
+def unfitting_examples(document: Schema) -> list[str]:
+    """Return the examples and defaults that are invalid by the schema beside them, with their places."""
+    found: dict[str, None] = {}
+    for path, method, operation, shared in _operations(document):
+        for place, schema, value in _examples(operation, shared):
+            try:
+                problem = shape_of(modern(schema)).problem(value)
+            except (ValueError, TypeError, RecursionError):
+                continue
+            if problem:
+                found[f"{place} of {method} {path}: {problem}"] = None
+    return list(found)
+
+
+def _examples(operation: Schema, shared: list[Any]) -> Iterator[tuple[str, Schema, Any]]:
+    """Yield the examples and defaults of an operation with their places and schemas."""
+    own = operation.get("parameters", [])
+    for one in [*shared, *(own if isinstance(own, list) else [])]:
+        if isinstance(one, dict) and isinstance(one.get("schema"), dict):
+            place = f"the example of {one.get('in')} {one.get('name')}"
+            yield from ((place, one["schema"], value) for value in _named(one))
+            yield from _of_schema(f"{one.get('in')} {one.get('name')}", one["schema"])
+    body = operation.get("requestBody", {})
+    responses = operation.get("responses", {})
+    contents = [("the request body", body)] if isinstance(body, dict) else []
+    contents += [(f"the body of status {status}", one) for status, one in responses.items() if isinstance(one, dict)]
+    for place, one in contents:
+        content = one.get("content", {})
+        for name, media in content.items() if isinstance(content, dict) else ():
+            if isinstance(media, dict) and isinstance(media.get("schema"), dict) and "json" in name:
+                yield from ((f"the example of {place}", media["schema"], value) for value in _named(media))
+                yield from _of_schema(place, media["schema"])
+
+
+def _named(given: Schema) -> list[Any]:
+    examples = given.get("examples", {})
+    named = [one["value"] for one in examples.values() if isinstance(one, dict) and "value" in one] if isinstance(examples, dict) else []
+    return [*([given["example"]] if "example" in given else []), *named]
+
+
+def _of_schema(place: str, schema: Schema, depth: int = 0) -> Iterator[tuple[str, Schema, Any]]:
+    """Yield the defaults and examples inside a schema."""
+    plain = {key: value for key, value in schema.items() if key not in {"default", "example", "examples"}}
+    if schema.get("default") is not None:
+        yield f"the default of {place}", plain, schema["default"]
+    if schema.get("example") is not None:
+        yield f"the example of {place}", plain, schema["example"]
+    examples = schema.get("examples")
+    yield from ((f"an example of {place}", plain, value) for value in (examples if isinstance(examples, list) else ()))
+    properties = schema.get("properties")
+    for name, part in properties.items() if isinstance(properties, dict) and depth < 4 else ():  # noqa: PLR2004 - levels
+        if isinstance(part, dict):
+            yield from _of_schema(f"{place} /{name}", part, depth + 1)

@@ -1,0 +1,66 @@
+"""Apply an OpenAPI Overlay to a description (OAI Overlay Specification 1.0 and 1.1)."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import jsonpath
+from jsonpath.exceptions import JSONPathError
+
+from conformance.documents.json_schema import Schema
+
+
+class OverlayError(ValueError):
+    """Raised for an overlay that cannot be applied; the message names the action and the fault."""
+
+
+def overlaid(document: Schema, overlay: Schema) -> Schema:
+    """Return a copy of a description with an overlay's actions applied in their order.
+
+    Raises:
+        OverlayError: the overlay is malformed, or an action has no valid JSONPath (RFC 9535).
+    """
+    if "overlay" not in overlay or not isinstance(overlay.get("actions"), list):
+        raise OverlayError("it is no overlay: it needs 'overlay' and a list of 'actions'")
+    changed = copy.deepcopy(document)
+    for number, action in enumerate(overlay["actions"]):
+        if not isinstance(action, dict) or not isinstance(action.get("target"), str):
+            raise OverlayError(f"actions[{number}] has no 'target'")
+        try:
+            matches = list(jsonpath.finditer(action["target"], changed))
+        except JSONPathError as error:
+            raise OverlayError(f"actions[{number}] target {action['target']!r} is no JSONPath: {error}") from error
+        # The last first, so that removing an item of a list does not move the next one.
+        for match in reversed(matches):
+            _apply(changed, list(match.parts), action)
+    return changed
+
+
+def _apply(document: Schema, parts: list[Any], action: Schema) -> None:
+    parent: Any = document
+    for part in parts[:-1]:
+        parent = parent[part]
+    if action.get("remove") is True:
+        if parts:
+            del parent[parts[-1]]
+        return
+    update = action.get("update")
+    here = parent[parts[-1]] if parts else document
+    if isinstance(here, list):
+        here.append(copy.deepcopy(update))
+    elif isinstance(here, dict) and isinstance(update, dict):
+        _merge(here, update)
+    elif parts:
+        parent[parts[-1]] = copy.deepcopy(update)
+
+
+def _merge(here: dict[str, Any], update: dict[str, Any]) -> None:
+    """Merge an object into another one: objects member by member, lists joined, everything else replaced."""
+    for key, value in update.items():
+        if isinstance(value, dict) and isinstance(here.get(key), dict):
+            _merge(here[key], value)
+        elif isinstance(value, list) and isinstance(here.get(key), list):
+            here[key] = [*here[key], *copy.deepcopy(value)]
+        else:
+            here[key] = copy.deepcopy(value)

@@ -1,0 +1,162 @@
+"""Convert a Swagger 2.0 description to OpenAPI 3.0."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from conformance.documents.json_schema import Schema, pointed
+
+_METHODS = ("get", "put", "post", "delete", "patch", "head", "options")
+_FORM = "application/x-www-form-urlencoded"
+_MULTIPART = "multipart/form-data"
+_JSON = ("application/json",)
+# Keys of a parameter or header that Swagger 2.0 writes beside its name, and OpenAPI 3 in its schema.
+_OF_SCHEMA = frozenset(
+    {
+        "type", "format", "items", "default", "maximum", "exclusiveMaximum", "minimum", "exclusiveMinimum", "maxLength",
+        "minLength", "pattern", "maxItems", "minItems", "uniqueItems", "enum", "multipleOf", "x-nullable",
+    }
+)  # fmt: skip
+_MOVED = {
+    "#/definitions/": "#/components/schemas/",
+    "#/parameters/": "#/components/parameters/",
+    "#/responses/": "#/components/responses/",
+}
+# How the items of an array are separated: style and explode.
+_COLLECTIONS = {
+    "csv": ("form", False),
+    "ssv": ("spaceDelimited", False),
+    "tsv": ("form", False),
+    "pipes": ("pipeDelimited", False),
+    "multi": ("form", True),
+}
+
+
+def as_openapi_3(document: Schema) -> Schema:
+    """Return a Swagger 2.0 description as OpenAPI 3.0.
+
+    Raises:
+        UnresolvedError: a ``$ref`` of a parameter or response leads nowhere.
+        AttributeError, TypeError, KeyError: the document is malformed.
+    """
+    schemes = document.get("securityDefinitions", {})
+    components = {
+        "schemas": _renamed(document.get("definitions", {})),
+        "securitySchemes": {name: _scheme(scheme) for name, scheme in schemes.items()},
+    }
+    found: Schema = {"openapi": "3.0.3", "info": document.get("info", {}), "components": components}
+    if servers := _servers(document):
+        found["servers"] = servers
+    found |= {key: document[key] for key in ("security", "tags") if key in document}
+    found["paths"] = {
+        path: _path_item(document, item) for path, item in document.get("paths", {}).items() if path.startswith("/")
+    }
+    return found | {key: value for key, value in document.items() if key.startswith("x-")}
+
+
+def _servers(document: Schema) -> list[Schema]:
+    host, base = document.get("host"), document.get("basePath", "")
+    if not host:
+        return [{"url": base}] if base else []
+    return [{"url": f"{scheme}://{host}{base}"} for scheme in document.get("schemes", ["http"])]
+
+
+def _scheme(given: Schema) -> Schema:
+    if given.get("type") == "basic":
+        return {"type": "http", "scheme": "basic"}
+    return dict(given)
+
+
+def _path_item(document: Schema, item: Schema) -> Schema:
+    shared = [_followed(document, one) for one in item.get("parameters", [])]
+    found = {key: value for key, value in item.items() if key.startswith("x-")}
+    for method in _METHODS:
+        if method in item:
+            found[method] = _operation(document, item[method], shared)
+    return found
+
+
+def _followed(document: Schema, value: Schema) -> Schema:
+    return pointed(document, value["$ref"]) if "$ref" in value else value  # type: ignore[no-any-return] # of the document
+
+
+def _operation(document: Schema, given: Schema, shared: list[Schema]) -> Schema:
+    own = [_followed(document, one) for one in given.get("parameters", [])]
+    names = {(one["name"], one["in"]) for one in own}
+    parameters = [one for one in shared if (one["name"], one["in"]) not in names] + own
+    consumes = given.get("consumes", document.get("consumes", _JSON))
+    produces = given.get("produces", document.get("produces", _JSON))
+    found = {key: value for key, value in given.items() if key not in {"parameters", "responses", "consumes", "produces"}}
+    found["parameters"] = [_parameter(one) for one in parameters if one["in"] not in {"body", "formData"}]
+    body = next((one for one in parameters if one["in"] == "body"), None)
+    form = [one for one in parameters if one["in"] == "formData"]
+    if body is not None:
+        content = {name: {"schema": _renamed(body.get("schema", {}))} for name in consumes or _JSON}
+        found["requestBody"] = {"required": body.get("required", False), "content": content}
+    elif form:
+        found["requestBody"] = _form(form, consumes)
+    found["responses"] = {
+        str(status): _response(_followed(document, response), produces)
+        for status, response in given.get("responses", {}).items()
+        if not str(status).startswith("x-")
+    }
+    return found
+
+
+def _schema_of(given: Schema) -> Schema:
+    """Return the schema that stands beside the name of a parameter or header."""
+    schema = {key: value for key, value in given.items() if key in _OF_SCHEMA}
+    if schema.get("type") == "file":
+        schema |= {"type": "string", "format": "binary"}
+    renamed: Schema = _renamed(schema)
+    return renamed
+
+
+def _parameter(given: Schema) -> Schema:
+    found = {key: value for key, value in given.items() if key not in _OF_SCHEMA and key != "collectionFormat"}
+    found["schema"] = _schema_of(given)
+    if given.get("type") == "array":
+        style, explode = _COLLECTIONS.get(given.get("collectionFormat", "csv"), ("form", False))
+        found |= {"explode": explode} if given["in"] in {"path", "header"} else {"style": style, "explode": explode}
+    if "x-example" in given:
+        found["example"] = given["x-example"]
+    return found
+
+
+def _form(fields: list[Schema], consumes: Any) -> Schema:
+    is_multipart = any(one.get("type") == "file" for one in fields) or _MULTIPART in consumes
+    schema = {
+        "type": "object",
+        "properties": {one["name"]: _schema_of(one) for one in fields},
+        "required": [one["name"] for one in fields if one.get("required")],
+    }
+    return {
+        "required": bool(schema["required"]),
+        "content": {_MULTIPART if is_multipart else _FORM: {"schema": schema}},
+    }
+
+
+def _response(given: Schema, produces: Any) -> Schema:
+    found = {key: value for key, value in given.items() if key in {"description"} or key.startswith("x-")}
+    if "schema" in given:
+        schema = given["schema"]
+        is_file = schema.get("type") == "file"
+        plain = {"type": "string", "format": "binary"} if is_file else _renamed(schema)
+        found["content"] = {name: {"schema": plain} for name in (produces or _JSON)}
+    found["headers"] = {name: {"schema": _schema_of(header)} for name, header in given.get("headers", {}).items()}
+    return found
+
+
+def _renamed(value: Any) -> Any:
+    """Return a schema with references to where OpenAPI 3 keeps their targets, and ``nullable``."""
+    if isinstance(value, list):
+        return [_renamed(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    found = {key: _renamed(item) for key, item in value.items()}
+    if isinstance(found.get("$ref"), str):
+        for old, new in _MOVED.items():
+            found["$ref"] = found["$ref"].replace(old, new, 1)
+    if found.pop("x-nullable", None) is True:
+        found["nullable"] = True
+    return found

@@ -1,0 +1,219 @@
+"""Responses against the description: status, media type, body and headers (OpenAPI 3.1, 4.8.16 to 4.8.21)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from functools import lru_cache
+from typing import Any
+
+import jsonschema_rs
+
+from conformance.api.rest.variations import Kind
+from conformance.documents.json_schema import Schema, kinds_of, shape_of
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation, is_json, operations_of
+from conformance.rules.told_once import Fault, told_once, without_numbers
+from conformance.scenarios.rule import Outcome, rule
+from conformance.scenarios.survey import Probe, Survey, generated_requests, survey
+from conformance.transport.exchange import Response
+from conformance.verdict.run import Run
+
+_ON = (survey, generated_requests)
+# HTTP lets any server send these, whatever the operation: conditions, ranges, rates, sizes, credentials, upgrades.
+_ANY_TIME = frozenset({100, 101, 206, 304, 401, 403, 407, 408, 411, 412, 413, 414, 416, 417, 421, 425, 426, 428, 429, 431})
+# ... and these, unless the request was the operation's usual one.
+_OF_REQUEST = frozenset({405, 406, 415, 501})
+_CRASHES = frozenset({500, 502, 504})
+_BAD_REQUEST, _NO_CONTENT = 400, 204
+_PLAIN = frozenset({Kind.USUAL, Kind.AGAIN, Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL})
+
+
+def _answered(trace: Survey, run: Run) -> Iterator[tuple[Probe, Operation, Response]]:
+    """Yield the probes whose responses the description speaks of."""
+    by_label = {item.label: item for item in operations_of(run.contract)}
+    for probe in trace.probes:
+        operation = by_label.get(probe.operation)
+        if probe.exchange is None or operation is None or probe.exchange.request.method != operation.method:
+            continue
+        if operation.responses and probe.kind is not Kind.ANONYMOUS and not _by_server(probe):
+            yield probe, operation, probe.exchange.response
+
+
+def _by_server(probe: Probe) -> bool:
+    """Return whether a web server may have refused a strange request before the application saw it."""
+    answer = probe.exchange.response if probe.exchange else None
+    strange = probe.kind in {Kind.ODD, Kind.GENERATED}
+    return answer is not None and strange and answer.status == _BAD_REQUEST and not is_json(answer.media_type)
+
+
+def _in_question(probe: Probe, status: int) -> bool:
+    """Return whether the description has to declare a status."""
+    return status not in _ANY_TIME and (probe.kind in _PLAIN or status not in _OF_REQUEST)
+
+
+@rule("description/status-declared", on=_ON)
+def status_declared(trace: Survey, run: Run) -> Iterable[Outcome]:
+    """Judge whether each status is declared for its operation; a crash is another requirement's affair."""
+    judged = {
+        id(probe): (operation, answer)
+        for probe, operation, answer in _answered(trace, run)
+        if _in_question(probe, answer.status) and answer.status not in _CRASHES
+    }
+
+    def fault(probe: Probe) -> Fault | None:
+        operation, answer = judged[id(probe)]
+        if operation.response_key(answer.status) is not None:
+            return None
+        return Fault(
+            str(answer.status), f"status {answer.status}", f"a status that is declared: {', '.join(operation.responses)}"
+        )
+
+    yield from told_once((one for one in trace.probes if id(one) in judged), "a declared status", fault)
+
+
+@rule("description/media-type", on=_ON)
+def media_type(trace: Survey, run: Run) -> Iterable[Outcome]:
+    """Judge whether each body has a media type that is declared for its status."""
+    judged: dict[int, tuple[dict[str, Schema], Response]] = {}
+    for probe, operation, answer in _answered(trace, run):
+        content = operation.declared(answer.status)
+        if content and answer.body and answer.status not in _CRASHES and _in_question(probe, answer.status):
+            judged[id(probe)] = content, answer
+
+    def fault(probe: Probe) -> Fault | None:
+        content, answer = judged[id(probe)]
+        if any(_matches(name, answer.media_type) for name in content):
+            return None
+        found = f"status {answer.status} with {answer.media_type or 'no Content-Type'}"
+        return Fault(f"{answer.status} {answer.media_type}", found, f"a body as {' or '.join(content)}")
+
+    yield from told_once((one for one in trace.probes if id(one) in judged), "a declared media type", fault)
+
+
+def _matches(declared: str, given: str) -> bool:
+    """Return whether a media type fits a declared media type or range (OpenAPI 3.1, 4.8.14)."""
+    if declared in {given, "*/*"} or (declared.endswith("/*") and given.startswith(declared[:-1])):
+        return True
+    return declared == "application/json" and not given.startswith("text/") and given.endswith("+json")
+
+
+@rule("description/body-schema", on=_ON)
+def body_schema(trace: Survey, run: Run) -> Iterable[Outcome]:
+    """Judge whether each JSON body is valid by the schema that is declared for its status, errors included."""
+    judged = {id(probe): found for probe, found in _with_schema(trace, run)}
+
+    def fault(probe: Probe) -> Fault | None:
+        schema, answer = judged[id(probe)]
+        wrong = _wrong(schema, answer)
+        cause = f"{answer.status} {without_numbers(wrong)}"
+        return Fault(cause, f"status {answer.status} with {wrong}") if wrong else None
+
+    yield from told_once(
+        (one for one in trace.probes if id(one) in judged), "JSON that is valid by the declared schema", fault
+    )
+
+
+@rule("description/formats", on=_ON)
+def formats(trace: Survey, run: Run) -> Iterable[Outcome]:
+    """Judge whether strings in responses have the ``format`` that the schema names (date-time, uuid, ...)."""
+    judged = {
+        id(probe): found
+        for probe, found in _with_schema(trace, run)
+        if '"format"' in _text(found[0]) and not _wrong(*found)
+    }
+
+    def fault(probe: Probe) -> Fault | None:
+        schema, answer = judged[id(probe)]
+        wrong = _unformatted(schema, answer)
+        return Fault(without_numbers(wrong), wrong) if wrong else None
+
+    yield from told_once((one for one in trace.probes if id(one) in judged), "strings of the declared format", fault)
+
+
+def _with_schema(trace: Survey, run: Run) -> Iterator[tuple[Probe, tuple[Schema, Response]]]:
+    """Yield the probes with a JSON response for which a usable schema is declared."""
+    for probe, operation, answer in _answered(trace, run):
+        content = operation.declared(answer.status) or {}
+        names = [name for name in content if _matches(name, answer.media_type) and is_json(answer.media_type)]
+        if names and not answer.cut and (answer.body or operation.method == "GET") and _usable(content[names[0]]):
+            yield probe, (content[names[0]], answer)
+
+
+def _usable(schema: Schema) -> bool:
+    try:
+        shape_of(schema)
+    except ValueError:
+        return False  # description/file-valid judges the schema itself
+    return True
+
+
+def _wrong(schema: Schema, answer: Response) -> str:
+    if not answer.body:
+        return "an empty body, where JSON is declared"
+    text = read_json(answer.body)
+    if text.malformed:
+        return f"a body that is not JSON: {text.problem}"
+    problem = shape_of(schema).problem(text.value)
+    return f"a body in which {problem}" if problem else ""
+
+
+def _text(schema: Schema) -> str:
+    return str(schema).replace("'", '"')
+
+
+@lru_cache(maxsize=256)
+def _formatted(key: int, text: str) -> Any:  # noqa: ARG001 - the text keeps the key from meaning another schema
+    return jsonschema_rs.validator_for(_SCHEMAS[key], validate_formats=True)
+
+
+_SCHEMAS: dict[int, Schema] = {}
+
+
+def _unformatted(schema: Schema, answer: Response) -> str:
+    """Return the first string that does not have its declared format."""
+    _SCHEMAS[id(schema)] = schema
+    error = next(iter(_formatted(id(schema), _text(schema)).iter_errors(read_json(answer.body).value)), None)
+    if error is None:
+        return ""
+    place = "/".join("*" if isinstance(part, int) else part for part in error.instance_path)
+    return f"{error.message[:200]} at /{place}"
+
+
+@rule("description/headers", on=_ON)
+def headers(trace: Survey, run: Run) -> Iterable[Outcome]:
+    """Judge whether each response has the headers that are declared as required, with valid values."""
+    judged: dict[int, tuple[dict[str, tuple[bool, Schema]], Response]] = {}
+    for probe, operation, answer in _answered(trace, run):
+        key = operation.response_key(answer.status)
+        if key is not None and operation.headers.get(key) and answer.status not in _CRASHES:
+            judged[id(probe)] = operation.headers[key], answer
+
+    def fault(probe: Probe) -> Fault | None:
+        declared, answer = judged[id(probe)]
+        for name, (required, schema) in declared.items():
+            value = answer.header(name)
+            if value is None:
+                if required:
+                    return Fault(name, f"status {answer.status} without the header {name}")
+            elif wrong := _wrong_header(schema, value):
+                return Fault(f"{name} {wrong}", f"{name}: {value[:80]}, in which {wrong}")
+        return None
+
+    yield from told_once((one for one in trace.probes if id(one) in judged), "the declared headers", fault)
+
+
+def _wrong_header(schema: Schema, value: str) -> str:
+    """Return why a header's text cannot be read as a valid value."""
+    kinds = kinds_of(schema)
+    if not _usable(schema) or kinds & {"object", "array"}:
+        return ""
+    readings: list[Any] = [value] if not kinds or "string" in kinds else []
+    if kinds & {"integer", "number"} and re.fullmatch(r"[+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?", value.strip()):
+        readings.append(float(value) if "." in value or "e" in value.lower() else int(value))
+    if "boolean" in kinds and value.strip().lower() in {"true", "false"}:
+        readings.append(value.strip().lower() == "true")
+    if not readings:
+        return f"the value is no {' or '.join(sorted(kinds))}"
+    problems = [shape_of(schema).problem(one) for one in readings]
+    return "" if "" in problems else problems[0]

@@ -1,0 +1,75 @@
+"""Tell what several operations have in common once, with the list of the operations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+from conformance.scenarios.rule import Case
+from conformance.scenarios.survey import Probe
+
+_LISTED = 12
+_NUMBERS = re.compile(r"\d+(?:\.\d+)?")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What is wrong with one response.
+
+    Attributes:
+        cause: faults of the same cause are told once.
+        observed: what the response shows, as a noun phrase.
+        expected: what it should be, as a noun phrase; empty: that of the rule.
+    """
+
+    cause: str
+    observed: str
+    expected: str = ""
+
+
+def told_once(
+    probes: Iterable[Probe], expected: str, fault_of: Callable[[Probe], Fault | None], *, apart: bool = False
+) -> Iterator[Case]:
+    """Yield a case for each probe that holds, and one for each cause of faults, with its operations.
+
+    Args:
+        probes: those that the rule judges.
+        expected: what the rule demands, as a noun phrase.
+        fault_of: returns what is wrong with a probe, or None.
+        apart: whether each operation is a cause of its own.
+    """
+    faults: dict[str, list[tuple[Probe, Fault]]] = {}
+    for probe in probes:
+        fault = fault_of(probe)
+        if fault is None:
+            yield Case(holds=True, exchange=probe.attempt, expected=expected)
+        else:
+            cause = f"{probe.operation} {fault.cause}" if apart else fault.cause
+            faults.setdefault(cause, []).append((probe, fault))
+    for cause, found in faults.items():
+        # The smallest request shows it best; a usual one better than an odd one.
+        probe, fault = min(found, key=lambda pair: (pair[0].says != "", pair[0].attempt.request.size))
+        operations = sorted({one.operation for one, _ in found} - {probe.operation})
+        observed = f"{fault.observed}, for {probe.says}" if probe.says else fault.observed
+        yield Case(
+            holds=False,
+            exchange=probe.attempt,
+            expected=fault.expected or expected,
+            observed=observed + _others(operations),
+            cause=cause,
+            subject=probe.operation,
+        )
+
+
+def _others(operations: list[str]) -> str:
+    if not operations:
+        return ""
+    more = f" and {len(operations) - _LISTED} more" if len(operations) > _LISTED else ""
+    count = f"{len(operations)} other operation{'s' if len(operations) > 1 else ''}"
+    return f". The same for {count}: {', '.join(operations[:_LISTED])}{more}"
+
+
+def without_numbers(text: str) -> str:
+    """Return a text with each number as #, to compare texts about values that differ."""
+    return _NUMBERS.sub("#", text)

@@ -1,0 +1,261 @@
+"""The survey of a described API: each operation that may be called is sent valid, invalid and odd requests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, Final
+
+from hypothesis.errors import Unsatisfiable
+
+from conformance.api.rest.applicable import allowed
+from conformance.api.rest.generated_request import GeneratedRequest
+from conformance.api.rest.inputs import Inputs, usual_inputs, written
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.values import Values
+from conformance.api.rest.variations import (
+    Kind,
+    Variation,
+    invalid_variations,
+    odd_variations,
+    unknown_variations,
+    valid_variations,
+)
+from conformance.documents.openapi import Operation, operations_of
+from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
+from conformance.verdict.effort import Effort
+from conformance.verdict.explorer import Explorer
+
+# At standard effort, of one operation: valid, invalid and odd requests; and at least so many of each at quick.
+_MOST: Final = {"valid": 60, "invalid": 60, "odd": 40}
+_LEAST: Final = 14
+# Valid requests of an operation that changes something: each leaves something behind.
+_ACTING: Final = 12
+# How often one request is sent again and again; and cases of Schemathesis, as many of each kind, of one operation.
+_REPEATS: Final = 200
+_COVERAGE: Final = 150
+_FUZZED: Final = 40
+
+
+@dataclass(frozen=True)
+class Probe:
+    """One request of the survey and what came of it.
+
+    Attributes:
+        operation: method and path template.
+        kind: what the request shows.
+        says: what is special about it, as a noun phrase.
+        place: the parameter or member that is special.
+        exchange: the request with its response; None without a response.
+        unanswered: the request without a response; None with one.
+        opinions: code and text of what Schemathesis finds wrong.
+    """
+
+    operation: str
+    kind: Kind
+    says: str = ""
+    place: str = ""
+    exchange: Exchange | None = None
+    unanswered: Unanswered | None = None
+    opinions: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def attempt(self) -> Attempt:
+        """The request with its response, or with the reason for a missing one."""
+        found = self.exchange or self.unanswered
+        if found is None:
+            raise ValueError("a probe has neither a response nor a reason for a missing one")
+        return found
+
+    @property
+    def status(self) -> int:
+        """The status code; 0 without a response."""
+        return self.exchange.response.status if self.exchange else 0
+
+    @property
+    def ok(self) -> bool:
+        """Whether the status is 2xx."""
+        return self.exchange is not None and self.exchange.response.ok
+
+
+@dataclass(frozen=True)
+class Survey:
+    """All requests of a survey, in the order in which they were sent.
+
+    Attributes:
+        probes: the requests.
+        repeats: response times of one request that was sent again and again, ms.
+        repeated: the last of these exchanges, or None.
+    """
+
+    probes: tuple[Probe, ...] = ()
+    repeats: tuple[float, ...] = ()
+    repeated: Exchange | None = None
+
+    def of(self, operation: str, *kinds: Kind) -> list[Probe]:
+        """Return the probes of one operation, of these kinds or of all."""
+        return [one for one in self.probes if one.operation == operation and (not kinds or one.kind in kinds)]
+
+
+@dataclass
+class _Surveyor:
+    """Sends the requests of a survey and records them."""
+
+    api: RestInterface
+    values: Values
+    probes: list[Probe] = field(default_factory=list)
+    usual: dict[str, Inputs] = field(default_factory=dict)
+    given_up: set[str] = field(default_factory=set)
+
+    def send(self, operation: Operation, variation: Variation, request: GeneratedRequest | None = None) -> Probe:
+        """Send one request and record it.
+
+        Raises:
+            PartialTraceError: the device does not respond any more.
+        """
+        request = request or written(operation, variation.inputs)
+        exchange, unanswered = None, None
+        try:
+            exchange = request.send(self.api)
+        except NoAnswerError as none:
+            unanswered = none.unanswered
+            if none.kind in {NoAnswer.TIMEOUT, NoAnswer.CIRCUIT_OPEN}:
+                self.given_up.add(operation.label)
+            self.record(Probe(operation.label, variation.kind, variation.says, variation.place, None, unanswered))
+            if not self.api.alive():
+                raise PartialTraceError(Survey(tuple(self.probes))) from none
+            return self.probes[-1]
+        self.record(Probe(operation.label, variation.kind, variation.says, variation.place, exchange))
+        if exchange.response.cut:
+            # An endless response says nothing new the second time, and costs its time each time.
+            self.given_up.add(operation.label)
+        if exchange.response.ok:
+            self.values.learn(operation, exchange)
+        return self.probes[-1]
+
+    def record(self, probe: Probe) -> None:
+        """Add a probe to the survey."""
+        self.probes.append(probe)
+
+    def begin(self, operation: Operation) -> None:
+        """Find a valid request that the device accepts, and keep it as the usual one."""
+        tried = usual_inputs(operation, self.values)
+        for inputs in tried[:4]:
+            self.usual.setdefault(operation.label, inputs)
+            if self.send(operation, Variation(Kind.USUAL, "", "", inputs)).ok:
+                self.usual[operation.label] = inputs
+                return
+            if operation.label in self.given_up:
+                return
+
+    def vary(self, operation: Operation, effort: Effort, seed: int) -> None:
+        """Send requests that differ from the usual one in one thing, and then the usual one again."""
+        usual = self.usual[operation.label]
+        valid = list(valid_variations(operation, usual, self.values))
+        if not operation.safe:
+            valid = effort.draw(valid, _ACTING, f"{seed}/valid {operation.label}")
+        groups = {
+            "valid": [*valid, *unknown_variations(operation, usual)],
+            "invalid": list(invalid_variations(operation, usual)),
+            "odd": list(odd_variations(operation, usual)),
+        }
+        for name, variations in groups.items():
+            most = max(_LEAST, effort.cases(_MOST[name]))
+            few = variations if len(variations) <= most else effort.draw(variations, _MOST[name], f"{seed}/{name}")
+            for one in few:
+                if operation.label in self.given_up:
+                    return
+                self.send(operation, one)
+        self.send(operation, Variation(Kind.AGAIN, "", "", usual))
+
+
+def order_of(operation: Operation) -> tuple[int, int]:
+    """Return the rank of an operation: what lists things comes before what needs their ids, DELETE comes last."""
+    ranks = {"GET": 0, "HEAD": 0, "OPTIONS": 0, "POST": 2, "PUT": 3, "PATCH": 3, "DELETE": 5}
+    rank = ranks.get(operation.method, 4)
+    return (rank + 1 if rank == 0 and operation.parameter("path") else rank), len(operation.parameter("path"))
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.READING)
+def survey(api: RestInterface, values: Values) -> Survey:
+    """Send each operation that may be called its usual request, and many that differ from it in one thing."""
+    run = api.run
+    operations = [item for item in operations_of(run.contract) if allowed(api, item)]
+    if not operations:
+        raise NotPossibleError("no operation of the description may be called")
+    surveyor = _Surveyor(api, values)
+    for operation in sorted(operations, key=order_of):
+        surveyor.begin(operation)
+        if operation.label not in surveyor.given_up:
+            surveyor.vary(operation, run.effort, run.seed)
+    for operation in operations:
+        if operation.method == "GET" and operation.parameter("path") and operation.label not in surveyor.given_up:
+            # What was created meanwhile has an id now.
+            surveyor.begin(operation)
+    return _repeated(surveyor, operations)
+
+
+def _repeated(surveyor: _Surveyor, operations: list[Operation]) -> Survey:
+    """Send the quickest usual request many times, and return the finished survey."""
+    quickest = [
+        (probe.exchange.response.elapsed_ms, probe.operation)
+        for probe in surveyor.probes
+        if probe.kind is Kind.USUAL and probe.exchange and probe.ok and probe.operation.startswith("GET ")
+    ]
+    times: list[float] = []
+    last: Exchange | None = None
+    for _, label in sorted(quickest)[:1]:
+        operation = next(item for item in operations if item.label == label)
+        request = written(operation, surveyor.usual[label])
+        for _ in range(surveyor.api.run.effort.cases(_REPEATS)):
+            try:
+                last = request.send(surveyor.api)
+            except NoAnswerError as none:
+                surveyor.record(Probe(label, Kind.AGAIN, "", "", None, none.unanswered))
+                break
+            times.append(last.response.elapsed_ms)
+    return Survey(tuple(surveyor.probes), tuple(times), last)
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.DESCRIBE)
+def generated_requests(api: RestInterface, values: Values, explore: Explorer) -> Survey:
+    """Send requests that Schemathesis generates for each operation, and note what its own checks say of each."""
+    # Imported late: that takes half a second.
+    from conformance.api.rest.generated import as_request, own_headers, targets  # noqa: PLC0415
+    from conformance.api.rest.opinions import opinions  # noqa: PLC0415
+
+    run = api.run
+    operations = {item.label: item for item in operations_of(run.contract) if allowed(api, item)}
+    surveyor = _Surveyor(api, values)
+
+    def send(operation: Operation, case: Any) -> None:
+        request, headers = as_request(case), own_headers(case)
+        if request is None or headers is None or operation.label in surveyor.given_up:
+            return
+        # A method that the description does not have may act on the device.
+        if request.method not in {operation.method, "OPTIONS"}:
+            return
+        probe = surveyor.send(
+            operation, Variation(Kind.GENERATED, "", "", Inputs()), replace(request, headers=headers)
+        )
+        if probe.exchange is not None and request.method == operation.method:
+            found = tuple((one.code, one.text) for one in opinions(case, probe.exchange))
+            surveyor.probes[-1] = replace(probe, opinions=found)
+
+    for target in targets(run.contract):
+        operation = operations.get(target.label)
+        if operation is None:
+            continue
+        cases = list(target.covering())
+        for case in run.effort.draw(cases, _COVERAGE, f"{run.seed}/coverage {target.label}"):
+            send(operation, case)
+        if run.effort.name == "quick" or run.effort.slow or not target.has_input:
+            continue
+        for negative in (True, False):
+            try:
+                explore(target.fuzzed(negative=negative), partial(send, operation), cases=_FUZZED)
+            except Unsatisfiable:
+                continue  # its schemas allow everything, or nothing
+    return Survey(tuple(surveyor.probes))
