@@ -107,8 +107,7 @@ def told(rules: CallRules, operations: Sequence[Operation]) -> list[str]:
     changing = by_reason.get(Reason.ALLOWED, [])
     kept = len(operations) - len(called)
     lines = [
-        f"Calls {len(called)} of {len(operations)} operations; {len(changing)} of them may change something; "
-        f"{kept} are not called."
+        f"Calls {len(called)} of {len(operations)} operations ({len(changing)} change state); {kept} are not called."
     ]
     for reason in Reason:
         labels = by_reason.get(reason, [])

@@ -13,6 +13,7 @@ import click
 import msgspec
 from click.core import ParameterSource
 
+from conformance.api.call_rules import CallRules, told
 from conformance.cli.summary import print_summary
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, FrontDoor, ResultCommand
@@ -20,7 +21,20 @@ from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.contract.places import places
 from conformance.contract.requirement_sets import RequirementSetError, judged_by
-from conformance.statement.statement import Statement, StatementError, empty_statement, load_statement
+from conformance.documents.description import DescriptionError, is_url
+from conformance.documents.openapi import operations_of
+from conformance.engine.describing import UnreachableError, described_contract
+from conformance.statement.statement import (
+    Api,
+    Calls,
+    Endpoints,
+    Statement,
+    StatementError,
+    api_of,
+    empty_statement,
+    endpoints_of,
+    load_statement,
+)
 from conformance.verdict.effort import EFFORTS, Effort
 
 if TYPE_CHECKING:
@@ -34,9 +48,24 @@ _OBJECTS = 20_000
 
 
 @click.command(cls=ResultCommand)
-@click.argument("statement", required=False, type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("target", required=False, metavar="[STATEMENT|DESCRIPTION]")
 @click.option("--init", is_flag=True, help="Write a commented STATEMENT from the robot's descriptions; test nothing.")
 @click.option("--rest", metavar="URL", help="Base URL of the REST interface.")
+@click.option(
+    "--openapi", metavar="URL|FILE", help="The device's own OpenAPI or Swagger description: judge it by that."
+)
+@click.option(
+    "--overlay", "overlays", multiple=True, metavar="FILE", help="OpenAPI Overlay to apply to it; repeatable."
+)
+@click.option("--base-url", metavar="URL", help="Where the operations of the description are.")
+@click.option(
+    "--call",
+    "allow",
+    multiple=True,
+    metavar="PATTERN",
+    help="Also call operations that may change something: 'POST /api/move/*', an operationId or a tag; repeatable.",
+)
+@click.option("--never", multiple=True, metavar="PATTERN", help="Never call these operations; repeatable.")
 @click.option("--publishers-wsdl", metavar="URL", help="WSDL of the publishers service, URL or file.")
 @click.option("--subscribers-wsdl", metavar="URL", help="WSDL of the subscribers service, URL or file.")
 @click.option("--publishers-endpoint", metavar="URL", help="Address of that service, if its WSDL has another.")
@@ -90,12 +119,15 @@ _OBJECTS = 20_000
 @click.option("--sign", "key", type=_FILE, metavar="KEY", help="Sign the result with this private key.")
 @click.option("--force", is_flag=True, help="With --init: overwrite STATEMENT.")
 @click.pass_obj
-def certify(door: FrontDoor, /, statement: Path | None, **options: Any) -> CommandResult:
+def certify(door: FrontDoor, /, target: str | None, **options: Any) -> CommandResult:
     """Test a robot against its contract, and judge each requirement.
 
     STATEMENT is the robot's implementation conformance statement (TOML); options override it. --fleet takes several
     statements. If no classes are claimed (statement, --profile, --class), all classes are judged whose interfaces have
     an address.
+
+    DESCRIPTION is the URL or file of an OpenAPI or Swagger description: the device is then judged by it and by what
+    binds every web API. Only GET, HEAD and OPTIONS are sent, unless --call allows more.
 
     Exit code: 0 conformant, 1 not conformant, 2 usage, 3 robot not reached, 4 inconclusive, 130 interrupted.
     """
@@ -112,11 +144,17 @@ def certify(door: FrontDoor, /, statement: Path | None, **options: Any) -> Comma
         return certify_fleet(Path(options["fleet"]), options)
     if options["parallel"] is not None:
         raise click.UsageError("--parallel says how many robots of a --fleet are judged at once: give --fleet")
+    source, statement = _told_apart(target, options["openapi"])
     try:
         contract = Contract.load(options["pack"])
         known = statement and not options["init"]
-        declared = load_statement(statement, contract) if statement and known else empty_statement(contract)
-        chosen = _apply(declared, options, contract)
+        api = api_of(statement) if statement and known else None
+        source = source or (api.openapi if api else None)
+        if source is not None:
+            chosen, contract = _described(source, api, statement if known else None, options)
+        else:
+            declared = load_statement(statement, contract) if statement and known else empty_statement(contract)
+            chosen = _apply(declared, options, contract)
         if options["init"]:
             return _init(statement, chosen, contract, force=options["force"])
         if options["nonce"] is not None:
@@ -126,7 +164,10 @@ def certify(door: FrontDoor, /, statement: Path | None, **options: Any) -> Comma
         if options["plan"]:
             return _plan(chosen, options, contract)
         outcome = _certify(chosen, options, contract, statement)
-    except (StatementError, ContractError) as error:
+    except UnreachableError as unreachable:
+        click.echo(f"the device cannot be reached: {unreachable}", err=True)
+        return CommandResult(ExitCode.UNREACHABLE)
+    except (StatementError, ContractError, DescriptionError) as error:
         raise click.UsageError(str(error)) from error
     except KeyboardInterrupt:
         return CommandResult(ExitCode.INTERRUPTED)
@@ -135,6 +176,44 @@ def certify(door: FrontDoor, /, statement: Path | None, **options: Any) -> Comma
     # that took half a second.
     gc.freeze()
     return CommandResult(outcome.exit_code, outcome.path, notary)
+
+
+def _told_apart(target: str | None, openapi: str | None) -> tuple[str | None, Path | None]:
+    """Return the description and the statement that the command names; either may be None.
+
+    Raises:
+        click.UsageError: two descriptions are named.
+    """
+    if target is None or not (is_url(target) or target.endswith((".json", ".yaml", ".yml"))):
+        return openapi, Path(target) if target else None
+    if openapi:
+        raise click.UsageError(f"{target} and --openapi {openapi} are two descriptions: name one")
+    return target, None
+
+
+def _described(
+    source: str, api: Api | None, statement: Path | None, options: dict[str, Any]
+) -> tuple[Statement, Contract]:
+    """Return statement and contract of a device that is judged by its own description.
+
+    Raises:
+        DescriptionError, StatementError, ContractError: one of them cannot be used.
+        UnreachableError: the server of the description does not respond.
+    """
+    from conformance.engine.pytest_run import connection_of  # noqa: PLC0415 - see _certify
+
+    given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) is not None}
+    where = msgspec.structs.replace(endpoints_of(statement) if statement else Endpoints(), **given)
+    overlays = tuple(options["overlays"]) or (api.overlays if api else ())
+    base_url = options["base_url"] or (api.base_url if api else None)
+    try:
+        connection = connection_of(where)
+        contract, where, remarks = described_contract(source, overlays, base_url, where, connection, options["out"])
+    except OSError as error:
+        raise StatementError(str(error)) from error
+    options["remarks"] = remarks
+    declared = load_statement(statement, contract) if statement else empty_statement(contract)
+    return _apply(msgspec.structs.replace(declared, endpoints=where), options, contract), contract
 
 
 def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> Statement:
@@ -156,7 +235,10 @@ def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> 
         claims = _claims(options, contract)
     if options["ros_domain_id"] is not None:
         declared = declared.on_domain(options["ros_domain_id"])
-    return msgspec.structs.replace(declared, endpoints=where, claims=claims)
+    calls = declared.calls
+    if options["allow"] or options["never"]:
+        calls = Calls((*calls.allow, *options["allow"]), (*calls.never, *options["never"]))
+    return msgspec.structs.replace(declared, endpoints=where, claims=claims, calls=calls)
 
 
 def _claims(options: dict[str, Any], contract: Contract) -> tuple[str, ...]:
@@ -235,7 +317,7 @@ def _certify(chosen: Statement, options: dict[str, Any], contract: Contract, sta
         raise StatementError(str(error)) from error
     run = _run(chosen, options, contract)
     run.requirement_set, run.given = requirements, given
-    notes = _notes(run)
+    notes = (*options.get("remarks", ()), *_notes(run))
     command = shlex.join(["roaas", *sys.argv[1:]])
     return judge(RobotUnderTest(run, connection), options["out"], command=command, baseline=baseline, notes=notes)
 
@@ -263,6 +345,12 @@ def _notes(run: Run) -> tuple[str, ...]:
         f"Class {name} is not claimed: the robot's {' and '.join(missing)} interface has no address."
         for name, missing in run.statement.lacking(run.contract).items()
     ]
-    if not run.allow_motion:
+    if run.contract.described:
+        rules = CallRules(run.statement.calls.allow, run.statement.calls.never, motion=run.allow_motion)
+        operations = operations_of(run.contract)
+        unused = rules.unused(operations)
+        notes += [f"The pattern {one!r} matches no operation of the description." for one in unused]
+        notes += told(rules, operations)
+    elif not run.allow_motion:
         notes.append("Without --allow-motion nothing was sent that moves the robot; what needs motion is skipped.")
     return tuple(notes)

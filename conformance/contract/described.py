@@ -15,7 +15,7 @@ ORIGINAL_NAME: Final = "original.json"
 UNRESOLVED_NAME: Final = "unresolved.json"
 #: How the contract is called in verdicts: "keeps its own description".
 TITLE: Final = "its own description"
-_CLASSES: Final = ("description", "robustness", "http", "rest-formats")
+_CLASSES: Final = ("description", "robustness", "http")
 # The class `description` judges these of each operation, and tells what operations have in common once.
 _WITHOUT: Final = ("http/declared-status", "http/declared-body", "http/json-integers", "http/no-traceback")
 _NO_NAME: Final = re.compile(r"[^a-z0-9]+")
@@ -39,7 +39,9 @@ def write_described_pack(
     info = document.get("info")
     info = info if isinstance(info, dict) else {}
     name = _NO_NAME.sub("-", str(info.get("title", "api")).lower()).strip("-") or "api"
-    classes = [*_CLASSES, *(("xml-security",) if _takes_xml(document) else ())]
+    taken, sent = _formats(document)
+    more = {"rest-formats": len(sent) > 1, "xml-security": any("xml" in name for name in taken)}
+    classes = [*_CLASSES, *(name for name, there in more.items() if there)]
     lines = [
         f"name = {basic_string(name)}",
         f"version = {basic_string(str(info.get('version', '')) or '0')}",
@@ -57,12 +59,22 @@ def write_described_pack(
     return folder
 
 
-def _takes_xml(document: Mapping[str, Any]) -> bool:
-    """Return whether an operation takes XML."""
+def _formats(document: Mapping[str, Any]) -> tuple[set[str], set[str]]:
+    """Return the media types that the operations take, and those of the 2xx responses of one operation, if several."""
+    taken: set[str] = set()
+    sent: set[str] = set()
     for item in document.get("paths", {}).values():
         for operation in item.values() if isinstance(item, dict) else ():
-            body = operation.get("requestBody") if isinstance(operation, dict) else None
-            content = body.get("content") if isinstance(body, dict) else None
-            if isinstance(content, dict) and any("xml" in name for name in content):
-                return True
-    return False
+            if not isinstance(operation, dict):
+                continue
+            taken |= _content(operation.get("requestBody"))
+            responses = operation.get("responses")
+            for status, response in responses.items() if isinstance(responses, dict) else ():
+                formats = _content(response) if str(status).startswith("2") else set()
+                sent = max(sent, formats, key=len)
+    return taken, sent
+
+
+def _content(value: Any) -> set[str]:
+    content = value.get("content") if isinstance(value, dict) else None
+    return set(content) if isinstance(content, dict) else set()

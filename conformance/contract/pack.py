@@ -224,9 +224,7 @@ class Contract:
         """
         dropped = self.manifest.without if self.manifest else ()
         generic = {
-            id_: item
-            for id_, item in generic_ledger().items()
-            if item.class_ in self.classes and id_ not in dropped
+            id_: item for id_, item in generic_ledger().items() if item.class_ in self.classes and id_ not in dropped
         }
         own: dict[str, Requirement] = {}
         path = self.directory / LEDGER

@@ -179,5 +179,7 @@ def _base_url(source: str, document: Schema) -> tuple[str, tuple[str, ...]]:
         return whole.rstrip("/"), ()
     parts = urlsplit(source)
     here = f"{parts.scheme}://{parts.netloc}{urlsplit(whole).path}".rstrip("/")
-    remark = f"The description names the server {whole}. Tested was {here}, from where it was read; --base-url changes that."
+    remark = (
+        f"The description names the server {whole}. Tested was {here}, from where it was read; --base-url changes that."
+    )
     return here, (remark,)

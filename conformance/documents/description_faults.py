@@ -64,14 +64,39 @@ def _path_parameters(document: Schema) -> Iterator[str]:
 
 def _schemas(document: Schema) -> Iterator[str]:
     """Yield schemas that no validator can use, such as one with a regular expression that does not compile."""
-    schemas = document.get("components", {}).get("schemas", {}) if isinstance(document.get("components"), dict) else {}
-    for name, schema in schemas.items() if isinstance(schemas, dict) else ():
+    told: set[str] = set()
+    for place, schema in _every_schema(document):
         try:
             shape_of(modern(resolved(document, schema)))
         except UnresolvedError:
             continue  # description/references tells that
         except (ValueError, TypeError, RecursionError) as error:
-            yield f"/components/schemas/{name} is no JSON Schema: {str(error).splitlines()[0][:160]}"
+            reason = str(error).splitlines()[0][:160]
+            if reason not in told:
+                told.add(reason)
+                yield f"{place} is no JSON Schema: {reason}"
+
+
+def _every_schema(document: Schema) -> Iterator[tuple[str, Schema]]:
+    """Yield the schemas of components, parameters, request bodies and responses, with their places."""
+    components = document.get("components")
+    schemas = components.get("schemas") if isinstance(components, dict) else document.get("definitions")
+    for name, schema in schemas.items() if isinstance(schemas, dict) else ():
+        if isinstance(schema, dict):
+            yield f"the schema {name}", schema
+    for path, method, operation, shared in _operations(document):
+        own = operation.get("parameters", [])
+        for one in [*shared, *(own if isinstance(own, list) else [])]:
+            if isinstance(one, dict) and isinstance(one.get("schema"), dict):
+                yield f"the schema of {one.get('in')} {one.get('name')} of {method} {path}", one["schema"]
+        responses = operation.get("responses")
+        contents = [("request", operation.get("requestBody"))]
+        contents += [(f"status {key}", one) for key, one in responses.items()] if isinstance(responses, dict) else []
+        for place, one in contents:
+            content = one.get("content") if isinstance(one, dict) else None
+            for media in content.values() if isinstance(content, dict) else ():
+                if isinstance(media, dict) and isinstance(media.get("schema"), dict):
+                    yield f"the schema of {method} {path}, {place}", media["schema"]
 
 
 def unresolved(document: Schema) -> list[str]:
@@ -153,7 +178,11 @@ def _examples(operation: Schema, shared: list[Any]) -> Iterator[tuple[str, Schem
 
 def _named(given: Schema) -> list[Any]:
     examples = given.get("examples", {})
-    named = [one["value"] for one in examples.values() if isinstance(one, dict) and "value" in one] if isinstance(examples, dict) else []
+    named = (
+        [one["value"] for one in examples.values() if isinstance(one, dict) and "value" in one]
+        if isinstance(examples, dict)
+        else []
+    )
     return [*([given["example"]] if "example" in given else []), *named]
 
 

@@ -77,7 +77,8 @@ def _path_item(document: Schema, item: Schema) -> Schema:
 
 
 def _followed(document: Schema, value: Schema) -> Schema:
-    return pointed(document, value["$ref"]) if "$ref" in value else value  # type: ignore[no-any-return] # of the document
+    found: Schema = pointed(document, value["$ref"]) if "$ref" in value else value
+    return found
 
 
 def _operation(document: Schema, given: Schema, shared: list[Schema]) -> Schema:
@@ -86,7 +87,9 @@ def _operation(document: Schema, given: Schema, shared: list[Schema]) -> Schema:
     parameters = [one for one in shared if (one["name"], one["in"]) not in names] + own
     consumes = given.get("consumes", document.get("consumes", _JSON))
     produces = given.get("produces", document.get("produces", _JSON))
-    found = {key: value for key, value in given.items() if key not in {"parameters", "responses", "consumes", "produces"}}
+    found = {
+        key: value for key, value in given.items() if key not in {"parameters", "responses", "consumes", "produces"}
+    }
     found["parameters"] = [_parameter(one) for one in parameters if one["in"] not in {"body", "formData"}]
     body = next((one for one in parameters if one["in"] == "body"), None)
     form = [one for one in parameters if one["in"] == "formData"]
@@ -137,7 +140,7 @@ def _form(fields: list[Schema], consumes: Any) -> Schema:
 
 
 def _response(given: Schema, produces: Any) -> Schema:
-    found = {key: value for key, value in given.items() if key in {"description"} or key.startswith("x-")}
+    found = {key: value for key, value in given.items() if key == "description" or key.startswith("x-")}
     if "schema" in given:
         schema = given["schema"]
         is_file = schema.get("type") == "file"

@@ -33,7 +33,10 @@ def inside_shown(body: bytes) -> str:
 
 
 # A file of a program: an absolute path with at least three segments, or with a drive letter.
-_PATH = re.compile(rb"(?<![\w:/.])(?:/(?:home|root|usr|opt|var|srv|app|code|src|work|tmp|mnt|etc|Users)(?:/[\w.@+-]+){2,}|[A-Z]:\\\\?(?:[\w .-]+\\\\?){2,})")
+_PATH = re.compile(
+    rb"(?<![\w:/.])/(?:home|root|usr|opt|var|srv|app|code|src|work|tmp|mnt|etc|Users)(?:/[\w.@+-]+){2,}"
+    rb"|[A-Z]:\\\\?(?:[\w .-]+\\\\?){2,}"
+)
 
 
 def path_shown(body: bytes, request: Request) -> str:

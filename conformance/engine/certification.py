@@ -2,6 +2,7 @@
 
 import datetime as dt
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -20,6 +21,7 @@ from conformance.scenarios.scenario import Recordings
 from conformance.scenarios.stored import write_traces
 from conformance.verdict.baseline import Expectation, accepted_until, apply_baseline
 from conformance.verdict.causes import Cause, by_cause
+from conformance.verdict.evidence import Evidence
 from conformance.verdict.run import Run
 from conformance.verdict.verdicts import Overall, Verdict, class_verdicts, overall, score, verdict_of
 
@@ -120,11 +122,20 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
             judge.stopped(requirement.id, run.aborted)
     scored = run.requirement_set.requirements if run.requirement_set else None
     seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, scored)
+    if run.contract.described:
+        _leave_out(seen)
     verdicts = [
         verdict_of(requirement, seen[requirement.id], run.claims, run.statement.undeclared)
         for requirement in run.contract.ledger.values()
     ]
     return verdicts, causes
+
+
+def _leave_out(seen: Mapping[str, Evidence]) -> None:
+    """Leave out what no permitted request shows: an API that is judged by its description has claimed nothing else."""
+    for evidence in seen.values():
+        if not (evidence.cases or evidence.errors or evidence.because or evidence.unclaimed):
+            evidence.unclaimed = (evidence.skips or ["nothing that may be called shows it"])[0]
 
 
 def _run_checks(robot: RobotUnderTest, progress: TextIO | None, remarks: list[str], recordings: Recordings) -> bool:

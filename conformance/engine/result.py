@@ -87,6 +87,7 @@ def result_document(
         "causes": [_cause(cause) for cause in causes],
         "contract_sections": {anchor: section._asdict() for anchor, section in run.contract.cited_sections.items()},
         "notes": notes,
+        **({"api": robot.log.document(robot.rest.call_rules)} if robot.log and robot.rest else {}),
     }
 
 

@@ -12,6 +12,7 @@ from typing import TextIO
 from conformance.api.device import Device, device_of
 from conformance.api.interfaces import Interfaces
 from conformance.api.rest.interface import RestInterface, plain_path
+from conformance.api.rest.operation_log import OperationLog
 from conformance.api.soap.callable_services import SoapServices
 from conformance.contract.interfaces import Interface
 from conformance.engine.resending import Recorder
@@ -39,11 +40,13 @@ class RobotUnderTest:
         run: the data of the run.
         connection: the settings that all clients share.
         rest: client of its REST interface, or None; ``connect`` sets it.
+        log: what was sent to each operation of an API that is judged by its own description, else None.
     """
 
     run: Run
     connection: Connection = field(default_factory=Connection)
     rest: RestInterface | None = None
+    log: OperationLog | None = None
     _services: SoapServices | None = None
     _progress: TextIO | None = None
 
@@ -80,6 +83,9 @@ class RobotUnderTest:
         """
         self._progress = progress
         self.connection.listeners.insert(0, Recorder(self.run.judge))
+        if self.run.contract.described:
+            # A contract names its streams; of any other API only a response shows that it does not end.
+            self.connection.endless = True
         self._connect_rest()
         self._connect_soap()
 
@@ -88,6 +94,9 @@ class RobotUnderTest:
         if not where.rest:
             return
         self.rest = RestInterface(self.run, HttpClient(where.rest, self.connection), self.alive)
+        if self.run.contract.described:
+            self.log = OperationLog(self.run.contract, self.rest.client.base_url)
+            self.connection.listeners.append(self.log)
         with self._told(Interface.REST, where.rest):
             self._look(Interface.REST, self.rest.client, self.rest.path)
 
@@ -133,8 +142,12 @@ class RobotUnderTest:
         for method, target in (("GET", path), ("GET", path), ("OPTIONS", path), ("GET", "/")):
             try:
                 while len(times) < _FEWEST_LOOKS or (len(times) < _LOOKS and sum(times) < 1000 * _LOOKING_S):
-                    times.append(client.send(method, target).response.elapsed_ms)
-                break
+                    response = client.send(method, target).response
+                    if response.cut:
+                        break
+                    times.append(response.elapsed_ms)
+                if times:
+                    break
             except NoAnswerError as none:
                 run.unreachable[name] = str(none)
                 if none.kind in {NoAnswer.REFUSED, NoAnswer.TLS}:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
+from conformance.api.rest.variations import Kind
 from conformance.scenarios.rule import Case
 from conformance.scenarios.survey import Probe
 
@@ -49,7 +50,7 @@ def told_once(
             faults.setdefault(cause, []).append((probe, fault))
     for cause, found in faults.items():
         # The smallest request shows it best; a usual one better than an odd one.
-        probe, fault = min(found, key=lambda pair: (pair[0].says != "", pair[0].attempt.request.size))
+        probe, fault = min(found, key=lambda pair: (pair[0].kind is Kind.GENERATED, pair[0].attempt.request.size))
         operations = sorted({one.operation for one, _ in found} - {probe.operation})
         observed = f"{fault.observed}, for {probe.says}" if probe.says else fault.observed
         yield Case(

@@ -9,6 +9,7 @@ from typing import Any, Final
 from hypothesis.errors import Unsatisfiable
 
 from conformance.api.rest.applicable import allowed
+from conformance.api.rest.calls import Call
 from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
@@ -22,6 +23,7 @@ from conformance.api.rest.variations import (
     valid_variations,
 )
 from conformance.documents.openapi import Operation, operations_of
+from conformance.documents.writing import text_of
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
@@ -30,11 +32,12 @@ from conformance.verdict.explorer import Explorer
 
 # At standard effort, of one operation: valid, invalid and odd requests; and at least so many of each at quick.
 _MOST: Final = {"valid": 60, "invalid": 60, "odd": 40}
-_LEAST: Final = 14
+_LEAST: Final = {"valid": 40, "invalid": 20, "odd": 12}
 # Valid requests of an operation that changes something: each leaves something behind.
 _ACTING: Final = 12
 # How often one request is sent again and again; and cases of Schemathesis, as many of each kind, of one operation.
 _REPEATS: Final = 200
+_FEWEST_REPEATS: Final = 60
 _COVERAGE: Final = 150
 _FUZZED: Final = 40
 
@@ -131,6 +134,7 @@ class _Surveyor:
         if exchange.response.cut:
             # An endless response says nothing new the second time, and costs its time each time.
             self.given_up.add(operation.label)
+            self.api.streams.add(operation.label)
         if exchange.response.ok:
             self.values.learn(operation, exchange)
         return self.probes[-1]
@@ -146,9 +150,18 @@ class _Surveyor:
             self.usual.setdefault(operation.label, inputs)
             if self.send(operation, Variation(Kind.USUAL, "", "", inputs)).ok:
                 self.usual[operation.label] = inputs
+                if operation.label not in self.given_up:
+                    self._note_working(operation, inputs)
                 return
             if operation.label in self.given_up:
                 return
+
+    def _note_working(self, operation: Operation, inputs: Inputs) -> None:
+        """Keep a request that was answered 2xx for other checks, if its values are plain texts and numbers."""
+        values = {**inputs.path, **inputs.query}
+        if all(isinstance(value, str | int | float) for value in values.values()) and not inputs.headers:
+            texts = {name: text_of(value) for name, value in values.items()}
+            self.api.working[operation.label] = Call(operation, texts)
 
     def vary(self, operation: Operation, effort: Effort, seed: int) -> None:
         """Send requests that differ from the usual one in one thing, and then the usual one again."""
@@ -162,9 +175,8 @@ class _Surveyor:
             "odd": list(odd_variations(operation, usual)),
         }
         for name, variations in groups.items():
-            most = max(_LEAST, effort.cases(_MOST[name]))
-            few = variations if len(variations) <= most else effort.draw(variations, _MOST[name], f"{seed}/{name}")
-            for one in few:
+            standard = max(_MOST[name], round(_LEAST[name] / effort.factor))
+            for one in effort.draw(variations, standard, f"{seed}/{name} {operation.label}"):
                 if operation.label in self.given_up:
                     return
                 self.send(operation, one)
@@ -209,7 +221,7 @@ def _repeated(surveyor: _Surveyor, operations: list[Operation]) -> Survey:
     for _, label in sorted(quickest)[:1]:
         operation = next(item for item in operations if item.label == label)
         request = written(operation, surveyor.usual[label])
-        for _ in range(surveyor.api.run.effort.cases(_REPEATS)):
+        for _ in range(max(_FEWEST_REPEATS, surveyor.api.run.effort.cases(_REPEATS))):
             try:
                 last = request.send(surveyor.api)
             except NoAnswerError as none:
@@ -223,26 +235,11 @@ def _repeated(surveyor: _Surveyor, operations: list[Operation]) -> Survey:
 def generated_requests(api: RestInterface, values: Values, explore: Explorer) -> Survey:
     """Send requests that Schemathesis generates for each operation, and note what its own checks say of each."""
     # Imported late: that takes half a second.
-    from conformance.api.rest.generated import as_request, own_headers, targets  # noqa: PLC0415
-    from conformance.api.rest.opinions import opinions  # noqa: PLC0415
+    from conformance.api.rest.generated import targets  # noqa: PLC0415
 
     run = api.run
     operations = {item.label: item for item in operations_of(run.contract) if allowed(api, item)}
     surveyor = _Surveyor(api, values)
-
-    def send(operation: Operation, case: Any) -> None:
-        request, headers = as_request(case), own_headers(case)
-        if request is None or headers is None or operation.label in surveyor.given_up:
-            return
-        # A method that the description does not have may act on the device.
-        if request.method not in {operation.method, "OPTIONS"}:
-            return
-        probe = surveyor.send(
-            operation, Variation(Kind.GENERATED, "", "", Inputs()), replace(request, headers=headers)
-        )
-        if probe.exchange is not None and request.method == operation.method:
-            found = tuple((one.code, one.text) for one in opinions(case, probe.exchange))
-            surveyor.probes[-1] = replace(probe, opinions=found)
 
     for target in targets(run.contract):
         operation = operations.get(target.label)
@@ -250,12 +247,30 @@ def generated_requests(api: RestInterface, values: Values, explore: Explorer) ->
             continue
         cases = list(target.covering())
         for case in run.effort.draw(cases, _COVERAGE, f"{run.seed}/coverage {target.label}"):
-            send(operation, case)
+            _send_case(surveyor, operation, case)
         if run.effort.name == "quick" or run.effort.slow or not target.has_input:
             continue
         for negative in (True, False):
             try:
-                explore(target.fuzzed(negative=negative), partial(send, operation), cases=_FUZZED)
+                explore(target.fuzzed(negative=negative), partial(_send_case, surveyor, operation), cases=_FUZZED)
             except Unsatisfiable:
                 continue  # its schemas allow everything, or nothing
     return Survey(tuple(surveyor.probes))
+
+
+def _send_case(surveyor: _Surveyor, operation: Operation, case: Any) -> None:
+    """Send a case of Schemathesis, and record it with what Schemathesis's checks say of the response."""
+    from conformance.api.rest.generated import as_request, own_headers  # noqa: PLC0415 - see generated_requests()
+    from conformance.api.rest.opinions import opinions  # noqa: PLC0415 - as above
+
+    request, headers = as_request(case), own_headers(case)
+    if request is None or headers is None or operation.label in surveyor.given_up:
+        return
+    # A method that the description does not have may act on the device.
+    if request.method not in {operation.method, "OPTIONS"}:
+        return
+    whole = replace(request, headers=headers)
+    probe = surveyor.send(operation, Variation(Kind.GENERATED, "", "", Inputs()), whole)
+    if probe.exchange is not None and request.method == operation.method:
+        found = tuple((one.code, one.text) for one in opinions(case, probe.exchange))
+        surveyor.probes[-1] = replace(probe, opinions=found)

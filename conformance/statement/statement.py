@@ -82,6 +82,20 @@ class Calls(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     never: tuple[Text, ...] = ()
 
 
+class Api(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The device's own description, by which it is judged in place of a contract.
+
+    Attributes:
+        openapi: URL or file of its OpenAPI or Swagger description.
+        overlays: files of OpenAPI Overlays to apply to it.
+        base_url: where its operations are, if the description does not say it.
+    """
+
+    openapi: Text | None = None
+    overlays: tuple[Text, ...] = ()
+    base_url: Text | None = None
+
+
 class Statement(msgspec.Struct, frozen=True):
     """What a vendor declares about a device. A pack whose device has more to declare extends it.
 
@@ -179,6 +193,7 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     load: Load = Load()
     values: dict[str, tuple[Any, ...]] = {}
     calls: Calls = Calls()
+    api: Api = Api()
 
     def read(self, contract: Contract, path: Path) -> Statement:
         """Return the statement.
@@ -214,6 +229,36 @@ def load_statement(path: Path, contract: Contract) -> Statement:
     """
     shape: type[StatementFile] = getattr(contract.plugin, "StatementFile", StatementFile)
     return read_toml(path, shape, StatementError).read(contract, path)
+
+
+class _Addresses(msgspec.Struct, frozen=True):
+    """The tables of a statement that say which contract the rest is read by."""
+
+    api: Api = Api()
+    endpoints: Endpoints = Endpoints()
+
+
+def api_of(path: Path) -> Api:
+    """Return the description that a statement names, files relative to the statement's folder.
+
+    Raises:
+        StatementError: the statement cannot be read, or this table is invalid.
+    """
+    api = read_toml(path, _Addresses, StatementError).api
+
+    def beside_it(name: str) -> str:
+        return name if "://" in name else str(path.parent / name)
+
+    return Api(beside_it(api.openapi) if api.openapi else None, tuple(map(beside_it, api.overlays)), api.base_url)
+
+
+def endpoints_of(path: Path) -> Endpoints:
+    """Return the endpoints of a statement, files relative to the statement's folder.
+
+    Raises:
+        StatementError: the statement cannot be read, or this table is invalid.
+    """
+    return beside(path.parent, read_toml(path, _Addresses, StatementError).endpoints)
 
 
 def empty_statement(contract: Contract) -> Statement:

@@ -97,9 +97,7 @@ class HttpConnection:
         """Whether the connection is open."""
         return self._link is not None
 
-    def exchange(
-        self, request: h11.Request, content: bytes, deadline: Deadline, *, endless: bool = False
-    ) -> Response:
+    def exchange(self, request: h11.Request, content: bytes, deadline: Deadline, *, endless: bool = False) -> Response:
         """Send a request and return the complete response; with ``endless``, only the beginning of an endless body.
 
         Raises:
@@ -175,7 +173,9 @@ class HttpConnection:
             pieces.append(bytes(event.data))
         return b"".join(pieces)
 
-    def _begin(self, link: socket.socket, head: h11.Response, deadline: Deadline) -> tuple[bytes, str]:
+    def _begin(
+        self, link: socket.socket, head: h11.Response | h11.InformationalResponse, deadline: Deadline
+    ) -> tuple[bytes, str]:
         """Return a body, or the beginning of one that does not end, and why it was not read to its end."""
         fields = {name.lower(): value.decode("latin-1").lower() for name, value in head.headers}
         kind = fields.get(b"content-type", "")

@@ -9,13 +9,27 @@ from conformance.api.rest.validity import require_valid
 from conformance.documents.json_schema import kind_of
 from conformance.documents.openapi import Operation, operations_of
 
+# As many operations of an API show how its server speaks HTTP.
+_DESCRIBED_READS = 8
 NO_MOTION = "it moves the robot, and --allow-motion was not given"
 
 
 def reads(api: RestInterface) -> list[Call]:
     """Return a valid request for each read-only operation, the optional ones last; see readable()."""
     found = [item for item in operations_of(api.run.contract) if item.method == "GET" and allowed(api, item)]
+    if api.run.contract.described:
+        return _described_reads(api, found)
     return [readable(api, item) for item in sorted(found, key=lambda item: item.optional)]
+
+
+def _described_reads(api: RestInterface, operations: list[Operation]) -> list[Call]:
+    """Return requests for some operations that read: how a server speaks HTTP shows in a few of them.
+
+    Those that the survey found to answer 2xx come first; a response that does not end is none that two can share.
+    """
+    ending = [item for item in operations if item.label not in api.streams]
+    ranked = sorted(ending, key=lambda item: (item.label not in api.working, len(item.parameters)))
+    return [api.working.get(item.label) or example_call(api, item) for item in ranked[:_DESCRIBED_READS]]
 
 
 def readable(api: RestInterface, operation: Operation) -> Call:

@@ -58,8 +58,8 @@ class Inputs:
         values = {key: item for key, item in self.at(where).items() if key != name}
         if value is not NOTHING:
             values[name] = value
-        key = {"header": "headers", "cookie": "cookies"}.get(where, where)
-        return replace(self, **{key: values})
+        changed: dict[str, Any] = {{"header": "headers", "cookie": "cookies"}.get(where, where): values}
+        return replace(self, **changed)
 
 
 def written(operation: Operation, inputs: Inputs) -> GeneratedRequest:
@@ -93,10 +93,8 @@ def written(operation: Operation, inputs: Inputs) -> GeneratedRequest:
 def _body(operation: Operation, inputs: Inputs) -> tuple[str, bytes]:
     """Return the Content-Type and the bytes of the body."""
     value, media_type = inputs.body, inputs.media_type
-    if value is NOTHING:
-        return "", b""
-    if isinstance(value, bytes):
-        return media_type, value
+    if value is NOTHING or isinstance(value, bytes):
+        return ("", b"") if value is NOTHING else (media_type, value)
     if media_type == FORM and isinstance(value, dict):
         return media_type, form_body(value)
     if media_type == MULTIPART and isinstance(value, dict):

@@ -3,10 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 from conformance.api.call_rules import CallRules
 from conformance.api.device import Device, device_of
 from conformance.contract.pack import Contract
+from conformance.documents.openapi import operations_of
 from conformance.transport.client import HttpClient
 from conformance.verdict.run import Run
 
@@ -22,6 +24,8 @@ class RestInterface:
         device: the contract pack's model of the device.
         small_numbers: by operation, the number that the robot accepts for its numeric parameters; empty: the example's.
         waits: how many more deferred reads may be repeated.
+        working: requests that the survey of a described API found to be answered 2xx, by operation.
+        streams: operations whose responses do not end.
     """
 
     run: Run
@@ -29,6 +33,8 @@ class RestInterface:
     alive: Callable[[], bool] = lambda: True
     small_numbers: dict[str, str] = field(default_factory=dict)
     waits: int = 5
+    working: dict[str, Any] = field(default_factory=dict)
+    streams: set[str] = field(default_factory=set)
     device: Device = field(init=False)
 
     def __post_init__(self) -> None:
@@ -48,7 +54,19 @@ class RestInterface:
 
 def plain_path(contract: Contract) -> str:
     """Return a path of the contract for GET without parameters, to check whether a robot responds."""
+    if contract.described:
+        return _described_path(contract)
     for path, operations in contract.openapi.get("paths", {}).items():
         if "get" in operations and "{" not in path and not operations["get"].get("x-roaas-optional"):
             return str(path)
+    return "/"
+
+
+def _described_path(contract: Contract) -> str:
+    """Return a path for GET without required parameters that harms nothing and does not stream; "/" if there is none."""
+    for operation in operations_of(contract):
+        required = any(item.required for item in operation.parameters)
+        streams = any(name.startswith(("text/event-stream", "multipart/", "video/")) for name in operation.formats)
+        if operation.method == "GET" and not required and not streams and CallRules().decide(operation).may:
+            return operation.template
     return "/"

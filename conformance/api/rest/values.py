@@ -9,7 +9,7 @@ from typing import Any
 
 from conformance.documents.json_schema import Schema, kinds_of, shape_of
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import PARAMETER, Operation, Parameter, is_json
+from conformance.documents.openapi import Operation, Parameter, is_json
 from conformance.documents.representation import flat
 from conformance.transport.exchange import Exchange
 
@@ -150,14 +150,11 @@ def sample(schema: Schema, depth: int = 0, *, whole: bool = False) -> Any:
         whole: whether objects get their optional members too.
     """
     schema = flat(_not_null(schema))
-    for key in ("example", "const", "default"):
-        if key in schema and schema[key] is not None and fits(schema, schema[key]):
-            return schema[key]
-    for key in ("examples", "enum"):
-        values = schema.get(key)
-        for value in values if isinstance(values, list) else ():
-            if value is not None and fits(schema, value):
-                return value
+    named = [schema[key] for key in ("example", "const", "default") if key in schema]
+    named += [value for key in ("examples", "enum") if isinstance(schema.get(key), list) for value in schema[key]]
+    chosen = next((value for value in named if value is not None and fits(schema, value)), None)
+    if chosen is not None:
+        return chosen
     kinds = kinds_of(schema)
     if "object" in kinds:
         return _object(schema, depth, whole=whole)
@@ -229,6 +226,8 @@ def _matching(schema: Schema) -> str:
 
     try:
         quiet = settings(database=None, derandomize=True, max_examples=200)
-        return find(from_regex(str(schema["pattern"])), lambda text: fits(schema, text) and text.isprintable(), settings=quiet)
+        return find(
+            from_regex(str(schema["pattern"])), lambda text: fits(schema, text) and text.isprintable(), settings=quiet
+        )
     except (HypothesisException, re.error, ValueError):
         return ""

@@ -80,7 +80,7 @@ def valid_variations(operation: Operation, usual: Inputs, values: Values) -> Ite
     for item in operation.parameters:
         place = f"{item.where} {item.name}"
         for kind, value in _valid_values(item.schema, item.examples, values.of(operation, item), item.required):
-            if value not in [usual.at(item.where).get(item.name, NOTHING)] and _sendable(item, value):
+            if value != usual.at(item.where).get(item.name, NOTHING) and _sendable(item, value):
                 yield Variation(kind, f"{_shown(value)} as {place}", place, usual.having(item.where, item.name, value))
     media_type, whole = whole_body(operation)
     if is_json(media_type) and isinstance(usual.body, dict):
@@ -207,20 +207,11 @@ def _invalid_values(schema: Schema) -> Iterator[tuple[Any, str]]:
 
 def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:
     """Yield values just outside a schema's bounds."""
-    for key, step in (("minimum", -1), ("maximum", 1)):
+    for key, step in (("minimum", -1), ("maximum", 1), ("exclusiveMinimum", 0), ("exclusiveMaximum", 0)):
         bound = schema.get(key)
         if isinstance(bound, int | float) and not isinstance(bound, bool):
-            yield bound + step, f"beyond its {key}"
-    for key, step in (("exclusiveMinimum", 0), ("exclusiveMaximum", 0)):
-        bound = schema.get(key)
-        if isinstance(bound, int | float) and not isinstance(bound, bool):
-            yield bound + step, f"at its {key}"
-    if isinstance(schema.get("maxLength"), int) and schema["maxLength"] <= _LONG:
-        yield "a" * (schema["maxLength"] + 1), "longer than its maxLength"
-    if isinstance(schema.get("minLength"), int) and schema["minLength"] > 0:
-        yield "a" * (schema["minLength"] - 1), "shorter than its minLength"
-    if isinstance(schema.get("pattern"), str):
-        yield from ((text, "which its pattern excludes") for text in ("~ roaas ~",))
+            yield bound + step, f"beyond its {key}" if step else f"at its {key}"
+    yield from _beyond_texts(schema)
     if isinstance(schema.get("enum"), list) and schema["enum"]:
         yield _UNKNOWN, "which is none of its values"
     if isinstance(schema.get("maxItems"), int) and schema["maxItems"] <= 100:  # noqa: PLR2004 - longer is a load test
@@ -229,6 +220,16 @@ def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:
         yield [copy.deepcopy(one) for _ in range(schema["maxItems"] + 1)], "with more items than its maxItems"
     if isinstance(schema.get("minItems"), int) and schema["minItems"] > 0:
         yield [], "with fewer items than its minItems"
+
+
+def _beyond_texts(schema: Schema) -> Iterator[tuple[Any, str]]:
+    """Yield texts just outside a schema's bounds."""
+    if isinstance(schema.get("maxLength"), int) and schema["maxLength"] <= _LONG:
+        yield "a" * (schema["maxLength"] + 1), "longer than its maxLength"
+    if isinstance(schema.get("minLength"), int) and schema["minLength"] > 0:
+        yield "a" * (schema["minLength"] - 1), "shorter than its minLength"
+    if isinstance(schema.get("pattern"), str):
+        yield "~ roaas ~", "which its pattern excludes"
 
 
 def _invalid_texts(parameter: Parameter) -> Iterator[tuple[Any, str]]:
@@ -265,7 +266,9 @@ def odd_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
         texts: tuple[Any, ...] = _ODD_TEXTS if "string" in kinds else ()
         for value in (*texts, *(_ODD_NUMBERS if kinds & {"number", "integer"} else ())):
             if _sendable(item, value):
-                yield Variation(Kind.ODD, f"{_shown(value)} as {place}", place, usual.having(item.where, item.name, value))
+                yield Variation(
+                    Kind.ODD, f"{_shown(value)} as {place}", place, usual.having(item.where, item.name, value)
+                )
     extra = usual.having("query", "roaas_unknown", "1")
     yield Variation(Kind.ODD, "an unknown query parameter", "query", extra)
     if is_json(usual.media_type) and isinstance(usual.body, dict):

@@ -21,7 +21,9 @@ from conformance.verdict.run import Run
 
 _ON = (survey, generated_requests)
 # HTTP lets any server send these, whatever the operation: conditions, ranges, rates, sizes, credentials, upgrades.
-_ANY_TIME = frozenset({100, 101, 206, 304, 401, 403, 407, 408, 411, 412, 413, 414, 416, 417, 421, 425, 426, 428, 429, 431})
+_ANY_TIME = frozenset(
+    {100, 101, 206, 304, 401, 403, 407, 408, 411, 412, 413, 414, 416, 417, 421, 425, 426, 428, 429, 431}
+)
 # ... and these, unless the request was the operation's usual one.
 _OF_REQUEST = frozenset({405, 406, 415, 501})
 _CRASHES = frozenset({500, 502, 504})
@@ -66,7 +68,9 @@ def status_declared(trace: Survey, run: Run) -> Iterable[Outcome]:
         if operation.response_key(answer.status) is not None:
             return None
         return Fault(
-            str(answer.status), f"status {answer.status}", f"a status that is declared: {', '.join(operation.responses)}"
+            str(answer.status),
+            f"status {answer.status}",
+            f"a status that is declared: {', '.join(operation.responses)}",
         )
 
     yield from told_once((one for one in trace.probes if id(one) in judged), "a declared status", fault)

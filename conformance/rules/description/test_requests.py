@@ -1,4 +1,4 @@
-"""The description against the device: what it requires, allows and forbids in requests (OpenAPI 3.1, 4.8.12, 4.8.14)."""
+"""The description against the device: what it requires, allows and forbids (OpenAPI 3.1, 4.8.12, 4.8.14)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,11 @@ def operations(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether the device has each operation that was called."""
     for operation in operations_of(run.contract):
         probes = trace.of(operation.label, Kind.USUAL)
-        absent = [one for one in probes if one.status in _NOT_THERE or (one.status == _NOT_FOUND and not operation.parameter("path"))]
+        absent = [
+            one
+            for one in probes
+            if one.status in _NOT_THERE or (one.status == _NOT_FOUND and not operation.parameter("path"))
+        ]
         if not probes:
             continue
 
@@ -50,7 +54,7 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
 
 
 def _is_invalid(run: Run, probe: Probe) -> bool:
-    """Return whether a generated request is invalid as it was sent, or Schemathesis says so of one that was accepted."""
+    """Return whether a generated request is invalid as it was sent, or by what Schemathesis says."""
     if probe.exchange is None:
         return False
     request = probe.exchange.request
@@ -81,7 +85,9 @@ def optional(trace: Survey) -> Iterable[Outcome]:
         more = [one for one in trace.of(label, Kind.OPTIONAL) if one.ok]
         refused = [one for one in least if one.status in _REFUSED]
 
-        def fault(probe: Probe, refused: list[Probe] = refused, least: list[Probe] = least, more: list[Probe] = more) -> Fault | None:
+        def fault(
+            probe: Probe, refused: list[Probe] = refused, least: list[Probe] = least, more: list[Probe] = more
+        ) -> Fault | None:
             if not more or len(refused) < len(least):
                 return None
             with_it = more[0]

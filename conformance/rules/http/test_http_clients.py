@@ -35,7 +35,7 @@ def _questions(api: RestInterface, known: list[Question]) -> list[Question]:
     return known
 
 
-@pytest.mark.requirement("http/concurrent-answers")
+@pytest.mark.requirement("http/concurrent-answers", "robustness/own-answer")
 def test_answers_do_not_cross(api: RestInterface, judge: Judge, asked: list[Question]) -> None:
     """Let eight clients send different requests at one moment, again and again; each must get its own response."""
     turns = rounds(_questions(api, asked), MOST_CLIENTS, api.run.effort.cases(_ROUNDS))
@@ -44,9 +44,10 @@ def test_answers_do_not_cross(api: RestInterface, judge: Judge, asked: list[Ques
         if isinstance(attempt, Unanswered) or is_busy(attempt):
             continue  # a robot that serves few clients at a time is not blamed
         mismatch = misplaced(api, question, attempt.response)
-        expect(judge, "http/concurrent-answers", attempt).that(
-            not mismatch, "the response to this request while other clients send theirs", mismatch, cause="mismatch"
-        )
+        for id_ in ("http/concurrent-answers", "robustness/own-answer"):
+            expect(judge, id_, attempt).that(
+                not mismatch, "the response to this request while other clients send theirs", mismatch, cause="mismatch"
+            )
 
 
 @pytest.mark.requirement("http/pipelining")

@@ -110,6 +110,8 @@ def test_head_is_get_without_its_body(api: RestInterface, judge: Judge) -> None:
 def _judge_head(judge: Judge, got: Exchange, exchange: Exchange, cause: str) -> None:
     one, two = got.response, exchange.response
     expect(judge, "http/head", exchange).status(one.status, when=f"GET gets {one.status}", cause=cause)
+    if one.status != two.status:
+        return  # the fields of another response say nothing of this one
     # A field whose value comes with the content may be left out (RFC 9110 9.3.2).
     expect(judge, "http/head-content-type", exchange).that(
         not two.media_type or one.media_type == two.media_type,

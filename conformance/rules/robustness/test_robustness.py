@@ -15,7 +15,7 @@ from conformance.scenarios.survey import Probe, Survey, generated_requests, surv
 from conformance.transport.exchange import NoAnswer
 
 _ON = (survey, generated_requests)
-# A status by which a server says that it, or one behind it, has failed. 503 says that it cannot now, 501 that it never can.
+# A status by which a server says that it, or one behind it, has failed; 503 says that it cannot now, 501 never.
 _CRASHES: Final = frozenset({500, 502, 504})
 # A response time has grown when its median is so many times, and so many ms, above that of the first requests.
 _TIMES, _MS, _FEWEST = 3.0, 50.0, 15
@@ -59,7 +59,20 @@ def no_hang(trace: Survey) -> Iterable[Outcome]:
 
 def _waits(operation: str) -> bool:
     """Return whether an operation's path says that it waits for something, as a long poll does."""
-    words = ("wait", "poll", "subscribe", "stream", "event", "watch", "next", "listen", "feed", "live", "follow", "tail")
+    words = (
+        "wait",
+        "poll",
+        "subscribe",
+        "stream",
+        "event",
+        "watch",
+        "next",
+        "listen",
+        "feed",
+        "live",
+        "follow",
+        "tail",
+    )
     return any(word in operation.lower() for word in words)
 
 

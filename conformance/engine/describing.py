@@ -1,0 +1,128 @@
+"""Fetch an API's own description, and make the contract pack by which the API is judged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+from urllib.parse import urljoin, urlsplit
+
+from conformance.contract.described import write_described_pack
+from conformance.contract.pack import Contract
+from conformance.documents.description import Description, DescriptionError, is_url, read_description
+from conformance.statement.statement import Endpoints
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import NoAnswer, NoAnswerError
+
+#: The folder of the pack, in the folder of the results.
+FOLDER: Final = "description"
+# Where APIs usually serve their description, tried if the URL itself is none.
+_USUAL: Final = (
+    "/openapi.json", "/openapi.yaml", "/swagger.json", "/v3/api-docs", "/api/openapi.json", "/api-docs",
+    "/swagger/v1/swagger.json", "/api/v1/openapi.json", "/docs/openapi.json",
+)  # fmt: skip
+_REDIRECTS: Final = 4
+_OK, _REDIRECT, _CLIENT_ERROR = 200, 300, 400
+
+
+class UnreachableError(Exception):
+    """Raised when the server of a description does not respond; the message says why."""
+
+
+class _Loader:
+    """Loads the content of URLs, with the credentials and deadline of the run, and of files."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def __call__(self, source: str) -> bytes:
+        """Return the content of a URL or file.
+
+        Raises:
+            UnreachableError: the server does not respond.
+            OSError, ValueError: there is no such content.
+        """
+        if not is_url(source):
+            return Path(source).read_bytes()
+        url = source
+        for _ in range(_REDIRECTS):
+            parts = urlsplit(url)
+            client = HttpClient(f"{parts.scheme}://{parts.netloc}", self._connection)
+            target = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
+            try:
+                response = client.send(
+                    "GET", target, headers=[("Accept", "application/json, application/yaml, */*")]
+                ).response
+            except NoAnswerError as none:
+                if none.kind is NoAnswer.CIRCUIT_OPEN:
+                    raise ValueError(str(none)) from none
+                raise UnreachableError(f"{url}: {none}") from none
+            finally:
+                client.close()
+            location = response.header("location")
+            if _REDIRECT <= response.status < _CLIENT_ERROR and location:
+                url = urljoin(url, location)
+                if urlsplit(url).netloc != parts.netloc:
+                    raise ValueError(f"it redirects to another server, {url}")
+                continue
+            if response.status != _OK:
+                raise ValueError(f"the server responded {response.status}")
+            return response.body
+        raise ValueError(f"more than {_REDIRECTS} redirects")
+
+
+def fetch_description(source: str, overlays: tuple[str, ...], connection: Connection) -> Description:
+    """Return the description at a URL or in a file; at a URL that is none, try the usual places on its server.
+
+    Raises:
+        DescriptionError: there is no usable description.
+        UnreachableError: the server does not respond.
+    """
+    load = _Loader(connection)
+    try:
+        return read_description(source, load, overlays)
+    except DescriptionError as error:
+        if not is_url(source):
+            raise
+        for path in _USUAL if len(urlsplit(source).path.strip("/").split("/")) <= 1 else ():
+            try:
+                return read_description(urljoin(source, path), load, overlays)
+            except DescriptionError:
+                continue
+        raise DescriptionError(f"{error}; name the URL or file of its OpenAPI description") from error
+
+
+def described_contract(
+    source: str,
+    overlays: tuple[str, ...],
+    base_url: str | None,
+    endpoints: Endpoints,
+    connection: Connection,
+    out: Path,
+) -> tuple[Contract, Endpoints, tuple[str, ...]]:
+    """Return the contract of an API's own description, the endpoints with its base URL, and remarks.
+
+    Args:
+        source: URL or file of the description.
+        overlays: URLs or files of overlays.
+        base_url: URL below which the operations are; None: as the description says.
+        endpoints: what the statement or the options say.
+        connection: deadline, credentials and TLS.
+        out: folder of the results, in which the pack is written.
+
+    Raises:
+        DescriptionError: there is no usable description, or it does not say where the API is.
+        UnreachableError: the server of the description does not respond.
+        OSError: the pack cannot be written.
+    """
+    import msgspec  # noqa: PLC0415 - read already where this is used
+
+    found = fetch_description(source, overlays, connection)
+    base = base_url or endpoints.rest or found.base_url
+    if not base:
+        raise DescriptionError(
+            f"{source} names no server: say where the API is with --base-url, as in --base-url http://robot:8000"
+        )
+    folder = write_described_pack(out / FOLDER, found.document, found.original, found.unresolved)
+    Contract.load.cache_clear()
+    remarks = () if base_url or endpoints.rest else found.remarks
+    return Contract.load(folder), msgspec.structs.replace(endpoints, rest=base), remarks
