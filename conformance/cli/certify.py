@@ -38,6 +38,7 @@ from conformance.statement.statement import (
 from conformance.verdict.effort import EFFORTS, Effort
 
 if TYPE_CHECKING:
+    from conformance.documents.openapi import Operation
     from conformance.engine.certification import Certification
     from conformance.verdict.run import Run
 
@@ -319,7 +320,8 @@ def _certify(chosen: Statement, options: dict[str, Any], contract: Contract, sta
     run.requirement_set, run.given = requirements, given
     notes = (*options.get("remarks", ()), *_notes(run))
     command = shlex.join(["roaas", *sys.argv[1:]])
-    return judge(RobotUnderTest(run, connection), options["out"], command=command, baseline=baseline, notes=notes)
+    robot, calls = RobotUnderTest(run, connection), tuple(told(*_rules(run))) if contract.described else ()
+    return judge(robot, options["out"], command=command, baseline=baseline, notes=notes, announced=calls)
 
 
 def _run(chosen: Statement, options: dict[str, Any], contract: Contract) -> Run:
@@ -337,20 +339,23 @@ def _run(chosen: Statement, options: dict[str, Any], contract: Contract) -> Run:
     )
 
 
+def _rules(run: Run) -> tuple[CallRules, tuple[Operation, ...]]:
+    calls = run.statement.calls
+    return CallRules(calls.allow, calls.never, motion=run.allow_motion), operations_of(run.contract)
+
+
 def _notes(run: Run) -> tuple[str, ...]:
     notes = []
-    if run.statement.claims is None:
+    if run.statement.claims is None and not run.contract.described:
         notes.append(f"No classes were claimed; judged are those that have an address: {', '.join(run.claims)}.")
     notes += [
         f"Class {name} is not claimed: the robot's {' and '.join(missing)} interface has no address."
         for name, missing in run.statement.lacking(run.contract).items()
     ]
     if run.contract.described:
-        rules = CallRules(run.statement.calls.allow, run.statement.calls.never, motion=run.allow_motion)
-        operations = operations_of(run.contract)
+        rules, operations = _rules(run)
         unused = rules.unused(operations)
         notes += [f"The pattern {one!r} matches no operation of the description." for one in unused]
-        notes += told(rules, operations)
     elif not run.allow_motion:
         notes.append("Without --allow-motion nothing was sent that moves the robot; what needs motion is skipped.")
     return tuple(notes)

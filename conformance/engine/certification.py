@@ -49,6 +49,7 @@ def certify(
     baseline: tuple[Expectation, ...] = (),
     progress: TextIO | None = sys.stderr,
     notes: tuple[str, ...] = (),
+    announced: tuple[str, ...] = (),
 ) -> Certification:
     """Certify a robot.
 
@@ -58,7 +59,8 @@ def certify(
         command: the command that repeats the run, for the result.
         baseline: expected failures.
         progress: stream for progress lines, or None.
-        notes: remarks for the result.
+        notes: remarks for the result, which are printed as well.
+        announced: what is printed and not among the remarks, because the result tells it elsewhere.
 
     Raises:
         OSError: the result cannot be written, or the CA file cannot be read.
@@ -73,7 +75,7 @@ def certify(
             if reached:
                 # Of a robot that is not there, they would only hide that.
                 if progress is not None:
-                    progress.writelines(f"{note}\n" for note in notes)
+                    progress.writelines(f"{note}\n" for note in (*notes, *announced))
                 run.interrupted |= _run_checks(robot, progress, remarks, recordings)
                 if not (run.interrupted or run.aborted):
                     look_again(run, robot.connection, robot.rest)

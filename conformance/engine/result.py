@@ -87,8 +87,15 @@ def result_document(
         "causes": [_cause(cause) for cause in causes],
         "contract_sections": {anchor: section._asdict() for anchor, section in run.contract.cited_sections.items()},
         "notes": notes,
-        **({"api": robot.log.document(robot.rest.call_rules)} if robot.log and robot.rest else {}),
+        **_api(robot, causes),
     }
+
+
+def _api(robot: RobotUnderTest, causes: list[Cause]) -> dict[str, Any]:
+    """Return what was called of an API that is judged by its own description, under its key."""
+    if robot.log is None or robot.rest is None:
+        return {}
+    return {"api": robot.log.document(robot.rest.call_rules, [cause.finding for cause in causes])}
 
 
 def _target(robot: RobotUnderTest) -> dict[str, Any]:

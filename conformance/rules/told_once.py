@@ -60,6 +60,7 @@ def told_once(
             observed=observed + _others(operations),
             cause=cause,
             subject=probe.operation,
+            operations=(probe.operation, *operations),
         )
 
 

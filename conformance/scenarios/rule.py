@@ -21,6 +21,7 @@ class Case:
         observed: what the trace shows instead; empty: a description of the response.
         cause: failures of the same cause are one finding; empty: derived from the texts.
         subject: what was tested; empty: method and target of the request.
+        operations: labels of all operations that show it, if not only that of the request.
     """
 
     holds: bool
@@ -29,6 +30,7 @@ class Case:
     observed: str = ""
     cause: str = ""
     subject: str = ""
+    operations: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,7 @@ def record(judge: Judge, requirement: str, outcomes: Iterable[Outcome]) -> None:
                     found=one.observed,
                     cause=one.cause,
                     subject=one.subject,
+                    operations=one.operations,
                 )
             case NotTested():
                 judge.skip(requirement, one.reason)

@@ -128,6 +128,7 @@ class Judge:
         found: str = "",
         cause: str = "",
         subject: str = "",
+        operations: Iterable[str] = (),
     ) -> bool:
         """Record whether one case meets a requirement.
 
@@ -139,6 +140,7 @@ class Judge:
             found: what the response showed; empty if status and media type alone are wrong.
             cause: failures of the same cause are one finding; by default the texts without their numbers.
             subject: what was tested; by default method and target of the request.
+            operations: labels of the operations of a description that show it.
 
         Returns:
             ``holds``.
@@ -151,7 +153,7 @@ class Judge:
         if not holds:
             self.failed(requirement)
             subject = subject or subject_of(exchange, self.check_name)
-            self._found(evidence, requirement, exchange, expected, found, cause, subject)
+            self._found(evidence, requirement, exchange, expected, found, cause, subject, operations)
         return holds
 
     def failed(self, requirement: str) -> None:
@@ -166,6 +168,7 @@ class Judge:
         found: str,
         cause: str,
         subject: str,
+        operations: Iterable[str],
     ) -> None:
         """Add a failed case to an existing finding of its cause, or as a new finding."""
         kind = self._kind(requirement, exchange, found)
@@ -177,6 +180,7 @@ class Judge:
         if finding is not None:
             finding.seen += 1
             finding.causes |= causes
+            finding.operations.update(operations)
             self.met.append(finding)
             unsent = isinstance(exchange, Unanswered) and exchange.kind is NoAnswer.CIRCUIT_OPEN
             smaller = exchange and finding.exchange and exchange.request.size < finding.exchange.request.size
@@ -200,6 +204,7 @@ class Judge:
             exchange,
             kind,
             causes=causes,
+            operations=set(operations),
             sequence=self._led_to(exchange),
             met=self._findings,
         )

@@ -60,6 +60,7 @@ class Finding:
         exchange: the smallest failing request with its result, or None if none was sent.
         cause: the kind of cause.
         causes: keys of its causes; findings with a common key have the same cause.
+        operations: labels of the operations that show it, where a rule named them.
         among: number of requirements that the same check recorded it for.
         alone: whether only this requirement keeps the finding, because its request made the robot stop responding.
         seen: number of failed cases.
@@ -77,6 +78,7 @@ class Finding:
     exchange: Attempt | None
     cause: CauseKind = CauseKind.RULE
     causes: set[str] = field(default_factory=set)
+    operations: set[str] = field(default_factory=set)
     among: int = 1
     alone: bool = False
     seen: int = 1

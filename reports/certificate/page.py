@@ -8,12 +8,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from reports.certificate.described import WORDS, Described, described
 from reports.certificate.seal import Seal
 from reports.findings import Finding, by_cause, by_requirement, findings
 from reports.pages.page import html_page
 
 SHOWN_FAILURES = 5
 """Findings shown for each requirement; the rest are counted."""
+ALL_FAILURES = 1000
+"""Findings shown for each requirement where other parts of the page link to all of them."""
 SHOWN_BODY = 3000
 """Characters shown of a request's or response's body."""
 SHOWN_CURL = 8000
@@ -112,8 +115,19 @@ class Certificate:
 
     @property
     def title(self) -> str:
-        """Return "Certificate of conformance" if the robot is conformant, otherwise "Conformance report"."""
+        """Return what the page calls itself: a certificate of conformance to a contract, or a report."""
+        if self.described:
+            return "Report on a device and its own description"
+        return f"{self.subject} {self._title}"
+
+    @property
+    def _title(self) -> str:
         return "Certificate of conformance" if self.result["verdict"] == "conformant" else "Conformance report"
+
+    @property
+    def described(self) -> Described | None:
+        """Return the operations of a device that is judged by its own description, otherwise None."""
+        return described(self.result)
 
     @property
     def robot(self) -> str:
@@ -133,7 +147,7 @@ class Certificate:
         """Return the verdict in a sentence; also name the failures that the baseline accepts, with date and reason."""
         accepted = self.result.get("accepted_until")
         if not accepted:
-            return self._headline
+            return f"{self._headline} {self.described.extent}" if self.described else self._headline
         known = [r for r in self.with_verdict("warn") if r.get("expected_failure")]
         named = "; ".join(
             f"{r['id']} until {r['expected_failure'].get('expires')} ({r['expected_failure']['reason']})" for r in known
@@ -149,7 +163,8 @@ class Certificate:
     @property
     def _headline(self) -> str:
         judged = len(self.claimed)
-        classes = f"{judged} claimed {'class' if judged == 1 else 'classes'}"
+        claimed = "" if self.described else "claimed "
+        classes = f"{judged} {claimed}{'class' if judged == 1 else 'classes'}"
         verdict = self.result["verdict"]
         if verdict == "conformant":
             return f"{'Each of the ' if judged > 1 else 'The '}{classes} passed."
@@ -165,6 +180,8 @@ class Certificate:
     @property
     def contract(self) -> str:
         """Return title, version and pack name of the contract; for results before version 1.2 only its version."""
+        if self.described:
+            return f"its own description: {self.described.name}".rstrip(": ")
         pack = self.result.get("pack")
         if not pack:
             return str(self.result["suite"]["contract"])
@@ -236,18 +253,25 @@ def certificate_print(result: Mapping[str, Any], seal: Seal) -> str:
     return html_page("certificate-print.html.j2", seal=seal, **page_values(result))
 
 
+def verdict_words(result: Mapping[str, Any]) -> dict[str, str]:
+    """Return the words for each verdict in a result."""
+    return {**VERDICT_WORDS, **WORDS, "not-claimed": "Not judged"} if described(result) else VERDICT_WORDS
+
+
 def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
     """Return the template variables that the HTML, print and Markdown forms of the certificate share."""
     return {
         "certificate": certificate(result),
         "result": result,
         "sections": result.get("contract_sections", {}),
-        "words": VERDICT_WORDS,
+        "words": verdict_words(result),
+        "described": described(result),
         "views": VIEWS,
         "by_cause": by_cause,
         "by_requirement": by_requirement,
         "findings": findings,
-        "shown_failures": SHOWN_FAILURES,
+        # The matrix of operations links to each finding.
+        "shown_failures": ALL_FAILURES if described(result) else SHOWN_FAILURES,
         "shown_body": SHOWN_BODY,
         "shown_curl": SHOWN_CURL,
         "shown_ids": SHOWN_IDS,

@@ -4,18 +4,18 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from reports.certificate.page import VERDICT_WORDS
+from reports.certificate.page import verdict_words
 
 _COLOURS = {"conformant": "brightgreen", "not-conformant": "red", "inconclusive": "lightgrey"}
 
 
 def badge(result: Mapping[str, Any]) -> str:
     """Return the JSON of a shields.io badge with the verdict of a valid `roaas-result/1` document."""
-    verdict, colour = VERDICT_WORDS[result["verdict"]].lower(), _COLOURS[result["verdict"]]
+    verdict, colour = verdict_words(result)[result["verdict"]].lower(), _COLOURS[result["verdict"]]
     values = list(result["classes"].values())
     text = f"{verdict} ({values.count('pass')} of {len(values)} classes)"
     if result.get("accepted_until"):
         text, colour = f"{verdict}, known failures until {result['accepted_until']}", "orange"
     if result.get("interrupted"):
-        text, colour = f"{verdict}, interrupted", "red" if verdict == "not conformant" else "lightgrey"
+        text, colour = f"{verdict}, interrupted", "red" if result["verdict"] == "not-conformant" else "lightgrey"
     return json.dumps({"schemaVersion": 1, "label": "RoAAS", "message": text, "color": colour}, indent=1) + "\n"

@@ -13,6 +13,7 @@ from processes import ended
 
 DATA = Path(__file__).parent / "data"
 _RESULT = json.loads((DATA / "result-example.json").read_text(encoding="utf-8"))
+_DESCRIBED = json.loads((DATA / "described-example.json").read_text(encoding="utf-8"))
 _FLEET = json.loads((DATA / "fleet-example.json").read_text(encoding="utf-8"))
 _LATENCY = json.loads((DATA / "latency-example.json").read_text(encoding="utf-8"))
 
@@ -21,6 +22,12 @@ _LATENCY = json.loads((DATA / "latency-example.json").read_text(encoding="utf-8"
 def result() -> dict[str, Any]:
     """Return a conformance result of a real run, with fewer requirements and with the addresses of an example."""
     return copy.deepcopy(_RESULT)
+
+
+@pytest.fixture
+def described_result() -> dict[str, Any]:
+    """Return the result of a real run by a device's own description, with fewer operations and requirements."""
+    return copy.deepcopy(_DESCRIBED)
 
 
 @pytest.fixture

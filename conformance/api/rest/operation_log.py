@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import parse_qsl
 
 from conformance.api.call_rules import CallRules
+from conformance.api.rest.branches import branches_in, branches_of
 from conformance.contract.pack import Contract
-from conformance.documents.openapi import Operation, matching, operations_of
+from conformance.documents.openapi import Operation, is_json, matching, operations_of, resource_at
 from conformance.transport.exchange import Exchange, Listener, Request, Unanswered
+from conformance.verdict.finding import Finding
+
+# A body is read for what it shows of its schema up to this size, octets.
+_READ = 100_000
 
 
 @dataclass
@@ -22,6 +29,7 @@ class _Record:
     statuses: Counter[int] = field(default_factory=Counter)
     slowest_ms: float = 0.0
     parameters: set[str] = field(default_factory=set)
+    branches: set[str] = field(default_factory=set)
 
 
 class OperationLog(Listener):
@@ -35,27 +43,52 @@ class OperationLog(Listener):
     def __init__(self, contract: Contract, base_url: str) -> None:
         self._contract, self._base_url = contract, base_url
         self._records: dict[str, _Record] = {item.label: _Record() for item in operations_of(contract)}
+        self._branches = {
+            (item.label, status, name): {f"{status}{branch}" for branch in branches_of(schema)}
+            for item in operations_of(contract)
+            for status, content in item.responses.items()
+            for name, schema in content.items()
+            if is_json(name)
+        }
 
     def answered(self, exchange: Exchange) -> None:
         """Count a response."""
-        record = self._count(exchange.request)
-        if record is not None:
+        operation = self._operation(exchange.request)
+        if operation is not None:
+            record = self._count(operation, exchange.request)
             record.statuses[exchange.response.status] += 1
             record.slowest_ms = max(record.slowest_ms, exchange.response.elapsed_ms)
+            self._look_into(operation, record, exchange)
 
     def unanswered(self, request: Unanswered) -> None:
         """Count a request without a response."""
-        record = self._count(request.request)
-        if record is not None:
-            record.unanswered += 1
+        operation = self._operation(request.request)
+        if operation is not None:
+            self._count(operation, request.request).unanswered += 1
 
-    def _count(self, request: Request) -> _Record | None:
+    def _operation(self, request: Request) -> Operation | None:
         if not request.url.startswith(self._base_url) or request.method in {"HEAD", "OPTIONS"}:
             return None
-        path, _, query = request.url[len(self._base_url) :].partition("?")
-        operation = matching(self._contract, request.method, path)
-        if operation is None:
-            return None
+        return matching(self._contract, request.method, self._path(request))
+
+    def _path(self, request: Request) -> str:
+        return request.url[len(self._base_url) :].partition("?")[0]
+
+    def _look_into(self, operation: Operation, record: _Record, exchange: Exchange) -> None:
+        """Note the branches of its schema that a response's body shows, until all of them are known."""
+        response, key = exchange.response, operation.response_key(exchange.response.status)
+        wanted = self._branches.get((operation.label, str(key), response.media_type), set())
+        if wanted <= record.branches or len(response.body) > _READ:
+            return
+        try:
+            value = json.loads(response.body)
+        except (ValueError, RecursionError):
+            return
+        schema = operation.responses[str(key)][response.media_type]
+        record.branches |= {f"{key}{branch}" for branch in branches_in(schema, value)}
+
+    def _count(self, operation: Operation, request: Request) -> _Record:
+        query = request.url.partition("?")[2]
         record = self._records[operation.label]
         record.sent += 1
         record.parameters |= {name for name, _ in parse_qsl(query, keep_blank_values=True)}
@@ -63,12 +96,20 @@ class OperationLog(Listener):
         record.parameters |= {name.lower() for name, _ in request.headers}
         return record
 
-    def document(self, rules: CallRules) -> dict[str, Any]:
+    def document(self, rules: CallRules, findings: Iterable[Finding]) -> dict[str, Any]:
         """Return the matrix of operations and the coverage of the description, for result.json."""
         operations = operations_of(self._contract)
-        rows = [self._row(item, rules) for item in operations]
+        numbers: dict[str, list[int]] = {}
+        for finding in findings:
+            for label in self._concerned(finding):
+                numbers.setdefault(label, []).append(finding.number)
+        rows = [self._row(item, rules) | {"findings": sorted(numbers.get(item.label, ()))} for item in operations]
         called = [item for item in operations if self._records[item.label].sent]
+        info = self._contract.openapi.get("info")
+        info = info if isinstance(info, dict) else {}
         return {
+            "title": str(info.get("title", "")),
+            "version": str(info.get("version", "")),
             "operations": rows,
             "coverage": {
                 "operations": [len(called), len(operations)],
@@ -80,8 +121,23 @@ class OperationLog(Listener):
                     sum(len(row["seen_declared"]) for row in rows),
                     sum(len(item.responses) for item in operations),
                 ],
+                "branches": [
+                    sum(len(record.branches) for record in self._records.values()),
+                    len({(label, branch) for (label, _, _), found in self._branches.items() for branch in found}),
+                ],
             },
         }
+
+    def _concerned(self, finding: Finding) -> set[str]:
+        """Return the labels of the operations that a finding concerns: those of its resource if it has no own one."""
+        if finding.operations or finding.exchange is None:
+            return finding.operations
+        request = finding.exchange.request
+        resource = resource_at(self._contract, self._path(request)) if request.url.startswith(self._base_url) else None
+        if resource is None:
+            return set()
+        own = resource.operations.get("GET" if request.method == "HEAD" else request.method)
+        return {own.label} if own else {item.label for item in resource.operations.values()}
 
     def _has_sent(self, operation: Operation, name: str) -> bool:
         return bool({name, name.lower()} & self._records[operation.label].parameters)

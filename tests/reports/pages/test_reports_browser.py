@@ -15,7 +15,7 @@ from reports.latency.page import latency_html
 
 DATA = Path(__file__).parents[1] / "data"
 WIDTHS = (1280, 390)
-PAGES = ("certificate", "latency", "compare")
+PAGES = ("certificate", "described", "latency", "compare")
 MEASURE = """(page, view) => {
   const box = (node) => { const b = node.getBoundingClientRect(); return [b.left, b.top, b.width, b.height]; };
   return {
@@ -42,9 +42,11 @@ MEASURE = """(page, view) => {
 def seen(tmp_path_factory, browse):
     """Show every page at every width, once, and return what was measured."""
     result = json.loads((DATA / "result-example.json").read_text(encoding="utf-8"))
+    described = json.loads((DATA / "described-example.json").read_text(encoding="utf-8"))
     latency = json.loads((DATA / "latency-example.json").read_text(encoding="utf-8"))
     both = compare(latency, latency, ("old", "new"), 0.05)
-    pages = certificate_html(result), latency_html(latency), comparison_html(both, ("old", "new"))
+    certificates = certificate_html(result), certificate_html(described)
+    pages = *certificates, latency_html(latency), comparison_html(both, ("old", "new"))
     return browse(tmp_path_factory.mktemp("pages"), dict(zip(PAGES, pages, strict=True)), MEASURE)
 
 
@@ -54,8 +56,8 @@ EACH = pytest.mark.parametrize("page", [f"{name} {width}" for name in PAGES for 
 @EACH
 def test_every_figure_is_drawn(seen, page):
     found = seen[page]
-    assert found["figures"] == {"certificate": 0, "latency": 7, "compare": 2}[page.split()[0]]
-    assert len(found["drawings"]) == {"certificate": 0, "latency": 18, "compare": 9}[page.split()[0]]
+    assert found["figures"] == {"certificate": 0, "described": 0, "latency": 7, "compare": 2}[page.split()[0]]
+    assert len(found["drawings"]) == {"certificate": 0, "described": 0, "latency": 18, "compare": 9}[page.split()[0]]
     for drawing in found["drawings"]:
         assert drawing["box"][2] > 250, drawing["name"]
         assert drawing["box"][3] > 100, drawing["name"]

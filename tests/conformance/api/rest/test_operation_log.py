@@ -1,0 +1,59 @@
+"""What a run sent to the operations of a described API."""
+
+from conformance.api.call_rules import CallRules
+from conformance.api.rest.operation_log import OperationLog
+from conformance.contract.described import write_described_pack
+from conformance.contract.pack import Contract
+from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
+from conformance.verdict.finding import Finding
+
+OK = {"200": {"content": {"application/json": {"schema": {"properties": {"x": {}, "y": {}}}}}}}
+API = {
+    "openapi": "3.1.0",
+    "info": {"title": "Arm", "version": "2"},
+    "paths": {
+        "/joints/{name}": {
+            "get": {
+                "parameters": [
+                    {"name": "name", "in": "path", "required": True, "schema": {"type": "string"}},
+                    {"name": "unit", "in": "query", "schema": {"type": "string"}},
+                ],
+                "responses": OK,
+            },
+            "delete": {"responses": {"204": {"description": "Gone."}}},
+        },
+        "/state": {"get": {"responses": OK}},
+    },
+}
+BASE = "http://robot/api"
+
+
+def exchange(target, status=200, body=b"{}", method="GET"):
+    headers = (("Content-Type", "application/json"),)
+    return Exchange(Request(method, f"{BASE}{target}"), Response(status, headers, body, 3.0))
+
+
+def finding(number, attempt, *operations):
+    return Finding("http/x", "", "", "", "", attempt, operations=set(operations), number=number)
+
+
+def test_the_matrix_counts_what_was_sent_and_seen(tmp_path):
+    log = OperationLog(Contract.load(write_described_pack(tmp_path, API, API)), BASE)
+    log.answered(exchange("/joints/a?unit=rad", body=b'{"x": 1}'))
+    log.answered(exchange("/joints/b", status=404))
+    log.answered(exchange("/elsewhere"))
+    log.unanswered(Unanswered(Request("GET", f"{BASE}/joints/c"), "closed", NoAnswer.CLOSED))
+    findings = [
+        finding(1, exchange("/joints/b"), "GET /joints/{name}", "GET /state"),
+        finding(2, exchange("/joints/b", method="HEAD")),
+        finding(3, exchange("/joints/b", method="BREW")),
+        finding(4, None),
+    ]
+    document = log.document(CallRules(), findings)
+    joints, delete, state = document["operations"]
+    assert (joints["requests"], joints["unanswered"]) == (3, 1)
+    assert (joints["statuses"], joints["seen_declared"]) == ({"200": 1, "404": 1}, ["200"])
+    assert [one["findings"] for one in (joints, delete, state)] == [[1, 2, 3], [3], [1]]
+    assert [one["called"] for one in (joints, delete, state)] == [True, False, True]
+    assert document["coverage"] == {"operations": [1, 3], "parameters": [2, 2], "statuses": [1, 3], "branches": [1, 4]}
+    assert (document["title"], document["version"]) == ("Arm", "2")
