@@ -22,7 +22,7 @@ _COMMANDS = {
     "replay": ("conformance.cli.replay", "Send a finding's requests again, and report whether it persists."),
     "report": ("reports.cli.pages", "Write the pages from the result files again."),
     "compare": ("reports.cli.pages", "Show whether a robot got slower between two load tests."),
-    "diff": ("reports.cli.difference", "Show what changed between two results: new failures, fixed, lost coverage."),
+    "diff": ("reports.cli.difference", "Show what changed between two results, or between two descriptions of an API."),
     "keygen": ("reports.cli.attestation", "Make a key pair for signing results."),
     "sign": ("reports.cli.signing", "Sign a result, so that others can verify the signer."),
     "verify": ("reports.cli.attestation", "Check a signed certificate, and whether it meets your policy."),
@@ -122,6 +122,17 @@ class FrontDoor:
                 click.echo(f"history: {path}")
         except import_module("reports.errors").ReportError as error:
             click.echo(f"no history: {error}", err=True)
+
+    @staticmethod
+    def description_changes(old: str, new: str) -> list[tuple[bool, str, str]]:
+        """Return what changed between two descriptions: whether it breaks clients, the operation, and what it is."""
+        comparing = import_module("conformance.engine.comparing")
+        refused = import_module("conformance.documents.description").DescriptionError
+        unreachable = import_module("conformance.engine.describing").UnreachableError
+        try:
+            return [(one.breaking, one.operation, one.text) for one in comparing.compared(old, new)]
+        except (refused, unreachable) as error:
+            raise click.UsageError(str(error)) from error
 
     @staticmethod
     def known(pack: str | None) -> dict[str, Any]:

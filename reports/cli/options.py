@@ -24,6 +24,9 @@ class FrontDoor(Protocol):
     def known(self, pack: str | None) -> dict[str, object]:
         """Return the installed suite's digests and profiles for a contract pack, with the fields of `policy.Known`."""
 
+    def description_changes(self, old: str, new: str) -> list[tuple[bool, str, str]]:
+        """Return what changed between two descriptions: whether it breaks clients, the operation, and what it is."""
+
 
 def policy_of(door: FrontDoor, path: Path | None, pack: str | None) -> tuple[Policy, Known]:
     """Return the policy (from a file, or the default) and the installed suite's digests for a contract pack."""

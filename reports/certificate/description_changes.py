@@ -1,0 +1,69 @@
+"""Show what changed between two descriptions of an API: text for the terminal, an HTML page, and Markdown."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from reports.pages.page import html_page, markdown_page
+from reports.pages.untrusted import excerpt
+
+_NAMED = 5
+_SHOWN = 200
+
+
+@dataclass(frozen=True, slots=True)
+class DescriptionChanges:
+    """The changes between two descriptions.
+
+    Attributes:
+        breaking: what breaks clients of the older one: the change, with the operations that have it.
+        other: what does not, likewise.
+    """
+
+    breaking: dict[str, list[str]]
+    other: dict[str, list[str]]
+
+    @property
+    def headline(self) -> str:
+        """Return in a sentence how much breaks."""
+        number, rest = len(self.breaking), len(self.other)
+        breaks = f"{number or 'No'} {'change breaks' if number < 2 else 'changes break'} existing clients"  # noqa: PLR2004 - plural
+        return f"{breaks}; {rest} other {'change' if rest == 1 else 'changes'}." if rest else f"{breaks}."
+
+    @property
+    def groups(self) -> Iterator[tuple[str, dict[str, list[str]]]]:
+        """Yield the two groups with their headings, if there is something in them."""
+        for heading, found in (("Breaks existing clients", self.breaking), ("Other changes", self.other)):
+            if found:
+                yield heading, found
+
+
+def description_changes(found: Iterable[tuple[bool, str, str]]) -> DescriptionChanges:
+    """Return changes by what they are; each is whether it breaks clients, the operation, and a text."""
+    groups: dict[bool, dict[str, list[str]]] = {True: {}, False: {}}
+    for breaking, operation, text in found:
+        groups[breaking].setdefault(text, []).append(operation)
+    return DescriptionChanges(groups[True], groups[False])
+
+
+def changes_text(found: DescriptionChanges) -> str:
+    """Return the changes as text for a terminal."""
+    lines = [found.headline]
+    for heading, changes in found.groups:
+        lines += ["", f"{heading} ({len(changes)}):"]
+        lines += [f"  {excerpt(_named(operations), 400)}: {excerpt(text, 400)}" for text, operations in changes.items()]
+    return "\n".join(lines)
+
+
+def _named(operations: list[str]) -> str:
+    more = f" and {len(operations) - _NAMED} more" if len(operations) > _NAMED else ""
+    return ", ".join(operations[:_NAMED]) + more
+
+
+def changes_pages(found: DescriptionChanges, names: tuple[str, str], stem: str) -> dict[str, str]:
+    """Return the pages with the changes, by file name; ``names`` say where the descriptions are from."""
+    values: dict[str, Any] = {"found": found, "names": names, "shown": _SHOWN, "named": _NAMED}
+    return {
+        f"{stem}.html": html_page("description-changes.html.j2", **values),
+        f"{stem}.md": markdown_page("description-changes.md.j2", **values),
+    }
