@@ -23,7 +23,7 @@ from conformance.contract.places import places
 from conformance.contract.requirement_sets import RequirementSetError, judged_by
 from conformance.documents.description import DescriptionError, is_url
 from conformance.documents.openapi import operations_of
-from conformance.engine.describing import UnreachableError, described_contract
+from conformance.engine.describing import UnreachableError, described_contract, fetch_description
 from conformance.statement.statement import (
     Api,
     Calls,
@@ -49,8 +49,8 @@ _OBJECTS = 20_000
 
 
 @click.command(cls=ResultCommand)
-@click.argument("target", required=False, metavar="[STATEMENT|DESCRIPTION]")
-@click.option("--init", is_flag=True, help="Write a commented STATEMENT from the robot's descriptions; test nothing.")
+@click.argument("targets", nargs=-1, metavar="[STATEMENT] [DESCRIPTION]")
+@click.option("--init", is_flag=True, help="Write a commented STATEMENT from the device's descriptions; test nothing.")
 @click.option("--rest", metavar="URL", help="Base URL of the REST interface.")
 @click.option(
     "--openapi", metavar="URL|FILE", help="The device's own OpenAPI or Swagger description: judge it by that."
@@ -120,7 +120,7 @@ _OBJECTS = 20_000
 @click.option("--sign", "key", type=_FILE, metavar="KEY", help="Sign the result with this private key.")
 @click.option("--force", is_flag=True, help="With --init: overwrite STATEMENT.")
 @click.pass_obj
-def certify(door: FrontDoor, /, target: str | None, **options: Any) -> CommandResult:
+def certify(door: FrontDoor, /, targets: tuple[str, ...], **options: Any) -> CommandResult:
     """Test a robot against its contract, and judge each requirement.
 
     STATEMENT is the robot's implementation conformance statement (TOML); options override it. --fleet takes several
@@ -134,32 +134,20 @@ def certify(door: FrontDoor, /, target: str | None, **options: Any) -> CommandRe
     """
     # A terminated run still stops the robot and writes what it has.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # What each run of a fleet would refuse is told once, before the first.
+    if options["nonce"] is not None and not options["init"]:
+        _check_nonce(options["nonce"])
     if options["fleet"]:
-        from conformance.cli.certify_fleet import certify_fleet  # noqa: PLC0415 - one robot needs nothing of it
-
-        # What each run would refuse is told once, before the first.
-        if options["nonce"] is not None:
-            _check_nonce(options["nonce"])
-        if options["key"]:
-            door.notary(Path(options["key"]))
-        return certify_fleet(Path(options["fleet"]), options)
+        return _certify_fleet(door, options)
     if options["parallel"] is not None:
         raise click.UsageError("--parallel says how many robots of a --fleet are judged at once: give --fleet")
-    source, statement = _told_apart(target, options["openapi"])
+    source, statement = _told_apart(targets, options["openapi"])
     try:
-        contract = Contract.load(options["pack"])
-        known = statement and not options["init"]
-        api = api_of(statement) if statement and known else None
-        source = source or (api.openapi if api else None)
-        if source is not None:
-            chosen, contract = _described(source, api, statement if known else None, options)
-        else:
-            declared = load_statement(statement, contract) if statement and known else empty_statement(contract)
-            chosen = _apply(declared, options, contract)
+        if source is not None and options["init"]:
+            return _init_described(statement, source, options)
+        chosen, contract = _chosen(source, None if options["init"] else statement, options)
         if options["init"]:
             return _init(statement, chosen, contract, force=options["force"])
-        if options["nonce"] is not None:
-            _check_nonce(options["nonce"])
         # Before the run: what cannot be signed by this key is told at once.
         notary = door.notary(Path(options["key"])) if options["key"] else None
         if options["plan"]:
@@ -179,17 +167,43 @@ def certify(door: FrontDoor, /, target: str | None, **options: Any) -> CommandRe
     return CommandResult(outcome.exit_code, outcome.path, notary)
 
 
-def _told_apart(target: str | None, openapi: str | None) -> tuple[str | None, Path | None]:
+def _certify_fleet(door: FrontDoor, options: dict[str, Any]) -> CommandResult:
+    from conformance.cli.certify_fleet import certify_fleet  # noqa: PLC0415 - one robot needs nothing of it
+
+    if options["key"]:
+        door.notary(Path(options["key"]))
+    return certify_fleet(Path(options["fleet"]), options)
+
+
+def _told_apart(targets: tuple[str, ...], openapi: str | None) -> tuple[str | None, Path | None]:
     """Return the description and the statement that the command names; either may be None.
 
     Raises:
-        click.UsageError: two descriptions are named.
+        click.UsageError: two descriptions or two statements are named.
     """
-    if target is None or not (is_url(target) or target.endswith((".json", ".yaml", ".yml"))):
-        return openapi, Path(target) if target else None
-    if openapi:
-        raise click.UsageError(f"{target} and --openapi {openapi} are two descriptions: name one")
-    return target, None
+    described = [one for one in targets if is_url(one) or one.endswith((".json", ".yaml", ".yml"))]
+    statements = [one for one in targets if one not in described]
+    described += [openapi] if openapi else []
+    for what, named in (("descriptions", described), ("statements", statements)):
+        if len(named) > 1:
+            raise click.UsageError(f"{' and '.join(named)} are several {what}: name one")
+    return next(iter(described), None), Path(statements[0]) if statements else None
+
+
+def _chosen(source: str | None, statement: Path | None, options: dict[str, Any]) -> tuple[Statement, Contract]:
+    """Return what a device is judged by: statement and contract.
+
+    Raises:
+        DescriptionError, StatementError, ContractError: one of them cannot be used.
+        UnreachableError: the server of the description does not respond.
+    """
+    contract = Contract.load(options["pack"])
+    api = api_of(statement) if statement else None
+    source = source or (api.openapi if api else None)
+    if source is not None:
+        return _described(source, api, statement, options)
+    declared = load_statement(statement, contract) if statement else empty_statement(contract)
+    return _apply(declared, options, contract), contract
 
 
 def _described(
@@ -271,14 +285,47 @@ def _plan(chosen: Statement, options: dict[str, Any], contract: Contract) -> Com
 def _init(path: Path | None, chosen: Statement, contract: Contract, *, force: bool) -> CommandResult:
     from conformance.engine.first_statement import write_first_statement  # noqa: PLC0415 - only --init needs it
 
-    if path is None:
-        raise click.UsageError("--init writes a statement: name the file, as in `roaas certify --init robot.toml`")
-    if path.exists() and not force:
-        raise click.UsageError(f"{path} exists already; --force overwrites it")
+    path = _new_file(path, force=force)
     problem = write_first_statement(path, chosen, contract)
     if problem:
         click.echo(f"the robot cannot be reached: {problem}", err=True)
         return CommandResult(ExitCode.UNREACHABLE)
+    click.echo(f"wrote {path}: look it over, then run `roaas certify {path}`")
+    return CommandResult(ExitCode.PASSED)
+
+
+def _new_file(path: Path | None, *, force: bool) -> Path:
+    """Return the file that --init writes.
+
+    Raises:
+        click.UsageError: none is named, or it exists.
+    """
+    if path is None:
+        raise click.UsageError("--init writes a statement: name the file, as in `roaas certify --init robot.toml`")
+    if path.exists() and not force:
+        raise click.UsageError(f"{path} exists already; --force overwrites it")
+    return path
+
+
+def _init_described(path: Path | None, source: str, options: dict[str, Any]) -> CommandResult:
+    """Write a statement for a device with a description.
+
+    Raises:
+        DescriptionError: there is no usable description.
+        StatementError: a file cannot be read or written.
+        UnreachableError: the server of the description does not respond.
+    """
+    from conformance.engine.first_described import write_described_statement  # noqa: PLC0415 - only --init needs it
+    from conformance.engine.pytest_run import connection_of  # noqa: PLC0415 - see _certify
+
+    path = _new_file(path, force=options["force"])
+    given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) is not None}
+    api = Api(overlays=tuple(options["overlays"]), base_url=options["base_url"] or options["rest"])
+    try:
+        found = fetch_description(source, api.overlays, connection_of(Endpoints(**given)))
+        write_described_statement(path, found, api, Calls(tuple(options["allow"]), tuple(options["never"])))
+    except OSError as error:
+        raise StatementError(str(error)) from error
     click.echo(f"wrote {path}: look it over, then run `roaas certify {path}`")
     return CommandResult(ExitCode.PASSED)
 
