@@ -197,6 +197,7 @@ def with_member(body: Any, steps: tuple[str, ...], value: Any) -> Any:
 
 
 def place_of(steps: tuple[str, ...]) -> str:
+    """Return the place of a member of a body, as variations name it."""
     return "body /" + "/".join(steps)
 
 
