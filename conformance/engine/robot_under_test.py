@@ -42,21 +42,15 @@ class RobotUnderTest:
         run: the data of the run.
         connection: the settings that all clients share.
         rest: client of its REST interface, or None; ``connect`` sets it.
-<<<<<<< HEAD
         log: what was sent to each operation of an API that is judged by its own description, else None.
-=======
         permission: what may be sent; every request passes it.
->>>>>>> h-c
     """
 
     run: Run
     connection: Connection = field(default_factory=Connection)
     rest: RestInterface | None = None
-<<<<<<< HEAD
     log: OperationLog | None = None
-=======
     permission: Permission = field(init=False)
->>>>>>> h-c
     _services: SoapServices | None = None
     _progress: TextIO | None = None
 

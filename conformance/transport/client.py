@@ -51,12 +51,9 @@ class Connection:
         resent: number of requests sent again because the server had closed the kept connection (RFC 9112 9.3.1).
         acted_at: when a request with an unsafe method was last sent or answered, s of the monotonic clock.
         pace: how fast the robot responds.
-<<<<<<< HEAD
         endless: whether a body that does not end is a response, of which only the beginning is read.
-=======
         permit: is called with method and absolute URL before each request; returns an empty text if the request may be
             sent, else why not. By default everything may be sent.
->>>>>>> h-c
     """
 
     timeout_s: float = 10.0
@@ -68,11 +65,8 @@ class Connection:
     resent: int = 0
     acted_at: float = -math.inf
     pace: Pace = field(default_factory=Pace)
-<<<<<<< HEAD
     endless: bool = False
-=======
     permit: Permit = lambda _method, _url: ""
->>>>>>> h-c
     _next_slot: float = 0.0
 
     def tls(self) -> ssl.SSLContext:
