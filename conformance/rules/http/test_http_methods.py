@@ -69,13 +69,15 @@ def test_methods_that_nobody_knows(api: RestInterface, judge: Judge) -> None:
             expect(judge, "http/unknown-method", attempt).status(405, 501, cause=method)
 
 
-@pytest.mark.requirement("http/options", "http/allow-agrees")
+@pytest.mark.requirement("http/options", "http/allow-agrees", "description/allow")
 def test_options(api: RestInterface, judge: Judge) -> None:
     """Send OPTIONS to each resource and judge the Allow header."""
     for resource, call in _resources(api):
         exchange = call.send(api, method="OPTIONS")
         if expect(judge, "http/options", exchange).status(200, 204):
             _judge_allow(judge, "http/options", resource, exchange)
+        elif exchange.response.status == 405:
+            _judge_allow(judge, "http/allow", resource, exchange)
 
 
 def _judge_allow(judge: Judge, requirement: str, resource: Resource, exchange: Exchange) -> None:
@@ -85,6 +87,13 @@ def _judge_allow(judge: Judge, requirement: str, resource: Resource, exchange: E
     value = exchange.response.header("allow") or ""
     named = {name.strip() for name in value.split(",")} - {""}
     wanted = set(resource.methods) - _ALWAYS_ALLOWED
+    if judge.knows("description/allow"):
+        # What a description leaves out is its fault, and no fault of the header.
+        more = sorted(named - wanted - _ALWAYS_ALLOWED)
+        expect(judge, "description/allow", exchange).that(
+            not more, f"methods that are declared: {', '.join(sorted(wanted))}", f"Allow: {value}", cause=str(more)
+        )
+        named &= wanted | _ALWAYS_ALLOWED
     expect(judge, "http/allow-agrees", exchange).that(
         wanted <= named <= wanted | _ALWAYS_ALLOWED,
         f"Allow: {', '.join(sorted(wanted))} (HEAD, OPTIONS and TRACE may stand beside them)",
