@@ -146,24 +146,7 @@ def certify(door: FrontDoor, /, target: str | None, **options: Any) -> CommandRe
         raise click.UsageError("--parallel says how many robots of a --fleet are judged at once: give --fleet")
     source, statement = _told_apart(target, options["openapi"])
     try:
-        contract = Contract.load(options["pack"])
-        known = statement and not options["init"]
-        api = api_of(statement) if statement and known else None
-        source = source or (api.openapi if api else None)
-        if source is not None:
-            chosen, contract = _described(source, api, statement if known else None, options)
-        else:
-            declared = load_statement(statement, contract) if statement and known else empty_statement(contract)
-            chosen = _apply(declared, options, contract)
-        if options["init"]:
-            return _init(statement, chosen, contract, force=options["force"])
-        if options["nonce"] is not None:
-            _check_nonce(options["nonce"])
-        # Before the run: what cannot be signed by this key is told at once.
-        notary = door.notary(Path(options["key"])) if options["key"] else None
-        if options["plan"]:
-            return _plan(chosen, options, contract)
-        outcome = _certify(chosen, options, contract, statement)
+        done = _judge(door, source, statement, options)
     except UnreachableError as unreachable:
         click.echo(f"the device cannot be reached: {unreachable}", err=True)
         return CommandResult(ExitCode.UNREACHABLE)
@@ -171,10 +154,44 @@ def certify(door: FrontDoor, /, target: str | None, **options: Any) -> CommandRe
         raise click.UsageError(str(error)) from error
     except KeyboardInterrupt:
         return CommandResult(ExitCode.INTERRUPTED)
-    print_summary(outcome)
     # What is there now lives as long as the process, which would look through all of it for garbage before it ends:
     # that took half a second.
     gc.freeze()
+    return done
+
+
+def _judge(door: FrontDoor, source: str | None, statement: Path | None, options: dict[str, Any]) -> CommandResult:
+    """Do what the options ask for one robot: write a first statement, print the plan, or certify.
+
+    Args:
+        door: signs the result.
+        source: URL or file of the device's own description, or None.
+        statement: the robot's statement, or None.
+        options: of the command.
+
+    Raises:
+        StatementError, ContractError, DescriptionError: one of the files cannot be used.
+        UnreachableError: the server of the description does not respond.
+    """
+    contract = Contract.load(options["pack"])
+    known = statement if not options["init"] else None
+    api = api_of(known) if known else None
+    source = source or (api.openapi if api else None)
+    if source is not None:
+        chosen, contract = _described(source, api, known, options)
+    else:
+        declared = load_statement(known, contract) if known else empty_statement(contract)
+        chosen = _apply(declared, options, contract)
+    if options["init"]:
+        return _init(statement, chosen, contract, force=options["force"])
+    if options["nonce"] is not None:
+        _check_nonce(options["nonce"])
+    # Before the run: what cannot be signed by this key is told at once.
+    notary = door.notary(Path(options["key"])) if options["key"] else None
+    if options["plan"]:
+        return _plan(chosen, options, contract)
+    outcome = _certify(chosen, options, contract, statement)
+    print_summary(outcome)
     return CommandResult(outcome.exit_code, outcome.path, notary)
 
 

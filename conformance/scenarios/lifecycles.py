@@ -89,10 +89,7 @@ def _path_of(created: Exchange, create: Operation, read: Operation) -> str:
         below = urlsplit(created.request.url).path.removesuffix(create.template)
         return path.removeprefix(below) if not location.startswith("http") or location.startswith(prefix) else ""
     value: Any = read_json(created.response.body).value
-    id_ = (
-        next((value[name] for name in IDS if isinstance(value.get(name), str | int)), None)
-        if isinstance(value, dict)
-        else None
-    )
+    members = value if isinstance(value, dict) else {}
+    id_ = next((members[name] for name in IDS if isinstance(members.get(name), str | int)), None)
     parameter = read.parameter("path")[-1].name
     return read.template.replace(f"{{{parameter}}}", str(id_)) if id_ is not None and "{" not in create.template else ""
