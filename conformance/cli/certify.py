@@ -14,6 +14,7 @@ import msgspec
 from click.core import ParameterSource
 
 from conformance.api.call_rules import CallRules, told
+from conformance.cli.certify_init import init, init_described
 from conformance.cli.summary import print_summary
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, FrontDoor, ResultCommand
@@ -23,7 +24,7 @@ from conformance.contract.places import places
 from conformance.contract.requirement_sets import RequirementSetError, judged_by
 from conformance.documents.description import DescriptionError, is_url
 from conformance.documents.openapi import operations_of
-from conformance.engine.describing import UnreachableError, described_contract, fetch_description
+from conformance.engine.describing import UnreachableError, described_contract
 from conformance.statement.statement import (
     Api,
     Calls,
@@ -134,25 +135,20 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **options: Any) -> Com
     """
     # A terminated run still stops the robot and writes what it has.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    # What each run of a fleet would refuse is told once, before the first.
-    if options["nonce"] is not None and not options["init"]:
-        _check_nonce(options["nonce"])
     if options["fleet"]:
-        return _certify_fleet(door, options)
+        from conformance.cli.certify_fleet import certify_fleet  # noqa: PLC0415 - one robot needs nothing of it
+
+        # What each run would refuse is told once, before the first.
+        if options["nonce"] is not None:
+            _check_nonce(options["nonce"])
+        if options["key"]:
+            door.notary(Path(options["key"]))
+        return certify_fleet(Path(options["fleet"]), options)
     if options["parallel"] is not None:
         raise click.UsageError("--parallel says how many robots of a --fleet are judged at once: give --fleet")
     source, statement = _told_apart(targets, options["openapi"])
     try:
-        if source is not None and options["init"]:
-            return _init_described(statement, source, options)
-        chosen, contract = _chosen(source, None if options["init"] else statement, options)
-        if options["init"]:
-            return _init(statement, chosen, contract, force=options["force"])
-        # Before the run: what cannot be signed by this key is told at once.
-        notary = door.notary(Path(options["key"])) if options["key"] else None
-        if options["plan"]:
-            return _plan(chosen, options, contract)
-        outcome = _certify(chosen, options, contract, statement)
+        done = _judge(door, source, statement, options)
     except UnreachableError as unreachable:
         click.echo(f"the device cannot be reached: {unreachable}", err=True)
         return CommandResult(ExitCode.UNREACHABLE)
@@ -160,19 +156,39 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **options: Any) -> Com
         raise click.UsageError(str(error)) from error
     except KeyboardInterrupt:
         return CommandResult(ExitCode.INTERRUPTED)
-    print_summary(outcome)
     # What is there now lives as long as the process, which would look through all of it for garbage before it ends:
     # that took half a second.
     gc.freeze()
+    return done
+
+
+def _judge(door: FrontDoor, source: str | None, statement: Path | None, options: dict[str, Any]) -> CommandResult:
+    """Do what the options ask for one robot: write a first statement, print the plan, or certify.
+
+    Args:
+        door: signs the result.
+        source: URL or file of the device's own description, or None.
+        statement: the robot's statement, or None.
+        options: of the command.
+
+    Raises:
+        StatementError, ContractError, DescriptionError: one of the files cannot be used.
+        UnreachableError: the server of the description does not respond.
+    """
+    if options["init"] and source is not None:
+        return init_described(statement, source, options)
+    chosen, contract = _chosen(source, statement if not options["init"] else None, options)
+    if options["init"]:
+        return init(statement, chosen, contract, force=options["force"])
+    if options["nonce"] is not None:
+        _check_nonce(options["nonce"])
+    # Before the run: what cannot be signed by this key is told at once.
+    notary = door.notary(Path(options["key"])) if options["key"] else None
+    if options["plan"]:
+        return _plan(chosen, options, contract)
+    outcome = _certify(chosen, options, contract, statement)
+    print_summary(outcome)
     return CommandResult(outcome.exit_code, outcome.path, notary)
-
-
-def _certify_fleet(door: FrontDoor, options: dict[str, Any]) -> CommandResult:
-    from conformance.cli.certify_fleet import certify_fleet  # noqa: PLC0415 - one robot needs nothing of it
-
-    if options["key"]:
-        door.notary(Path(options["key"]))
-    return certify_fleet(Path(options["fleet"]), options)
 
 
 def _told_apart(targets: tuple[str, ...], openapi: str | None) -> tuple[str | None, Path | None]:
@@ -279,54 +295,6 @@ def _plan(chosen: Statement, options: dict[str, Any], contract: Contract) -> Com
 
     for line in plan_of(RobotUnderTest(_run(chosen, options, contract))):
         click.echo(line)
-    return CommandResult(ExitCode.PASSED)
-
-
-def _init(path: Path | None, chosen: Statement, contract: Contract, *, force: bool) -> CommandResult:
-    from conformance.engine.first_statement import write_first_statement  # noqa: PLC0415 - only --init needs it
-
-    path = _new_file(path, force=force)
-    problem = write_first_statement(path, chosen, contract)
-    if problem:
-        click.echo(f"the robot cannot be reached: {problem}", err=True)
-        return CommandResult(ExitCode.UNREACHABLE)
-    click.echo(f"wrote {path}: look it over, then run `roaas certify {path}`")
-    return CommandResult(ExitCode.PASSED)
-
-
-def _new_file(path: Path | None, *, force: bool) -> Path:
-    """Return the file that --init writes.
-
-    Raises:
-        click.UsageError: none is named, or it exists.
-    """
-    if path is None:
-        raise click.UsageError("--init writes a statement: name the file, as in `roaas certify --init robot.toml`")
-    if path.exists() and not force:
-        raise click.UsageError(f"{path} exists already; --force overwrites it")
-    return path
-
-
-def _init_described(path: Path | None, source: str, options: dict[str, Any]) -> CommandResult:
-    """Write a statement for a device with a description.
-
-    Raises:
-        DescriptionError: there is no usable description.
-        StatementError: a file cannot be read or written.
-        UnreachableError: the server of the description does not respond.
-    """
-    from conformance.engine.first_described import write_described_statement  # noqa: PLC0415 - only --init needs it
-    from conformance.engine.pytest_run import connection_of  # noqa: PLC0415 - see _certify
-
-    path = _new_file(path, force=options["force"])
-    given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) is not None}
-    api = Api(overlays=tuple(options["overlays"]), base_url=options["base_url"] or options["rest"])
-    try:
-        found = fetch_description(source, api.overlays, connection_of(Endpoints(**given)))
-        write_described_statement(path, found, api, Calls(tuple(options["allow"]), tuple(options["never"])))
-    except OSError as error:
-        raise StatementError(str(error)) from error
-    click.echo(f"wrote {path}: look it over, then run `roaas certify {path}`")
     return CommandResult(ExitCode.PASSED)
 
 

@@ -13,15 +13,9 @@ from conformance.api.rest.calls import Call
 from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.values import Values
-from conformance.api.rest.variations import (
-    Kind,
-    Variation,
-    invalid_variations,
-    odd_variations,
-    unknown_variations,
-    valid_variations,
-)
+from conformance.api.rest.variations import Kind, Variation, odd_variations, unknown_variations, valid_variations
 from conformance.documents.openapi import Operation, operations_of
 from conformance.documents.writing import text_of
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario

@@ -4,7 +4,7 @@ import math
 import ssl
 import time
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -19,6 +19,7 @@ from conformance.transport.exchange import (
     Listener,
     NoAnswer,
     NoAnswerError,
+    NotPermittedError,
     Request,
     Response,
     Unanswered,
@@ -26,6 +27,8 @@ from conformance.transport.exchange import (
 from conformance.transport.pace import Pace, time_to_arrive
 
 Headers = tuple[tuple[str, str], ...]
+# Called with method and URL; returns an empty text if the request may be sent, else why not.
+Permit = Callable[[str, str], str]
 # An endpoint that has let this many deadlines pass within this time, s, is not asked until that is over: a hang costs
 # its deadline twice in that time at most, and a link that was gone twice in a long run is none.
 _HANGS = 2
@@ -49,6 +52,8 @@ class Connection:
         acted_at: when a request with an unsafe method was last sent or answered, s of the monotonic clock.
         pace: how fast the robot responds.
         endless: whether a body that does not end is a response, of which only the beginning is read.
+        permit: is called with method and absolute URL before each request; returns an empty text if the request may be
+            sent, else why not. By default everything may be sent.
     """
 
     timeout_s: float = 10.0
@@ -61,21 +66,33 @@ class Connection:
     acted_at: float = -math.inf
     pace: Pace = field(default_factory=Pace)
     endless: bool = False
+    permit: Permit = lambda _method, _url: ""
     _next_slot: float = 0.0
 
     def tls(self) -> ssl.SSLContext:
         """The TLS context that trusts ``ca_file``, or the system's authorities."""
         return tls_context(self.ca_file)
 
-    def take_slot(self, method: str) -> None:
-        """Count a request, after waiting until ``request_rate`` allows it."""
+    def take_slot(self, *requests: tuple[str, str]) -> None:
+        """Count one message, after waiting until ``request_rate`` allows it. Everything that sends calls this before.
+
+        Args:
+            requests: method and URL of each request in the message; raw bytes may hold several, or none.
+
+        Raises:
+            NotPermittedError: one of the requests may not be sent in this run.
+        """
+        for method, url in requests:
+            if reason := self.permit(method, url):
+                raise NotPermittedError(reason)
         self.sent += 1
         if self.request_rate:
             now = time.monotonic()
             if self._next_slot > now:
                 time.sleep(self._next_slot - now)
             self._next_slot = max(now, self._next_slot) + 1 / self.request_rate
-        self.note(method)
+        for method, _ in requests:
+            self.note(method)
 
     def note(self, method: str) -> None:
         """Update ``acted_at`` if the method is unsafe: called when a request is sent, answered or given up."""
@@ -112,6 +129,10 @@ class HttpClient:
         """Return the URL of a path below the base URL, as requests have it."""
         return f"{self.scheme}://{self.authority}{self.prefix}{path}"
 
+    def refusal(self, method: str, path: str) -> str:
+        """Return why this run may not send a request, or an empty text. Checks ask before they send."""
+        return self.connection.permit(method, self.url(path))
+
     def send(
         self,
         method: str,
@@ -136,6 +157,7 @@ class HttpClient:
 
         Raises:
             NoAnswerError: no HTTP response was received.
+            NotPermittedError: the request may not be sent in this run.
         """
         fields = self._fields(method, tuple(headers), body, close=fresh)
         shown = tuple((name, value) for name, value in fields if name != "Connection")
@@ -191,7 +213,7 @@ class HttpClient:
         request = h11.Request(method=method, target=target, headers=headers)
         before = ""
         for attempt in range(1, _ATTEMPTS + 1):
-            self.connection.take_slot(method)
+            self.connection.take_slot((method, self.url(path)))
             deadline = Deadline(seconds, len(body))
             keep = not fresh and attempt == 1
             connection = self._connections.take() if keep else self._connections.new()

@@ -234,6 +234,10 @@ class NoAnswerError(Exception):
         return self.unanswered.kind
 
 
+class NotPermittedError(Exception):
+    """Raised instead of sending a request that this run may not send; the message says why not."""
+
+
 class Listener:
     """Base class for objects that are called with every response and every request without a response. Does nothing."""
 

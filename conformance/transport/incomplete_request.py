@@ -24,6 +24,7 @@ class PartialRequest:
 
     Raises:
         NoAnswerError: the connection cannot be opened.
+        NotPermittedError: the request may not be sent in this run.
     """
 
     def __init__(
@@ -48,7 +49,7 @@ class PartialRequest:
         if head_only is not None:
             octets = octets[:head_only]
         self.request = Request(method, client.url(path), (), b"", f"{shown}\r\n\r\n".encode()[: len(octets)] + body)
-        client.connection.take_slot(method)
+        client.connection.take_slot((method, self.request.url))
         try:
             self._socket = socket.create_connection((client.host, client.port), client.connection.timeout_s)
             if client.scheme == "https":

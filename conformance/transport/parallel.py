@@ -59,7 +59,7 @@ def send_together(rounds: Sequence[Sequence[Outgoing]]) -> list[list[Attempt]]:
         with ThreadPoolExecutor(max(1, len(clients))) as pool:
             for requests in rounds:
                 for request in requests:
-                    request.client.connection.take_slot(request.method)
+                    request.client.connection.take_slot((request.method, request.client.url(request.path)))
                 start = threading.Barrier(len(requests))
                 jobs = [
                     pool.submit(client.send, request, start.wait)

@@ -21,6 +21,11 @@ from conformance.transport.pace import time_for
 
 # What a recipient may forgive in a header section, and a server must not send (RFC 9112 2.2, 5.2).
 _FORGIVEN = re.compile(rb"(?<!\r)\n|\r(?!\n)|\n[ \t]")
+# A request line, wherever it stands (a body may end without a line end), and one that writes without a version.
+_REQUEST_LINE = re.compile(
+    rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+)[ \t]+([^ \t\r\n]+)[ \t]+HTTP/"
+    rb"|(?:\A|[\r\n])[ \t]*(PUT|POST|DELETE|PATCH)[ \t]+([^ \t\r\n]+)"
+)
 _MOST = 4 * 1024 * 1024
 # The least that a connection is waited for, s.
 _TO_CONNECT_S = 0.05
@@ -102,10 +107,11 @@ def talk(
 
     Raises:
         NoAnswerError: the connection cannot be opened.
+        NotPermittedError: one of the requests in the bytes may not be sent in this run.
     """
     deadline = time.monotonic() + (timeout_s or client.connection.timeout_s) + time_for(len(octets))
     request = shown(client, octets)
-    client.connection.take_slot(request.method)
+    client.connection.take_slot(*((method, _url(client, target)) for method, target in requests_in(octets)))
     started = time.perf_counter()
     try:
         left = max(_TO_CONNECT_S, deadline - time.monotonic())
@@ -176,6 +182,19 @@ def shown(client: HttpClient, octets: bytes) -> Request:
         octets = octets.replace(client.connection.token.encode("latin-1", "replace"), b"$ROAAS_TOKEN")
     line = octets.split(b"\r\n", 1)[0].decode("latin-1")
     return Request(line.split(" ", 1)[0][:40], _address(client), (), b"", raw=octets)
+
+
+def requests_in(octets: bytes) -> list[tuple[str, str]]:
+    """Return method and target of every line in the bytes that a server may take for a request line, bodies included.
+
+    Servers differ in where they see one request end and the next one begin (RFC 9112 11.2).
+    """
+    found = (match.groups() for match in _REQUEST_LINE.finditer(octets))
+    return [((one or three).decode(), (two or four).decode("latin-1")) for one, two, three, four in found]
+
+
+def _url(client: HttpClient, target: str) -> str:
+    return target if "://" in target else f"{client.scheme}://{client.authority}{target}"
 
 
 def _address(client: HttpClient) -> str:

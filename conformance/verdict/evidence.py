@@ -260,6 +260,10 @@ class Judge:
         """Return the number of failures so far, by requirement."""
         return {id_: evidence.failures for id_, evidence in self.evidence.items() if evidence.findings}
 
+    def knows(self, requirement: str) -> bool:
+        """Return whether the contract has a requirement."""
+        return requirement in self.evidence
+
     def counts(self, ids: Iterable[str]) -> dict[str, int]:
         """Return the number of cases by requirement."""
         return {id_: self.evidence[id_].cases for id_ in ids if id_ in self.evidence}

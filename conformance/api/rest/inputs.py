@@ -93,8 +93,10 @@ def written(operation: Operation, inputs: Inputs) -> GeneratedRequest:
 def _body(operation: Operation, inputs: Inputs) -> tuple[str, bytes]:
     """Return the Content-Type and the bytes of the body."""
     value, media_type = inputs.body, inputs.media_type
-    if value is NOTHING or isinstance(value, bytes):
-        return ("", b"") if value is NOTHING else (media_type, value)
+    if value is NOTHING:
+        media_type, value = "", b""
+    if isinstance(value, bytes):
+        return media_type, value
     if media_type == FORM and isinstance(value, dict):
         return media_type, form_body(value)
     if media_type == MULTIPART and isinstance(value, dict):

@@ -17,8 +17,8 @@ from conformance.transport.exchange import Exchange
 _REMEMBERED, _TRIED = 8, 4
 _DEPTH = 6
 _NAME = re.compile(r"[^a-z0-9]")
-# What identifies an item of a collection, by the usual names of such members.
-_IDS = ("id", "uuid", "name", "key", "slug")
+#: What identifies an item of a collection, by the usual names of such members.
+IDS = ("id", "uuid", "name", "key", "slug")
 #: A value of each format that JSON Schema and OpenAPI name.
 FORMATS: Mapping[str, str] = {
     "uuid": "3fa85f64-5717-4562-b3fc-2c963f66afa6",
@@ -66,7 +66,7 @@ class Values:
         items = value if isinstance(value, list) else [value]
         for item in items[:_REMEMBERED]:
             if isinstance(item, dict):
-                for name in _IDS:
+                for name in IDS:
                     if isinstance(item.get(name), str | int):
                         self._remember(self._ids[operation.template.rstrip("/")], item[name])
                         break

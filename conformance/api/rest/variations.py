@@ -17,10 +17,10 @@ from conformance.documents.representation import flat
 
 # As many enum values, examples and optional members are tried of one place, and so deep in a body.
 _FEW: Final = 12
-_DEPTH: Final = 3
-_LONG: Final = 5000
+DEPTH: Final = 3
+LONG: Final = 5000
 _BEYOND: Final = 2**63
-_UNKNOWN: Final = "roaas-unknown"
+UNKNOWN: Final = "roaas-unknown"
 _UNKNOWN_NUMBER: Final = 987_654_321
 # Texts that programs stumble over; none of them acts on anything.
 _ODD_TEXTS: Final = (
@@ -33,7 +33,7 @@ _ODD_TEXTS: Final = (
     "{{7*7}}${7*7}",
     "roaas\r\nroaas: 1",
     "null",
-    "x" * _LONG,
+    "x" * LONG,
 )
 _ODD_NUMBERS: Final = (0, -1, _BEYOND, -_BEYOND - 1, 1e308, 1.5)
 
@@ -81,7 +81,7 @@ def valid_variations(operation: Operation, usual: Inputs, values: Values) -> Ite
         place = f"{item.where} {item.name}"
         for kind, value in _valid_values(item.schema, item.examples, values.of(operation, item), item.required):
             if value != usual.at(item.where).get(item.name, NOTHING) and _sendable(item, value):
-                yield Variation(kind, f"{_shown(value)} as {place}", place, usual.having(item.where, item.name, value))
+                yield Variation(kind, f"{shown(value)} as {place}", place, usual.having(item.where, item.name, value))
     media_type, whole = whole_body(operation)
     if is_json(media_type) and isinstance(usual.body, dict):
         schema = operation.bodies[media_type].schema
@@ -118,7 +118,7 @@ def _bounds(schema: Schema) -> Iterator[Any]:
     if "pattern" in schema or "format" in schema or "enum" in schema:
         return
     for key in ("minLength", "maxLength"):
-        if isinstance(schema.get(key), int) and 0 < schema[key] <= _LONG:
+        if isinstance(schema.get(key), int) and 0 < schema[key] <= LONG:
             yield "a" * schema[key]
 
 
@@ -126,137 +126,29 @@ def _valid_members(usual: Inputs, value: Any, schema: Schema, steps: tuple[str, 
     """Yield bodies with one optional member more, or with another value of a member."""
     schema = flat(schema)
     for name, part in list(schema.get("properties", {}).items()):
-        place, here = _place((*steps, name)), (*steps, name)
+        place, here = place_of((*steps, name)), (*steps, name)
         if part.get("readOnly"):
             continue
         flatter = flat(part)
         if name not in value:
-            body = _with(usual.body, here, sample(part, whole=True))
+            body = with_member(usual.body, here, sample(part, whole=True))
             yield Variation(Kind.OPTIONAL, f"the optional member {place}", place, replace(usual, body=body))
         for kind, one in _valid_values(flatter, flatter.get("examples", ()) or (), [], required=True):
             if one != value.get(name, NOTHING):
-                body = _with(usual.body, here, one)
-                yield Variation(kind, f"{_shown(one)} as {place}", place, replace(usual, body=body))
-        if isinstance(value.get(name), dict) and len(steps) < _DEPTH:
+                body = with_member(usual.body, here, one)
+                yield Variation(kind, f"{shown(one)} as {place}", place, replace(usual, body=body))
+        if isinstance(value.get(name), dict) and len(steps) < DEPTH:
             yield from _valid_members(usual, value[name], part, here)
-
-
-def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
-    """Yield requests that the description forbids: each breaks one rule of it, clearly also as it is written."""
-    for item in operation.parameters:
-        place = f"{item.where} {item.name}"
-        if item.required and item.where != "path":
-            without = usual.having(item.where, item.name, NOTHING)
-            yield Variation(Kind.MISSING, f"no {place}", place, without)
-        for value, why in _invalid_texts(item):
-            yield Variation(
-                Kind.INVALID, f"{_shown(value)} as {place}, {why}", place, usual.having(item.where, item.name, value)
-            )
-    if not is_json(usual.media_type) or usual.media_type not in operation.bodies:
-        return
-    body = operation.bodies[usual.media_type]
-    if operation.body_required:
-        yield Variation(Kind.MISSING, "no body", "body", replace(usual, body=b""))
-    cut = Variation(Kind.MALFORMED, "a body that is not JSON", "body", replace(usual, body=b'{"roaas": '))
-    yield cut
-    if "object" in kinds_of(body.schema) and len(kinds_of(body.schema)) == 1:
-        yield Variation(Kind.INVALID, "a list instead of an object", "body", replace(usual, body=[]))
-    if isinstance(usual.body, dict):
-        yield from _invalid_members(usual, usual.body, body.schema, ())
-
-
-def _invalid_members(usual: Inputs, value: Any, schema: Schema, steps: tuple[str, ...]) -> Iterator[Variation]:
-    """Yield bodies in which one member is missing or wrong."""
-    flatter = flat(schema)
-    for name, part in list(flatter.get("properties", {}).items()):
-        here = (*steps, name)
-        place = _place(here)
-        if part.get("readOnly"):
-            continue
-        if name in flatter.get("required", ()):
-            body = _with(usual.body, here, NOTHING)
-            yield Variation(Kind.MISSING, f"no {place}", place, replace(usual, body=body))
-        for wrong, why in _invalid_values(part):
-            body = _with(usual.body, here, wrong)
-            yield Variation(Kind.INVALID, f"{_shown(wrong)} as {place}, {why}", place, replace(usual, body=body))
-        if isinstance(value.get(name), dict) and len(steps) < _DEPTH:
-            yield from _invalid_members(usual, value[name], part, here)
-    if flatter.get("additionalProperties") is False and not steps:
-        body = _with(usual.body, ("roaas_unknown",), 1)
-        yield Variation(
-            Kind.INVALID, "a member that the schema excludes", "body /roaas_unknown", replace(usual, body=body)
-        )
-
-
-def _invalid_values(schema: Schema) -> Iterator[tuple[Any, str]]:
-    """Yield JSON values that a schema forbids, with the rule that each breaks."""
-    kinds = kinds_of(schema)
-    merged = flat(schema)
-    if not kinds:
-        return
-    for value, why in _beyond(merged):
-        if not fits(schema, value):
-            yield value, why
-    # An object stands for no scalar, and a word for no number, in any framework; 1 for "1" is taken by many.
-    for value in ({"roaas": 1}, _UNKNOWN, 17):
-        is_plain = isinstance(value, str) or (isinstance(value, int) and kinds <= {"object", "array", "boolean"})
-        if not fits(schema, value) and (is_plain or isinstance(value, dict)):
-            yield value, "which has another type" if "enum" not in merged else "which is none of its values"
-            break
-
-
-def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:
-    """Yield values just outside a schema's bounds."""
-    for key, step in (("minimum", -1), ("maximum", 1), ("exclusiveMinimum", 0), ("exclusiveMaximum", 0)):
-        bound = schema.get(key)
-        if isinstance(bound, int | float) and not isinstance(bound, bool):
-            yield bound + step, f"beyond its {key}" if step else f"at its {key}"
-    yield from _beyond_texts(schema)
-    if isinstance(schema.get("enum"), list) and schema["enum"]:
-        yield _UNKNOWN, "which is none of its values"
-    if isinstance(schema.get("maxItems"), int) and schema["maxItems"] <= 100:  # noqa: PLR2004 - longer is a load test
-        items = schema.get("items")
-        one = sample(items if isinstance(items, dict) else {})
-        yield [copy.deepcopy(one) for _ in range(schema["maxItems"] + 1)], "with more items than its maxItems"
-    if isinstance(schema.get("minItems"), int) and schema["minItems"] > 0:
-        yield [], "with fewer items than its minItems"
-
-
-def _beyond_texts(schema: Schema) -> Iterator[tuple[Any, str]]:
-    """Yield texts just outside a schema's bounds."""
-    if isinstance(schema.get("maxLength"), int) and schema["maxLength"] <= _LONG:
-        yield "a" * (schema["maxLength"] + 1), "longer than its maxLength"
-    if isinstance(schema.get("minLength"), int) and schema["minLength"] > 0:
-        yield "a" * (schema["minLength"] - 1), "shorter than its minLength"
-    if isinstance(schema.get("pattern"), str):
-        yield "~ roaas ~", "which its pattern excludes"
-
-
-def _invalid_texts(parameter: Parameter) -> Iterator[tuple[Any, str]]:
-    """Yield values of a parameter that its schema forbids in whatever way its text is read."""
-    kinds = kinds_of(parameter.schema)
-    if not kinds or kinds & {"object", "array"}:
-        return
-    merged = flat(parameter.schema)
-    in_path = parameter.where == "path"
-    for value, why in _beyond(merged):
-        # In a path, an empty text makes another path; a number within a text is a text.
-        is_text = isinstance(value, str) or "string" not in kinds
-        if is_text and not fits(parameter.schema, value) and not (in_path and value == ""):
-            yield value, why
-            break
-    if "string" not in kinds and "enum" not in merged:
-        yield _UNKNOWN, "which has another type"
 
 
 def unknown_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
     """Yield requests with the identifier of something that does not exist."""
     for item in operation.parameter("path"):
-        values: tuple[Any, ...] = (_UNKNOWN, _UNKNOWN_NUMBER, "00000000-0000-4000-8000-000000000000")
+        values: tuple[Any, ...] = (UNKNOWN, _UNKNOWN_NUMBER, "00000000-0000-4000-8000-000000000000")
         known = next((value for value in values if fits(item.schema, value)), None)
         if known is not None and "enum" not in flat(item.schema):
             place = f"path {item.name}"
-            yield Variation(Kind.UNKNOWN, f"{_shown(known)} as {place}", place, usual.having("path", item.name, known))
+            yield Variation(Kind.UNKNOWN, f"{shown(known)} as {place}", place, usual.having("path", item.name, known))
 
 
 def odd_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
@@ -267,7 +159,7 @@ def odd_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
         for value in (*texts, *(_ODD_NUMBERS if kinds & {"number", "integer"} else ())):
             if _sendable(item, value):
                 yield Variation(
-                    Kind.ODD, f"{_shown(value)} as {place}", place, usual.having(item.where, item.name, value)
+                    Kind.ODD, f"{shown(value)} as {place}", place, usual.having(item.where, item.name, value)
                 )
     extra = usual.having("query", "roaas_unknown", "1")
     yield Variation(Kind.ODD, "an unknown query parameter", "query", extra)
@@ -276,9 +168,9 @@ def odd_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
             kinds = kinds_of(part) or {"string"}
             texts = _ODD_TEXTS[2:4] if "string" in kinds else ()
             for value in (None, *texts, *(_ODD_NUMBERS[2:5] if kinds & {"number", "integer"} else ())):
-                place = _place((name,))
-                body = _with(usual.body, (name,), value)
-                yield Variation(Kind.ODD, f"{_shown(value)} as {place}", place, replace(usual, body=body))
+                place = place_of((name,))
+                body = with_member(usual.body, (name,), value)
+                yield Variation(Kind.ODD, f"{shown(value)} as {place}", place, replace(usual, body=body))
 
 
 def _sendable(parameter: Parameter, value: Any) -> bool:
@@ -291,7 +183,7 @@ def _sendable(parameter: Parameter, value: Any) -> bool:
     return True
 
 
-def _with(body: Any, steps: tuple[str, ...], value: Any) -> Any:
+def with_member(body: Any, steps: tuple[str, ...], value: Any) -> Any:
     """Return a copy of a body with another value of a member; NOTHING removes the member."""
     changed = copy.deepcopy(body)
     inner = changed
@@ -304,11 +196,12 @@ def _with(body: Any, steps: tuple[str, ...], value: Any) -> Any:
     return changed
 
 
-def _place(steps: tuple[str, ...]) -> str:
+def place_of(steps: tuple[str, ...]) -> str:
+    """Return the place of a member of a body, as variations name it."""
     return "body /" + "/".join(steps)
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
     """Return a value as a reader sees it, cut to 40 characters."""
     text = repr(value) if not isinstance(value, Mapping) else "an object"
     return text if len(text) <= 40 else f"{text[:36]}…{text[-1]}"  # noqa: PLR2004 - characters of a line

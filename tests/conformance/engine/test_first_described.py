@@ -65,7 +65,7 @@ def test_the_statement_is_written_and_can_be_read(folder, arguments):
     }
     for line in (
         "# Called are 3 of 5 operations.",
-        "  # -- jobs\n  # called: GET /api/jobs/{job_id}\n"
+        "  # -- jobs\n  # called: GET /api/jobs/{job_id}\n",
         '  # "DELETE /api/jobs/{job_id}",  # it may change something\n',
         '  # -- update\n  # "POST /api/firmware",  # its name warns of harm\n',
         "  # -- health\n  # called: GET /health\n",

@@ -65,7 +65,10 @@ def test_a_full_statement(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[robto]\nname = 'x'", "unknown key 'robto'; known are claims, endpoints, limits, load, motion, robot, ros"),
+        (
+            "[robto]\nname = 'x'",
+            "unknown key 'robto'; known are api, calls, claims, endpoints, limits, load, motion, robot, ros, values",
+        ),
         ("[limts]\nhold_s = 1", "unknown key 'limts'"),
         ("[endpoints]\nrset = 'x'", "[endpoints] unknown key 'rset'; known are ca_file, publishers_endpoint,"),
         ("[endpoints]\nrest = 7003", "[endpoints] rest = 7003 must be a string"),

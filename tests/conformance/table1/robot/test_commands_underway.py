@@ -3,7 +3,7 @@
 import time
 from contextlib import contextmanager
 
-from toy_body import serving
+from toy_server import serving
 
 from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.limits import DeclaredLimits
@@ -51,7 +51,7 @@ class _Body:
 def _told():
     body = _Body()
     declared = DeclaredLimits(linear_m_s=0.7, angular_rad_s=2.5, settle_s=_SETTLE_S)
-    with serving(body) as url:
+    with serving(body.answer) as url:
         client = HttpClient(url, Connection())
         api = RestInterface(Run(statement=Statement(declared=declared), allow_motion=True), client)
         robot = Robot(api)

@@ -1,0 +1,126 @@
+"""Requests for one operation that the description forbids: each breaks one rule of it."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, Final
+
+from conformance.api.rest.inputs import NOTHING, Inputs
+from conformance.api.rest.values import fits, sample
+from conformance.api.rest.variations import DEPTH, LONG, UNKNOWN, Kind, Variation, place_of, shown, with_member
+from conformance.documents.json_schema import Schema, kinds_of
+from conformance.documents.openapi import Operation, Parameter, is_json
+from conformance.documents.representation import flat
+
+# A longer array is a load test.
+_MOST_ITEMS: Final = 100
+
+
+def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
+    """Yield requests that the description forbids: each breaks one rule of it, clearly also as it is written."""
+    for item in operation.parameters:
+        place = f"{item.where} {item.name}"
+        if item.required and item.where != "path":
+            without = usual.having(item.where, item.name, NOTHING)
+            yield Variation(Kind.MISSING, f"no {place}", place, without)
+        for value, why in _invalid_texts(item):
+            yield Variation(
+                Kind.INVALID, f"{shown(value)} as {place}, {why}", place, usual.having(item.where, item.name, value)
+            )
+    if not is_json(usual.media_type) or usual.media_type not in operation.bodies:
+        return
+    body = operation.bodies[usual.media_type]
+    if operation.body_required:
+        yield Variation(Kind.MISSING, "no body", "body", replace(usual, body=b""))
+    cut = Variation(Kind.MALFORMED, "a body that is not JSON", "body", replace(usual, body=b'{"roaas": '))
+    yield cut
+    if "object" in kinds_of(body.schema) and len(kinds_of(body.schema)) == 1:
+        yield Variation(Kind.INVALID, "a list instead of an object", "body", replace(usual, body=[]))
+    if isinstance(usual.body, dict):
+        yield from _invalid_members(usual, usual.body, body.schema, ())
+
+
+def _invalid_members(usual: Inputs, value: Any, schema: Schema, steps: tuple[str, ...]) -> Iterator[Variation]:
+    """Yield bodies in which one member is missing or wrong."""
+    flatter = flat(schema)
+    for name, part in list(flatter.get("properties", {}).items()):
+        here = (*steps, name)
+        place = place_of(here)
+        if part.get("readOnly"):
+            continue
+        if name in flatter.get("required", ()):
+            body = with_member(usual.body, here, NOTHING)
+            yield Variation(Kind.MISSING, f"no {place}", place, replace(usual, body=body))
+        for wrong, why in _invalid_values(part):
+            body = with_member(usual.body, here, wrong)
+            yield Variation(Kind.INVALID, f"{shown(wrong)} as {place}, {why}", place, replace(usual, body=body))
+        if isinstance(value.get(name), dict) and len(steps) < DEPTH:
+            yield from _invalid_members(usual, value[name], part, here)
+    if flatter.get("additionalProperties") is False and not steps:
+        body = with_member(usual.body, ("roaas_unknown",), 1)
+        yield Variation(
+            Kind.INVALID, "a member that the schema excludes", "body /roaas_unknown", replace(usual, body=body)
+        )
+
+
+def _invalid_values(schema: Schema) -> Iterator[tuple[Any, str]]:
+    """Yield JSON values that a schema forbids, with the rule that each breaks."""
+    kinds = kinds_of(schema)
+    merged = flat(schema)
+    if not kinds:
+        return
+    for value, why in _beyond(merged):
+        if not fits(schema, value):
+            yield value, why
+    # An object stands for no scalar, and a word for no number, in any framework; 1 for "1" is taken by many.
+    for value in ({"roaas": 1}, UNKNOWN, 17):
+        is_plain = isinstance(value, str) or (isinstance(value, int) and kinds <= {"object", "array", "boolean"})
+        if not fits(schema, value) and (is_plain or isinstance(value, dict)):
+            yield value, "which has another type" if "enum" not in merged else "which is none of its values"
+            break
+
+
+def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:
+    """Yield values just outside a schema's bounds."""
+    for key, step in (("minimum", -1), ("maximum", 1), ("exclusiveMinimum", 0), ("exclusiveMaximum", 0)):
+        bound = schema.get(key)
+        if isinstance(bound, int | float) and not isinstance(bound, bool):
+            yield bound + step, f"beyond its {key}" if step else f"at its {key}"
+    yield from _beyond_texts(schema)
+    if isinstance(schema.get("enum"), list) and schema["enum"]:
+        yield UNKNOWN, "which is none of its values"
+    if isinstance(schema.get("maxItems"), int) and schema["maxItems"] <= _MOST_ITEMS:
+        items = schema.get("items")
+        one = sample(items if isinstance(items, dict) else {})
+        yield [copy.deepcopy(one) for _ in range(schema["maxItems"] + 1)], "with more items than its maxItems"
+    if isinstance(schema.get("minItems"), int) and schema["minItems"] > 0:
+        yield [], "with fewer items than its minItems"
+
+
+def _beyond_texts(schema: Schema) -> Iterator[tuple[Any, str]]:
+    """Yield texts just outside a schema's bounds."""
+    if isinstance(schema.get("maxLength"), int) and schema["maxLength"] <= LONG:
+        yield "a" * (schema["maxLength"] + 1), "longer than its maxLength"
+    if isinstance(schema.get("minLength"), int) and schema["minLength"] > 0:
+        yield "a" * (schema["minLength"] - 1), "shorter than its minLength"
+    if isinstance(schema.get("pattern"), str):
+        yield "~ roaas ~", "which its pattern excludes"
+
+
+def _invalid_texts(parameter: Parameter) -> Iterator[tuple[Any, str]]:
+    """Yield values of a parameter that its schema forbids in whatever way its text is read."""
+    kinds = kinds_of(parameter.schema)
+    if not kinds or kinds & {"object", "array"}:
+        return
+    merged = flat(parameter.schema)
+    in_path = parameter.where == "path"
+    for value, why in _beyond(merged):
+        # In a path, an empty text makes another path; a number within a text is a text.
+        is_text = isinstance(value, str) or "string" not in kinds
+        if is_text and not fits(parameter.schema, value) and not (in_path and value == ""):
+            yield value, why
+            break
+    if "string" not in kinds and "enum" not in merged:
+        yield UNKNOWN, "which has another type"

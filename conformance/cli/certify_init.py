@@ -1,0 +1,67 @@
+"""``roaas certify --init``: write a first statement."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.result_command import CommandResult
+from conformance.contract.pack import Contract
+from conformance.engine.describing import fetch_description
+from conformance.statement.statement import Api, Calls, Endpoints, Statement, StatementError
+
+
+def init(path: Path | None, chosen: Statement, contract: Contract, *, force: bool) -> CommandResult:
+    """Write a statement for a robot with a contract.
+
+    Raises:
+        click.UsageError: no file is named, or it exists.
+    """
+    from conformance.engine.first_statement import write_first_statement  # noqa: PLC0415 - only --init needs it
+
+    path = _new_file(path, force=force)
+    problem = write_first_statement(path, chosen, contract)
+    if problem:
+        click.echo(f"the robot cannot be reached: {problem}", err=True)
+        return CommandResult(ExitCode.UNREACHABLE)
+    click.echo(f"wrote {path}: look it over, then run `roaas certify {path}`")
+    return CommandResult(ExitCode.PASSED)
+
+
+def _new_file(path: Path | None, *, force: bool) -> Path:
+    """Return the file that --init writes.
+
+    Raises:
+        click.UsageError: none is named, or it exists.
+    """
+    if path is None:
+        raise click.UsageError("--init writes a statement: name the file, as in `roaas certify --init robot.toml`")
+    if path.exists() and not force:
+        raise click.UsageError(f"{path} exists already; --force overwrites it")
+    return path
+
+
+def init_described(path: Path | None, source: str, options: dict[str, Any]) -> CommandResult:
+    """Write a statement for a device with a description.
+
+    Raises:
+        DescriptionError: there is no usable description.
+        StatementError: a file cannot be read or written.
+        UnreachableError: the server of the description does not respond.
+    """
+    from conformance.engine.first_described import write_described_statement  # noqa: PLC0415 - only --init needs it
+    from conformance.engine.pytest_run import connection_of  # noqa: PLC0415 - as above
+
+    path = _new_file(path, force=options["force"])
+    given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) is not None}
+    api = Api(overlays=tuple(options["overlays"]), base_url=options["base_url"] or options["rest"])
+    try:
+        found = fetch_description(source, api.overlays, connection_of(Endpoints(**given)))
+        write_described_statement(path, found, api, Calls(tuple(options["allow"]), tuple(options["never"])))
+    except OSError as error:
+        raise StatementError(str(error)) from error
+    click.echo(f"wrote {path}: look it over, then run `roaas certify {path}`")
+    return CommandResult(ExitCode.PASSED)
