@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import msgspec
 from click.core import ParameterSource
 
 from conformance.api.call_rules import CallRules, told
 from conformance.cli.certify_init import init, init_described
+from conformance.cli.certify_target import told_apart, what_is_judged
 from conformance.cli.summary import print_summary
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, FrontDoor, ResultCommand
@@ -22,20 +22,10 @@ from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.contract.places import places
 from conformance.contract.requirement_sets import RequirementSetError, judged_by
-from conformance.documents.description import DescriptionError, is_url
+from conformance.documents.description import DescriptionError
 from conformance.documents.openapi import operations_of
-from conformance.engine.describing import UnreachableError, described_contract
-from conformance.statement.statement import (
-    Api,
-    Calls,
-    Endpoints,
-    Statement,
-    StatementError,
-    api_of,
-    empty_statement,
-    endpoints_of,
-    load_statement,
-)
+from conformance.engine.describing import UnreachableError
+from conformance.statement.statement import Statement, StatementError
 from conformance.verdict.effort import EFFORTS, Effort
 
 if TYPE_CHECKING:
@@ -146,7 +136,7 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **options: Any) -> Com
         return certify_fleet(Path(options["fleet"]), options)
     if options["parallel"] is not None:
         raise click.UsageError("--parallel says how many robots of a --fleet are judged at once: give --fleet")
-    source, statement = _told_apart(targets, options["openapi"])
+    source, statement = told_apart(targets, options["openapi"])
     try:
         done = _judge(door, source, statement, options)
     except UnreachableError as unreachable:
@@ -177,7 +167,7 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
     """
     if options["init"] and source is not None:
         return init_described(statement, source, options)
-    chosen, contract = _chosen(source, statement if not options["init"] else None, options)
+    chosen, contract = what_is_judged(source, statement if not options["init"] else None, options)
     if options["init"]:
         return init(statement, chosen, contract, force=options["force"])
     if options["nonce"] is not None:
@@ -189,103 +179,6 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
     outcome = _certify(chosen, options, contract, statement)
     print_summary(outcome)
     return CommandResult(outcome.exit_code, outcome.path, notary)
-
-
-def _told_apart(targets: tuple[str, ...], openapi: str | None) -> tuple[str | None, Path | None]:
-    """Return the description and the statement that the command names; either may be None.
-
-    Raises:
-        click.UsageError: two descriptions or two statements are named.
-    """
-    described = [one for one in targets if is_url(one) or one.endswith((".json", ".yaml", ".yml"))]
-    statements = [one for one in targets if one not in described]
-    described += [openapi] if openapi else []
-    for what, named in (("descriptions", described), ("statements", statements)):
-        if len(named) > 1:
-            raise click.UsageError(f"{' and '.join(named)} are several {what}: name one")
-    return next(iter(described), None), Path(statements[0]) if statements else None
-
-
-def _chosen(source: str | None, statement: Path | None, options: dict[str, Any]) -> tuple[Statement, Contract]:
-    """Return what a device is judged by: statement and contract.
-
-    Raises:
-        DescriptionError, StatementError, ContractError: one of them cannot be used.
-        UnreachableError: the server of the description does not respond.
-    """
-    contract = Contract.load(options["pack"])
-    api = api_of(statement) if statement else None
-    source = source or (api.openapi if api else None)
-    if source is not None:
-        return _described(source, api, statement, options)
-    declared = load_statement(statement, contract) if statement else empty_statement(contract)
-    return _apply(declared, options, contract), contract
-
-
-def _described(
-    source: str, api: Api | None, statement: Path | None, options: dict[str, Any]
-) -> tuple[Statement, Contract]:
-    """Return statement and contract of a device that is judged by its own description.
-
-    Raises:
-        DescriptionError, StatementError, ContractError: one of them cannot be used.
-        UnreachableError: the server of the description does not respond.
-    """
-    from conformance.engine.pytest_run import connection_of  # noqa: PLC0415 - see _certify
-
-    given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) is not None}
-    where = msgspec.structs.replace(endpoints_of(statement) if statement else Endpoints(), **given)
-    overlays = tuple(options["overlays"]) or (api.overlays if api else ())
-    base_url = options["base_url"] or (api.base_url if api else None)
-    try:
-        connection = connection_of(where)
-        contract, where, remarks = described_contract(source, overlays, base_url, where, connection, options["out"])
-    except OSError as error:
-        raise StatementError(str(error)) from error
-    options["remarks"] = remarks
-    declared = load_statement(statement, contract) if statement else empty_statement(contract)
-    return _apply(msgspec.structs.replace(declared, endpoints=where), options, contract), contract
-
-
-def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> Statement:
-    """Return the statement with the options applied, which override it.
-
-    Raises:
-        StatementError: an option has an invalid value.
-    """
-    given = {key: options[key] for key in declared.endpoints.__struct_fields__ if options[key] is not None}
-    where = msgspec.structs.replace(declared.endpoints, **given)
-    for key in ("rest", "publishers_endpoint", "subscribers_endpoint"):
-        url = getattr(where, key)
-        if url is not None and not url.startswith(("http://", "https://")):
-            raise StatementError(f"{key.replace('_', '-')} {url!r} is no URL: it has to start with http:// or https://")
-    if not where.interfaces:
-        raise StatementError("no robot is named: give a STATEMENT, --rest, --publishers-wsdl or --subscribers-wsdl")
-    claims = declared.claims
-    if options["profile"] or options["classes"]:
-        claims = _claims(options, contract)
-    if options["ros_domain_id"] is not None:
-        declared = declared.on_domain(options["ros_domain_id"])
-    calls = declared.calls
-    if options["allow"] or options["never"]:
-        calls = Calls((*calls.allow, *options["allow"]), (*calls.never, *options["never"]))
-    return msgspec.structs.replace(declared, endpoints=where, claims=claims, calls=calls)
-
-
-def _claims(options: dict[str, Any], contract: Contract) -> tuple[str, ...]:
-    """Return the classes that the options claim.
-
-    Raises:
-        StatementError: the contract has no such profile or class.
-    """
-    for option, names, known in (
-        ("--profile", filter(None, [options["profile"]]), contract.profiles),
-        ("--class", options["classes"], contract.classes),
-    ):
-        for name in names:
-            if name not in known:
-                raise StatementError(f"{option} {name!r}: {contract.name} has {', '.join(known)}")
-    return (*contract.profiles.get(options["profile"] or "", ()), *options["classes"])
 
 
 def _plan(chosen: Statement, options: dict[str, Any], contract: Contract) -> CommandResult:

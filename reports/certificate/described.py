@@ -104,12 +104,12 @@ class Described:
         return [Measure(name, reached, whole) for name, (reached, whole) in found if whole]
 
     @property
-    def uncalled(self) -> Iterator[tuple[str, list[str]]]:
+    def uncalled(self) -> Iterator[tuple[str, list[Row]]]:
         """Yield each reason for which operations were not called, with those operations."""
-        groups: dict[str, list[str]] = {}
+        groups: dict[str, list[Row]] = {}
         for entry in self.api["operations"]:
             if not entry["called"]:
-                groups.setdefault(entry["reason"], []).append(entry["operation"])
+                groups.setdefault(entry["reason"], []).append(Row(entry))
         yield from groups.items()
 
     @property

@@ -1,0 +1,121 @@
+"""What ``roaas certify`` judges: the arguments and options as a statement and a contract."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+import msgspec
+
+from conformance.contract.pack import Contract
+from conformance.documents.description import is_url
+from conformance.engine.describing import described_contract
+from conformance.statement.statement import (
+    Api,
+    Calls,
+    Endpoints,
+    Statement,
+    StatementError,
+    api_of,
+    empty_statement,
+    endpoints_of,
+    load_statement,
+)
+
+
+def told_apart(targets: tuple[str, ...], openapi: str | None) -> tuple[str | None, Path | None]:
+    """Return the description and the statement that the command names; either may be None.
+
+    Raises:
+        click.UsageError: two descriptions or two statements are named.
+    """
+    described = [one for one in targets if is_url(one) or one.endswith((".json", ".yaml", ".yml"))]
+    statements = [one for one in targets if one not in described]
+    described += [openapi] if openapi else []
+    for what, named in (("descriptions", described), ("statements", statements)):
+        if len(named) > 1:
+            raise click.UsageError(f"{' and '.join(named)} are several {what}: name one")
+    return next(iter(described), None), Path(statements[0]) if statements else None
+
+
+def what_is_judged(source: str | None, statement: Path | None, options: dict[str, Any]) -> tuple[Statement, Contract]:
+    """Return what a device is judged by: statement and contract.
+
+    Raises:
+        DescriptionError, StatementError, ContractError: one of them cannot be used.
+        UnreachableError: the server of the description does not respond.
+    """
+    contract = Contract.load(options["pack"])
+    api = api_of(statement) if statement else None
+    source = source or (api.openapi if api else None)
+    if source is not None:
+        return _described(source, api, statement, options)
+    declared = load_statement(statement, contract) if statement else empty_statement(contract)
+    return _apply(declared, options, contract), contract
+
+
+def _described(
+    source: str, api: Api | None, statement: Path | None, options: dict[str, Any]
+) -> tuple[Statement, Contract]:
+    """Return statement and contract of a device that is judged by its own description.
+
+    Raises:
+        DescriptionError, StatementError, ContractError: one of them cannot be used.
+        UnreachableError: the server of the description does not respond.
+    """
+    from conformance.engine.pytest_run import connection_of  # noqa: PLC0415 - it loads pytest
+
+    given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) is not None}
+    where = msgspec.structs.replace(endpoints_of(statement) if statement else Endpoints(), **given)
+    overlays = tuple(options["overlays"]) or (api.overlays if api else ())
+    base_url = options["base_url"] or (api.base_url if api else None)
+    try:
+        connection = connection_of(where)
+        contract, where, remarks = described_contract(source, overlays, base_url, where, connection, options["out"])
+    except OSError as error:
+        raise StatementError(str(error)) from error
+    options["remarks"] = remarks
+    declared = load_statement(statement, contract) if statement else empty_statement(contract)
+    return _apply(msgspec.structs.replace(declared, endpoints=where), options, contract), contract
+
+
+def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> Statement:
+    """Return the statement with the options applied, which override it.
+
+    Raises:
+        StatementError: an option has an invalid value.
+    """
+    given = {key: options[key] for key in declared.endpoints.__struct_fields__ if options[key] is not None}
+    where = msgspec.structs.replace(declared.endpoints, **given)
+    for key in ("rest", "publishers_endpoint", "subscribers_endpoint"):
+        url = getattr(where, key)
+        if url is not None and not url.startswith(("http://", "https://")):
+            raise StatementError(f"{key.replace('_', '-')} {url!r} is no URL: it has to start with http:// or https://")
+    if not where.interfaces:
+        raise StatementError("no robot is named: give a STATEMENT, --rest, --publishers-wsdl or --subscribers-wsdl")
+    claims = declared.claims
+    if options["profile"] or options["classes"]:
+        claims = _claims(options, contract)
+    if options["ros_domain_id"] is not None:
+        declared = declared.on_domain(options["ros_domain_id"])
+    calls = declared.calls
+    if options["allow"] or options["never"]:
+        calls = Calls((*calls.allow, *options["allow"]), (*calls.never, *options["never"]))
+    return msgspec.structs.replace(declared, endpoints=where, claims=claims, calls=calls)
+
+
+def _claims(options: dict[str, Any], contract: Contract) -> tuple[str, ...]:
+    """Return the classes that the options claim.
+
+    Raises:
+        StatementError: the contract has no such profile or class.
+    """
+    for option, names, known in (
+        ("--profile", filter(None, [options["profile"]]), contract.profiles),
+        ("--class", options["classes"], contract.classes),
+    ):
+        for name in names:
+            if name not in known:
+                raise StatementError(f"{option} {name!r}: {contract.name} has {', '.join(known)}")
+    return (*contract.profiles.get(options["profile"] or "", ()), *options["classes"])
