@@ -35,6 +35,9 @@ _MOST: Final = {"valid": 60, "invalid": 60, "odd": 40}
 _LEAST: Final = {"valid": 40, "invalid": 20, "odd": 12}
 # Valid requests of an operation that changes something: each leaves something behind.
 _ACTING: Final = 12
+# Statuses of an operation that is not there.
+_NOT_FOUND: Final = 404
+_NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
 # How often one request is sent again and again; and cases of Schemathesis, as many of each kind, of one operation.
 _REPEATS: Final = 200
 _FEWEST_REPEATS: Final = 60
@@ -101,6 +104,16 @@ class Survey:
         """Return the probes of one operation, of these kinds or of all."""
         return [one for one in self.probes if one.operation == operation and (not kinds or one.kind in kinds)]
 
+    def lacks(self, operation: Operation) -> bool:
+        """Return whether the device answered each usual request as if it did not have the operation.
+
+        A declared 404, or one for an identifier in the path, says that something else is not there.
+        """
+        named = bool(operation.parameter("path") or {"404", "4XX", "4xx"} & operation.responses.keys())
+        absent = _NOT_THERE - {_NOT_FOUND} if named else _NOT_THERE
+        usual = self.of(operation.label, Kind.USUAL)
+        return bool(usual) and all(one.status in absent for one in usual)
+
 
 @dataclass
 class _Surveyor:
@@ -126,6 +139,7 @@ class _Surveyor:
             unanswered = none.unanswered
             if none.kind in {NoAnswer.TIMEOUT, NoAnswer.CIRCUIT_OPEN}:
                 self.given_up.add(operation.label)
+                self.api.streams.add(operation.label)
             self.record(Probe(operation.label, variation.kind, variation.says, variation.place, None, unanswered))
             if not self.api.alive():
                 raise PartialTraceError(Survey(tuple(self.probes))) from none
@@ -238,7 +252,9 @@ def generated_requests(api: RestInterface, values: Values, explore: Explorer) ->
     from conformance.api.rest.generated import targets  # noqa: PLC0415
 
     run = api.run
-    operations = {item.label: item for item in operations_of(run.contract) if allowed(api, item)}
+    operations = {
+        item.label: item for item in operations_of(run.contract) if allowed(api, item) and item.label not in api.streams
+    }
     surveyor = _Surveyor(api, values)
 
     for target in targets(run.contract):

@@ -63,7 +63,7 @@ def plain_path(contract: Contract) -> str:
 
 
 def _described_path(contract: Contract) -> str:
-    """Return a path for GET without required parameters that harms nothing and does not stream; "/" if there is none."""
+    """Return a path for GET without required parameters, harmless and without a stream; "/" if there is none."""
     for operation in operations_of(contract):
         required = any(item.required for item in operation.parameters)
         streams = any(name.startswith(("text/event-stream", "multipart/", "video/")) for name in operation.formats)

@@ -159,10 +159,15 @@ def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
         yield Variation(Kind.MISSING, "no body", "body", replace(usual, body=b""))
     cut = Variation(Kind.MALFORMED, "a body that is not JSON", "body", replace(usual, body=b'{"roaas": '))
     yield cut
+    # RFC 8259 8.1: JSON is UTF-8.
+    not_utf8 = replace(usual, body=b'{"roaas": "\xff\xfe"}')
+    yield Variation(Kind.MALFORMED, "a body that is not UTF-8", "body", not_utf8)
     if "object" in kinds_of(body.schema) and len(kinds_of(body.schema)) == 1:
         yield Variation(Kind.INVALID, "a list instead of an object", "body", replace(usual, body=[]))
     if isinstance(usual.body, dict):
-        yield from _invalid_members(usual, usual.body, body.schema, ())
+        # What one alternative of a union forbids, another one may allow.
+        found = _invalid_members(usual, usual.body, body.schema, ())
+        yield from (one for one in found if not fits(body.schema, one.inputs.body))
 
 
 def _invalid_members(usual: Inputs, value: Any, schema: Schema, steps: tuple[str, ...]) -> Iterator[Variation]:
