@@ -230,9 +230,16 @@ def _without(schema: Any, mark: str) -> Any:
     result = {key: _without(item, mark) for key, item in schema.items()}
     properties, required = result.get("properties"), result.get("required")
     if isinstance(properties, dict) and isinstance(required, list):
-        marked = {name for name, part in properties.items() if isinstance(part, dict) and part.get(mark) is True}
+        marked = _marked(properties, mark)
         result["required"] = [name for name in required if name not in marked]
+    if isinstance(properties, dict) and mark == "readOnly":
+        # A device ignores such a member of a request, whatever its value.
+        result["properties"] = {**properties, **{name: {"readOnly": True} for name in _marked(properties, mark)}}
     return result
+
+
+def _marked(properties: dict[str, Any], mark: str) -> set[str]:
+    return {name for name, part in properties.items() if isinstance(part, dict) and part.get(mark) is True}
 
 
 def _encoding(content: dict[str, Any]) -> dict[str, tuple[str, bool]]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Final
 
-from conformance.api.rest.inputs import NOTHING, Inputs, whole_body
+from conformance.api.rest.inputs import FORM, MULTIPART, NOTHING, Inputs, whole_body
 from conformance.api.rest.values import Values, fits, sample
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.openapi import Operation, Parameter, is_json
@@ -152,6 +152,10 @@ def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
             yield Variation(
                 Kind.INVALID, f"{_shown(value)} as {place}, {why}", place, usual.having(item.where, item.name, value)
             )
+    if usual.media_type in {FORM, MULTIPART} and isinstance(usual.body, dict):
+        for name in operation.bodies[usual.media_type].schema.get("required", ()):
+            less = {key: item for key, item in usual.body.items() if key != name}
+            yield Variation(Kind.MISSING, f"no field {name}", f"body /{name}", replace(usual, body=less))
     if not is_json(usual.media_type) or usual.media_type not in operation.bodies:
         return
     body = operation.bodies[usual.media_type]
