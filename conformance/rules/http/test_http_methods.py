@@ -21,6 +21,8 @@ _STANDARD = ("GET", "PUT", "POST", "DELETE", "PATCH", "HEAD")
 _UNKNOWN = ("PROPFIND", "FOO")
 # How often the lengths of GET and HEAD are compared: the numbers in a resource have more digits or fewer each time.
 _LENGTHS = 8
+# As many resources are named in one finding.
+_LISTED = 12
 _ALWAYS_ALLOWED = frozenset({"HEAD", "OPTIONS", "TRACE"})
 
 
@@ -47,6 +49,7 @@ def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
 @pytest.mark.requirement("http/method-not-allowed", "http/allow", "http/allow-agrees")
 def test_methods_that_a_resource_has_not(api: RestInterface, judge: Judge) -> None:
     """Send to each resource each method that the contract does not define for it: the robot must respond 405."""
+    seen: list[tuple[Resource, Exchange]] = []
     for resource, call in _resources(api):
         there = {*resource.methods, *(("HEAD",) if "GET" in resource.methods else ())}
         if api.run.contract.described:
@@ -55,8 +58,10 @@ def test_methods_that_a_resource_has_not(api: RestInterface, judge: Judge) -> No
         for method in api.run.effort.subsample([name for name in _STANDARD if name not in there], 2):
             exchange = call.send(api, method=method)
             cause = f"{method} {exchange.response.status}"
-            if expect(judge, "http/method-not-allowed", exchange).status(405, cause=cause):
-                _judge_allow(api, judge, "http/allow", resource, exchange)
+            refused = expect(judge, "http/method-not-allowed", exchange).status(405, cause=cause)
+            if refused and _judge_allow(judge, "http/allow", exchange):
+                seen.append((resource, exchange))
+    _judge_agreement(api, judge, seen)
 
 
 @pytest.mark.requirement("http/unknown-method", "http/unknown-method-refused")
@@ -78,29 +83,49 @@ def test_methods_that_nobody_knows(api: RestInterface, judge: Judge) -> None:
 @pytest.mark.requirement("http/options", "http/allow", "http/allow-agrees")
 def test_options(api: RestInterface, judge: Judge) -> None:
     """Send OPTIONS to each resource and judge the Allow header."""
+    seen: list[tuple[Resource, Exchange]] = []
     for resource, call in _resources(api):
         exchange = call.send(api, method="OPTIONS")
         if exchange.response.status == HTTPStatus.METHOD_NOT_ALLOWED and api.run.contract.described:
-            _judge_allow(api, judge, "http/allow", resource, exchange)
-        elif expect(judge, "http/options", exchange).status(200, 204):
-            _judge_allow(api, judge, "http/options", resource, exchange)
+            there = _judge_allow(judge, "http/allow", exchange)
+        else:
+            expected = expect(judge, "http/options", exchange).status(200, 204)
+            there = expected and _judge_allow(judge, "http/options", exchange)
+        if there:
+            seen.append((resource, exchange))
+    _judge_agreement(api, judge, seen)
 
 
-def _judge_allow(api: RestInterface, judge: Judge, requirement: str, resource: Resource, exchange: Exchange) -> None:
-    """Judge whether Allow is there, and names what the contract gives the resource and nothing else."""
-    if not expect(judge, requirement, exchange).header("Allow"):
-        return
-    value = exchange.response.header("allow") or ""
-    named = {name.strip() for name in value.split(",")} - {""}
-    wanted = set(resource.methods) - _ALWAYS_ALLOWED
+def _judge_allow(judge: Judge, requirement: str, exchange: Exchange) -> bool:
+    """Judge whether Allow is there."""
+    return expect(judge, requirement, exchange).header("Allow")
+
+
+def _judge_agreement(api: RestInterface, judge: Judge, seen: list[tuple[Resource, Exchange]]) -> None:
+    """Judge whether each Allow names what the contract gives its resource and nothing else.
+
+    A device whose description is all that is known may have further methods; a framework that leaves methods out does
+    so for every resource, which is one finding.
+    """
     described = api.run.contract.described
-    expect(judge, "http/allow-agrees", exchange).that(
-        wanted <= named <= (named if described else wanted) | _ALWAYS_ALLOWED,
-        f"Allow: {', '.join(sorted(wanted))} (HEAD, OPTIONS and TRACE may stand beside them)",
-        f"Allow: {value}",
-        # A framework that leaves methods out does so for every resource.
-        cause="methods left out" if described else resource.template,
-    )
+    wrong: list[tuple[Resource, Exchange]] = []
+    for resource, exchange in seen:
+        named = {name.strip() for name in (exchange.response.header("allow") or "").split(",")} - {""}
+        wanted = set(resource.methods) - _ALWAYS_ALLOWED
+        if wanted <= named <= (named if described else wanted) | _ALWAYS_ALLOWED:
+            expect(judge, "http/allow-agrees", exchange).that(holds=True, expected="Allow with all methods")
+        else:
+            wrong.append((resource, exchange))
+    for resource, exchange in wrong[:1] if described else wrong:
+        wanted = set(resource.methods) - _ALWAYS_ALLOWED
+        others = [other.template for other, _ in wrong[1:]] if described else []
+        more = f". The same for {len(others)} other resources: {', '.join(others[:_LISTED])}" if others else ""
+        expect(judge, "http/allow-agrees", exchange).that(
+            holds=False,
+            expected=f"Allow: {', '.join(sorted(wanted))} (HEAD, OPTIONS and TRACE may stand beside them)",
+            got=f"Allow: {exchange.response.header('allow')}{more}",
+            cause="methods left out" if described else resource.template,
+        )
 
 
 def _formats(call: Call, most: int) -> list[str]:
