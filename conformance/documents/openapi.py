@@ -1,4 +1,7 @@
-"""The operations of a contract, from its OpenAPI description."""
+"""The operations of a contract, from its OpenAPI description.
+
+Over 300 lines because the operations and the reader of each of their parts belong together.
+"""
 
 import re
 from dataclasses import dataclass, field

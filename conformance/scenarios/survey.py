@@ -1,7 +1,11 @@
-"""The survey of a described API: each operation that may be called is sent valid, invalid and odd requests."""
+"""The survey of a described API: each operation that may be called is sent valid, invalid and odd requests.
+
+Over 300 lines because the survey and the generated requests share one surveyor.
+"""
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Final
@@ -42,6 +46,8 @@ _NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
 _REPEATS: Final = 200
 _FEWEST_REPEATS: Final = 60
 _COVERAGE: Final = 150
+# As many times an exploration's time one operation may take: one that answers slowly must not take the whole run.
+_BUDGETS: Final = 3
 _FUZZED: Final = 40
 
 
@@ -170,6 +176,11 @@ class _Surveyor:
             if operation.label in self.given_up:
                 return
 
+    def cut_short(self, what: str) -> None:
+        """Count a request that time did not allow."""
+        told = self.api.run.cut_short
+        told[what] = told.get(what, 0) + 1
+
     def _note_working(self, operation: Operation, inputs: Inputs) -> None:
         """Keep a request that was answered 2xx for other checks, if its values are plain texts and numbers."""
         values = {**inputs.path, **inputs.query}
@@ -188,12 +199,16 @@ class _Surveyor:
             "invalid": list(invalid_variations(operation, usual)),
             "odd": list(odd_variations(operation, usual)),
         }
+        until = time.monotonic() + _BUDGETS * effort.budget_s
         for name, variations in groups.items():
             standard = max(_MOST[name], round(_LEAST[name] / effort.factor))
             for one in effort.draw(variations, standard, f"{seed}/{name} {operation.label}"):
                 if operation.label in self.given_up:
                     return
-                self.send(operation, one)
+                if time.monotonic() > until:
+                    self.cut_short(f"survey of {operation.label}")
+                else:
+                    self.send(operation, one)
         self.send(operation, Variation(Kind.AGAIN, "", "", usual))
 
 
@@ -262,7 +277,11 @@ def generated_requests(api: RestInterface, values: Values, explore: Explorer) ->
         if operation is None:
             continue
         cases = list(target.covering())
+        until = time.monotonic() + _BUDGETS * run.effort.budget_s
         for case in run.effort.draw(cases, _COVERAGE, f"{run.seed}/coverage {target.label}"):
+            if time.monotonic() > until:
+                surveyor.cut_short(f"generated requests of {target.label}")
+                continue
             _send_case(surveyor, operation, case)
         if run.effort.name == "quick" or run.effort.slow or not target.has_input:
             continue

@@ -1,4 +1,7 @@
-"""Requests for one operation that differ from its usual request in one thing, valid and invalid ones."""
+"""Requests for one operation that differ from its usual request in one thing, valid and invalid ones.
+
+Over 300 lines because one table of variations is read as a whole.
+"""
 
 from __future__ import annotations
 
