@@ -17,7 +17,13 @@ UNRESOLVED_NAME: Final = "unresolved.json"
 TITLE: Final = "its own description"
 _CLASSES: Final = ("description", "robustness", "http")
 # The class `description` judges these of each operation, and tells what operations have in common once.
-_WITHOUT: Final = ("http/declared-status", "http/declared-body", "http/json-integers", "http/no-traceback")
+# An unknown method might act.
+_WITHOUT: Final = (
+    "http/declared-status", "http/declared-body", "http/json-integers", "http/no-traceback", "http/unknown-method",
+    "http/unknown-method-refused",
+)  # fmt: skip
+# Formats in which one value can be written.
+_DATA: Final = re.compile(r"[/+](?:x-)?(?:json|xml|yaml)\b")
 _NO_NAME: Final = re.compile(r"[^a-z0-9]+")
 
 
@@ -60,7 +66,7 @@ def write_described_pack(
 
 
 def _formats(document: Mapping[str, Any]) -> tuple[set[str], set[str]]:
-    """Return the media types that the operations take, and those of the 2xx responses of one operation, if several."""
+    """Return the media types that the operations take, and the formats of data that one of them sends, if several."""
     taken: set[str] = set()
     sent: set[str] = set()
     for item in document.get("paths", {}).values():
@@ -70,7 +76,7 @@ def _formats(document: Mapping[str, Any]) -> tuple[set[str], set[str]]:
             taken |= _content(operation.get("requestBody"))
             responses = operation.get("responses")
             for status, response in responses.items() if isinstance(responses, dict) else ():
-                formats = _content(response) if str(status).startswith("2") else set()
+                formats = {name for name in _content(response) if str(status)[0] == "2" and _DATA.search(name)}
                 sent = max(sent, formats, key=len)
     return taken, sent
 

@@ -6,12 +6,14 @@ import json
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from os.path import normpath
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urljoin, urlsplit
 
 import yaml
 
+from conformance.documents.description_faults import unresolved
 from conformance.documents.json_schema import Schema, UnresolvedError
 from conformance.documents.overlay import OverlayError, overlaid
 from conformance.documents.swagger import as_openapi_3
@@ -72,15 +74,30 @@ def read_description(source: str, load: Load, overlays: Iterable[str] = ()) -> D
     version = str(original.get("openapi") or original.get("swagger") or "")
     if version.startswith("2."):
         try:
-            document = as_openapi_3(document) | {key: document[key] for key in (FILES,) if key in document}
+            document = as_openapi_3(document)
         except (UnresolvedError, AttributeError, TypeError, KeyError) as error:
             raise DescriptionError(f"{source} is no usable Swagger 2.0 description: {error!r}") from error
     elif not version.startswith("3."):
         raise DescriptionError(f"{source} is no OpenAPI description: it has neither 'openapi: 3...' nor 'swagger: 2.0'")
     if not isinstance(document.get("paths"), dict):
         raise DescriptionError(f"{source} describes no operation: it has no 'paths'")
+    broken = unresolved(document)
+    document = _without(document, frozenset(broken)) if broken else document
     base_url, remarks = _base_url(source, document)
-    return Description(source, document, original, base_url, tuple(bundle.unresolved), remarks)
+    return Description(source, document, original, base_url, (*bundle.unresolved, *broken), remarks)
+
+
+def _without(value: Any, broken: frozenset[str]) -> Any:
+    """Return a value without the references that lead nowhere, so that the rest can be used."""
+    if isinstance(value, list):
+        return [_without(item, broken) for item in value if not _refers(item, broken)]
+    if not isinstance(value, dict):
+        return value
+    return {key: {} if _refers(item, broken) else _without(item, broken) for key, item in value.items()}
+
+
+def _refers(value: Any, broken: frozenset[str]) -> bool:
+    return isinstance(value, dict) and isinstance(value.get("$ref"), str) and value["$ref"] in broken
 
 
 def is_url(source: str) -> bool:
@@ -99,7 +116,7 @@ def _parsed(source: str, load: Load) -> Schema:
         # YAML is read through JSON, so that its dates become the texts that a device can be sent.
         document = json.loads(text) if text.lstrip().startswith("{") else yaml.load(text, _LOADER)  # noqa: S506 - a safe one
         plain = json.loads(json.dumps(document, default=str))
-    except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
+    except (OSError, ValueError, TypeError, yaml.YAMLError, RecursionError) as error:
         raise DescriptionError(f"{source} cannot be read: {error}") from error
     if not isinstance(plain, dict):
         raise DescriptionError(f"{source} is no description: it holds no object")
@@ -139,11 +156,11 @@ class _Bundle:
         file, _, pointer = reference.partition("#")
         if not file:
             return f"{root}{pointer}"
-        target = urljoin(location, file) if is_url(location) else str(Path(location).parent / file)
+        target = urljoin(location, file) if is_url(location) else normpath(Path(location).parent / file)
         if is_url(location) and urlsplit(target).netloc != urlsplit(location).netloc:
             self.unresolved.append(f"{reference}: another server's file is not fetched")
             return None
-        if target == self.source:
+        if target == (self.source if is_url(self.source) else normpath(self.source)):
             return f"#{pointer}"
         if target not in self.numbers:
             if len(self.numbers) >= _MOST_FILES or is_url(target) != is_url(location):
@@ -154,32 +171,42 @@ class _Bundle:
                 other = _parsed(target, self.load)
             except DescriptionError as error:
                 self.unresolved.append(f"{reference}: {error}")
-                self.files[number] = {}
             else:
                 self.files[number] = {}
                 self.files[number] = self._walked(other, target, f"#/{FILES}/{number}")
+        if self.numbers[target] not in self.files:
+            return None
         return f"#/{FILES}/{self.numbers[target]}{pointer}"
 
 
 def _base_url(source: str, document: Schema) -> tuple[str, tuple[str, ...]]:
     """Return the URL below which the operations are, and a remark where the description names another server."""
-    servers = document.get("servers")
-    first = servers[0] if isinstance(servers, list) and servers and isinstance(servers[0], dict) else {}
-    variables = first.get("variables", {}) if isinstance(first.get("variables"), dict) else {}
+    given = document.get("servers")
+    servers = [one for one in given if isinstance(one, dict)] if isinstance(given, list) else []
+    urls = [_with_defaults(one) for one in servers] or ["/"]
+    if not is_url(source):
+        wholes = [f"http:{url}" if url.startswith("//") else url for url in urls]
+        return next(filter(is_url, wholes), "").rstrip("/"), ()
+    wholes = [urljoin(source, url) for url in urls]
+    same = [one for one in wholes if urlsplit(one)[:2] == urlsplit(source)[:2]]
+    if same:
+        return same[0].rstrip("/"), ()
+    parts = urlsplit(source)
+    here = f"{parts.scheme}://{parts.netloc}{urlsplit(wholes[0]).path}".rstrip("/")
+    remark = (
+        f"The description names the server {wholes[0]}. Tested was {here}, from where it was read; --base-url changes "
+        "that."
+    )
+    return here, (remark,)
+
+
+def _with_defaults(server: Schema) -> str:
+    """Return a server's URL with the defaults of its variables."""
+    given = server.get("variables")
+    variables = given if isinstance(given, dict) else {}
 
     def default(found: re.Match[str]) -> str:
         variable = variables.get(found[1], {})
         return str(variable.get("default", "")) if isinstance(variable, dict) else ""
 
-    url = _VARIABLE.sub(default, str(first.get("url", "/")))
-    if not is_url(source):
-        return (url.rstrip("/"), ()) if is_url(url) else ("", ())
-    whole = urljoin(source, url)
-    if urlsplit(whole).netloc == urlsplit(source).netloc:
-        return whole.rstrip("/"), ()
-    parts = urlsplit(source)
-    here = f"{parts.scheme}://{parts.netloc}{urlsplit(whole).path}".rstrip("/")
-    remark = (
-        f"The description names the server {whole}. Tested was {here}, from where it was read; --base-url changes that."
-    )
-    return here, (remark,)
+    return _VARIABLE.sub(default, str(server.get("url", "/")))

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, cast
+from urllib.parse import unquote
 
 import jsonschema_rs
 
@@ -34,11 +35,12 @@ def pointed(document: Schema, reference: str) -> Any:
     if not reference.startswith("#/"):
         raise UnresolvedError(f"$ref {reference!r} is not local")
     value: Any = document
-    for part in reference[2:].split("/"):
+    for part in unquote(reference[2:]).split("/"):
         name = part.replace("~1", "/").replace("~0", "~")
-        if not isinstance(value, dict) or name not in value:
-            raise UnresolvedError(f"$ref {reference!r} leads nowhere")
-        value = value[name]
+        try:
+            value = value[int(name)] if isinstance(value, list) else value[name]
+        except (KeyError, IndexError, ValueError, TypeError) as error:
+            raise UnresolvedError(f"$ref {reference!r} leads nowhere") from error
     return value
 
 
@@ -71,8 +73,15 @@ def modern(schema: Any) -> Any:
     if not isinstance(schema, dict):
         return schema
     result = {key: modern(item) for key, item in schema.items()}
-    if result.pop("nullable", None) is True:
+    if isinstance(result.get("nullable"), bool) and result.pop("nullable"):
         result = _with_null(result)
+    if (
+        isinstance(result.get("discriminator"), dict)
+        and isinstance(result.get("oneOf"), list)
+        and "anyOf" not in result
+    ):
+        # The discriminator says which alternative is meant, even if others allow the value as well (3.1, 4.8.25).
+        result["anyOf"] = result.pop("oneOf")
     for bound, exclusive in (("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum")):
         if isinstance(result.get(exclusive), bool) and result.pop(exclusive) and bound in result:
             result[exclusive] = result.pop(bound)

@@ -1,4 +1,7 @@
-"""The operations of a contract, from its OpenAPI description."""
+"""The operations of a contract, from its OpenAPI description.
+
+Over 300 lines because the operations and the reader of each of their parts belong together.
+"""
 
 import re
 from dataclasses import dataclass, field
@@ -49,11 +52,13 @@ class Body:
         media_type: without parameters.
         schema: of the value.
         examples: example values (text for XML) in the description; may be empty.
+        encoding: style and explode of the members of a form, where the description says them.
     """
 
     media_type: str
     schema: Schema
     examples: tuple[Any, ...] = ()
+    encoding: dict[str, tuple[str, bool]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +195,9 @@ def _operation(
         template=path,
         parameters=tuple(_parameter(item) for item in parameters),
         bodies={
-            name: Body(name, modern(content.get("schema", {})), _examples(content))
+            name: Body(
+                name, _without(modern(content.get("schema", {})), "readOnly"), _examples(content), _encoding(content)
+            )
             for name, content in _by_media_type(body).items()
         },
         body_required=bool(body.get("required", False)),
@@ -213,22 +220,37 @@ def _operation(
 
 def _answer(schema: Any, *, closed: bool) -> Schema:
     """Return the schema of a response body: as it is if ``closed``, but without members that only requests have."""
-    answer: Schema = _readable(modern(schema)) if closed else opened(modern(schema))
+    answer: Schema = _without(modern(schema), "writeOnly") if closed else opened(modern(schema))
     return answer
 
 
-def _readable(schema: Any) -> Any:
-    """Return a schema in which no ``writeOnly`` member is required (OpenAPI 3.0, 4.7.24.2)."""
+def _without(schema: Any, mark: str) -> Any:
+    """Return a schema in which no member with this mark is required (readOnly, writeOnly; OpenAPI 3.0, 4.7.24.2)."""
     if isinstance(schema, list):
-        return [_readable(item) for item in schema]
+        return [_without(item, mark) for item in schema]
     if not isinstance(schema, dict):
         return schema
-    result = {key: _readable(item) for key, item in schema.items()}
+    result = {key: _without(item, mark) for key, item in schema.items()}
     properties, required = result.get("properties"), result.get("required")
     if isinstance(properties, dict) and isinstance(required, list):
-        written = {name for name, part in properties.items() if isinstance(part, dict) and part.get("writeOnly")}
-        result["required"] = [name for name in required if name not in written]
+        marked = _marked(properties, mark)
+        result["required"] = [name for name in required if name not in marked]
+    if isinstance(properties, dict) and mark == "readOnly":
+        # A device ignores such a member of a request, whatever its value.
+        result["properties"] = {**properties, **{name: {"readOnly": True} for name in _marked(properties, mark)}}
     return result
+
+
+def _marked(properties: dict[str, Any], mark: str) -> set[str]:
+    return {name for name, part in properties.items() if isinstance(part, dict) and part.get(mark) is True}
+
+
+def _encoding(content: dict[str, Any]) -> dict[str, tuple[str, bool]]:
+    """Return style and explode of the members of a form (OpenAPI 3.1, 4.8.15.1)."""
+    return {
+        name: (style := given.get("style", "form"), bool(given.get("explode", style == "form")))
+        for name, given in content.get("encoding", {}).items()
+    }
 
 
 def _headers(response: dict[str, Any]) -> dict[str, tuple[bool, Schema]]:

@@ -203,10 +203,15 @@ def flat(schema: Schema) -> Schema:
     result = {key: item for key, item in schema.items() if key not in _COMBINING}
     for part in parts:
         inner = flat(part)
+        properties = {**inner.get("properties", {}), **result.get("properties", {})}
+        for name in inner.get("properties", {}).keys() & result.get("properties", {}).keys():
+            one, other = inner["properties"][name], result["properties"][name]
+            # Of a member that several parts name, all of them hold.
+            properties[name] = one if one == other else {"allOf": [other, one]}
         result = {
             **inner,
             **result,
-            "properties": {**inner.get("properties", {}), **result.get("properties", {})},
+            "properties": properties,
             "required": [*inner.get("required", ()), *result.get("required", ())],
         }
         if not result["properties"]:

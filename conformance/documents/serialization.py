@@ -1,5 +1,6 @@
 """Write parameters and form bodies as OpenAPI's styles say (OpenAPI 3.1, 4.8.12.2 and 4.8.15.1)."""
 
+from collections.abc import Mapping
 from typing import Any
 from urllib.parse import quote, urlencode
 
@@ -16,6 +17,8 @@ def path_text(value: Any, style: str = "simple", name: str = "", *, explode: boo
     if style == "label":
         return "." + ("." if explode else ",").join(texts)
     if style == "matrix":
+        if explode and isinstance(value, dict):
+            return "".join(f";{text}" for text in texts)
         many = isinstance(value, list) and explode
         return "".join(f";{name}={text}" for text in texts) if many else f";{name}={','.join(texts)}"
     return ",".join(texts)
@@ -46,9 +49,13 @@ def header_text(value: Any, *, explode: bool = False) -> str:
     return ",".join(_members(value, "=" if explode else ","))
 
 
-def form_body(value: dict[str, Any]) -> bytes:
-    """Return the members of an object as ``application/x-www-form-urlencoded``."""
-    return urlencode([pair for name, item in value.items() for pair in query_pairs(name, item)]).encode()
+def form_body(value: dict[str, Any], encoding: Mapping[str, tuple[str, bool]]) -> bytes:
+    """Return the members of an object as ``application/x-www-form-urlencoded``; encoding: their style and explode."""
+    pairs: list[tuple[str, str]] = []
+    for name, item in value.items():
+        style, explode = encoding.get(name, ("form", True))
+        pairs += query_pairs(name, item, style, explode=explode)
+    return urlencode(pairs).encode()
 
 
 def multipart_body(value: dict[str, Any]) -> tuple[str, bytes]:

@@ -51,14 +51,16 @@ def as_openapi_3(document: Schema) -> Schema:
     found["paths"] = {
         path: _path_item(document, item) for path, item in document.get("paths", {}).items() if path.startswith("/")
     }
-    return found | {key: value for key, value in document.items() if key.startswith("x-")}
+    return found | {key: _renamed(value) for key, value in document.items() if key.startswith("x-")}
 
 
 def _servers(document: Schema) -> list[Schema]:
     host, base = document.get("host"), document.get("basePath", "")
     if not host:
         return [{"url": base}] if base else []
-    return [{"url": f"{scheme}://{host}{base}"} for scheme in document.get("schemes", ["http"])]
+    # Without schemes, the scheme is that by which the description was fetched.
+    schemes = [f"{scheme}:" for scheme in document.get("schemes", ())] or [""]
+    return [{"url": f"{scheme}//{host}{base}"} for scheme in schemes]
 
 
 def _scheme(given: Schema) -> Schema:
@@ -68,6 +70,7 @@ def _scheme(given: Schema) -> Schema:
 
 
 def _path_item(document: Schema, item: Schema) -> Schema:
+    item = _followed(document, item)
     shared = [_followed(document, one) for one in item.get("parameters", [])]
     found = {key: value for key, value in item.items() if key.startswith("x-")}
     for method in _METHODS:
@@ -119,23 +122,31 @@ def _parameter(given: Schema) -> Schema:
     found = {key: value for key, value in given.items() if key not in _OF_SCHEMA and key != "collectionFormat"}
     found["schema"] = _schema_of(given)
     if given.get("type") == "array":
-        style, explode = _COLLECTIONS.get(given.get("collectionFormat", "csv"), ("form", False))
-        found |= {"explode": explode} if given["in"] in {"path", "header"} else {"style": style, "explode": explode}
+        written = _collection(given)
+        found |= {"explode": written["explode"]} if given["in"] in {"path", "header"} else written
     if "x-example" in given:
         found["example"] = given["x-example"]
     return found
 
 
+def _collection(given: Schema) -> Schema:
+    style, explode = _COLLECTIONS.get(given.get("collectionFormat", "csv"), ("form", False))
+    return {"style": style, "explode": explode}
+
+
 def _form(fields: list[Schema], consumes: Any) -> Schema:
-    is_multipart = any(one.get("type") == "file" for one in fields) or _MULTIPART in consumes
+    is_multipart = any(one.get("type") == "file" for one in fields) or (
+        _MULTIPART in consumes and _FORM not in consumes
+    )
     schema = {
         "type": "object",
         "properties": {one["name"]: _schema_of(one) for one in fields},
         "required": [one["name"] for one in fields if one.get("required")],
     }
+    encoding = {one["name"]: _collection(one) for one in fields if one.get("type") == "array"}
     return {
         "required": bool(schema["required"]),
-        "content": {_MULTIPART if is_multipart else _FORM: {"schema": schema}},
+        "content": {_MULTIPART if is_multipart else _FORM: {"schema": schema, "encoding": encoding}},
     }
 
 
@@ -145,7 +156,11 @@ def _response(given: Schema, produces: Any) -> Schema:
         schema = given["schema"]
         is_file = schema.get("type") == "file"
         plain = {"type": "string", "format": "binary"} if is_file else _renamed(schema)
-        found["content"] = {name: {"schema": plain} for name in (produces or _JSON)}
+        examples = given.get("examples", {})
+        found["content"] = {
+            name: {"schema": plain, **({"example": examples[name]} if name in examples else {})}
+            for name in (produces or _JSON)
+        }
     found["headers"] = {name: {"schema": _schema_of(header)} for name, header in given.get("headers", {}).items()}
     return found
 

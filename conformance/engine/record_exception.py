@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import NoAnswerError, NotPermittedError
-from conformance.verdict.evidence import RefutedError
+from conformance.verdict.evidence import HarnessError, RefutedError
 from conformance.verdict.finding import Finding
 from conformance.verdict.run import Run
 
@@ -20,7 +20,9 @@ def record_exception(
     """
     if isinstance(error, RefutedError):
         return
-    if isinstance(error, NotPossibleError | NotPermittedError):
+    # A description may be such that no valid request can be made from it.
+    unmade = isinstance(error, HarnessError) and run.contract.described
+    if isinstance(error, NotPossibleError | NotPermittedError) or unmade:
         for id_ in ids:
             run.judge.skip(id_, str(error))
         return

@@ -12,7 +12,7 @@ from typing import TextIO
 from conformance.api.device import Device, device_of
 from conformance.api.interfaces import Interfaces
 from conformance.api.permission import Permission
-from conformance.api.rest.interface import RestInterface, plain_path
+from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.operation_log import OperationLog
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
@@ -207,7 +207,7 @@ class RobotUnderTest:
         """Return a client and a path for each interface that responded at the start."""
         found: list[tuple[HttpClient, str]] = []
         if self.rest is not None and Interface.REST not in self.run.unreachable:
-            found.append((self.rest.client, plain_path(self.run.contract)))
+            found.append((self.rest.client, self.rest.path))
         found += [
             (service.client, service.path)
             for name, service in self.soap.there.items()

@@ -1,7 +1,11 @@
-"""The survey of a described API: each operation that may be called is sent valid, invalid and odd requests."""
+"""The survey of a described API: each operation that may be called is sent valid, invalid and odd requests.
+
+Over 300 lines because the survey and the generated requests share one surveyor.
+"""
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Final
@@ -29,10 +33,15 @@ _MOST: Final = {"valid": 60, "invalid": 60, "odd": 40}
 _LEAST: Final = {"valid": 40, "invalid": 20, "odd": 12}
 # Valid requests of an operation that changes something: each leaves something behind.
 _ACTING: Final = 12
+# Statuses of an operation that is not there.
+_NOT_FOUND: Final = 404
+_NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
 # How often one request is sent again and again; and cases of Schemathesis, as many of each kind, of one operation.
 _REPEATS: Final = 200
 _FEWEST_REPEATS: Final = 60
 _COVERAGE: Final = 150
+# As many times an exploration's time one operation may take: one that answers slowly must not take the whole run.
+_BUDGETS: Final = 3
 _FUZZED: Final = 40
 
 
@@ -95,6 +104,16 @@ class Survey:
         """Return the probes of one operation, of these kinds or of all."""
         return [one for one in self.probes if one.operation == operation and (not kinds or one.kind in kinds)]
 
+    def lacks(self, operation: Operation) -> bool:
+        """Return whether the device answered each usual request as if it did not have the operation.
+
+        A declared 404, or one for an identifier in the path, says that something else is not there.
+        """
+        named = bool(operation.parameter("path") or {"404", "4XX", "4xx"} & operation.responses.keys())
+        absent = _NOT_THERE - {_NOT_FOUND} if named else _NOT_THERE
+        usual = self.of(operation.label, Kind.USUAL)
+        return bool(usual) and all(one.status in absent for one in usual)
+
 
 @dataclass
 class _Surveyor:
@@ -120,6 +139,7 @@ class _Surveyor:
             unanswered = none.unanswered
             if none.kind in {NoAnswer.TIMEOUT, NoAnswer.CIRCUIT_OPEN}:
                 self.given_up.add(operation.label)
+                self.api.streams.add(operation.label)
             self.record(Probe(operation.label, variation.kind, variation.says, variation.place, None, unanswered))
             if not self.api.alive():
                 raise PartialTraceError(Survey(tuple(self.probes))) from none
@@ -150,6 +170,11 @@ class _Surveyor:
             if operation.label in self.given_up:
                 return
 
+    def cut_short(self, what: str) -> None:
+        """Count a request that time did not allow."""
+        told = self.api.run.cut_short
+        told[what] = told.get(what, 0) + 1
+
     def _note_working(self, operation: Operation, inputs: Inputs) -> None:
         """Keep a request that was answered 2xx for other checks, if its values are plain texts and numbers."""
         values = {**inputs.path, **inputs.query}
@@ -168,12 +193,16 @@ class _Surveyor:
             "invalid": list(invalid_variations(operation, usual)),
             "odd": list(odd_variations(operation, usual)),
         }
+        until = time.monotonic() + _BUDGETS * effort.budget_s
         for name, variations in groups.items():
             standard = max(_MOST[name], round(_LEAST[name] / effort.factor))
             for one in effort.draw(variations, standard, f"{seed}/{name} {operation.label}"):
                 if operation.label in self.given_up:
                     return
-                self.send(operation, one)
+                if time.monotonic() > until:
+                    self.cut_short(f"survey of {operation.label}")
+                else:
+                    self.send(operation, one)
         self.send(operation, Variation(Kind.AGAIN, "", "", usual))
 
 
@@ -232,7 +261,9 @@ def generated_requests(api: RestInterface, values: Values, explore: Explorer) ->
     from conformance.api.rest.generated import targets  # noqa: PLC0415
 
     run = api.run
-    operations = {item.label: item for item in operations_of(run.contract) if allowed(api, item)}
+    operations = {
+        item.label: item for item in operations_of(run.contract) if allowed(api, item) and item.label not in api.streams
+    }
     surveyor = _Surveyor(api, values)
 
     for target in targets(run.contract):
@@ -240,7 +271,11 @@ def generated_requests(api: RestInterface, values: Values, explore: Explorer) ->
         if operation is None:
             continue
         cases = list(target.covering())
+        until = time.monotonic() + _BUDGETS * run.effort.budget_s
         for case in run.effort.draw(cases, _COVERAGE, f"{run.seed}/coverage {target.label}"):
+            if time.monotonic() > until:
+                surveyor.cut_short(f"generated requests of {target.label}")
+                continue
             _send_case(surveyor, operation, case)
         if run.effort.name == "quick" or run.effort.slow or not target.has_input:
             continue

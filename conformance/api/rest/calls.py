@@ -10,6 +10,7 @@ from urllib.parse import quote
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
+from conformance.api.rest.values import sample
 from conformance.documents.json_schema import Schema, kind_of
 from conformance.documents.openapi import SAFE, Operation
 from conformance.documents.representation import flat
@@ -122,9 +123,10 @@ def example_call(api: RestInterface, operation: Operation, media_type: str = JSO
 
 def _example(api: RestInterface, operation: Operation, media_type: str) -> Call:
     given: dict[str, Any] = {}
+    made = sample if api.run.contract.described else minimal
     for item in operation.parameters:
         if item.where in {"path", "query"} and (item.required or item.examples):
-            given[item.name] = item.examples[0] if item.examples else minimal(item.schema)
+            given[item.name] = item.examples[0] if item.examples else made(item.schema)
     if given:
         given = _fitted(api, operation, given)
     call = Call(operation, {name: text_of(value) for name, value in given.items()})
@@ -132,7 +134,7 @@ def _example(api: RestInterface, operation: Operation, media_type: str) -> Call:
         return call
     body = operation.bodies.get(JSON) or next(iter(operation.bodies.values()))
     plain = [item for item in body.examples if not isinstance(item, str)]
-    value = _fitted(api, operation, plain[0] if plain else minimal(body.schema))
+    value = _fitted(api, operation, plain[0] if plain else made(body.schema))
     if media_type == XML:
         octets = xml_bytes(value, root_name(operation.bodies[XML].schema) or "value")
     else:

@@ -98,7 +98,8 @@ def _body(operation: Operation, inputs: Inputs) -> tuple[str, bytes]:
     if isinstance(value, bytes):
         return media_type, value
     if media_type == FORM and isinstance(value, dict):
-        return media_type, form_body(value)
+        encoding = operation.bodies[media_type].encoding if media_type in operation.bodies else {}
+        return media_type, form_body(value, encoding)
     if media_type == MULTIPART and isinstance(value, dict):
         return multipart_body(value)
     if is_xml(media_type):
@@ -112,10 +113,10 @@ def _body(operation: Operation, inputs: Inputs) -> tuple[str, bytes]:
 def usual_inputs(operation: Operation, values: Values) -> list[Inputs]:
     """Return inputs of valid requests with what is required and nothing else, the most promising first."""
     base = Inputs()
-    chosen = {item.name: values.of(operation, item) for item in operation.parameters if item.required}
-    for item in operation.parameters:
-        if item.required and chosen[item.name]:
-            base = base.having(item.where, item.name, chosen[item.name][0])
+    chosen = [(item, values.of(operation, item)) for item in operation.parameters if item.required]
+    for item, known in chosen:
+        if known:
+            base = base.having(item.where, item.name, known[0])
     bodies: list[tuple[str, Any]] = []
     for name, body in list(operation.bodies.items())[:1] if operation.bodies else []:
         found = values.body(body.schema, body.examples)
@@ -123,8 +124,8 @@ def usual_inputs(operation: Operation, values: Values) -> list[Inputs]:
     if bodies:
         base = replace(base, media_type=bodies[0][0], body=bodies[0][1])
     found = [base]
-    for item in operation.parameters:
-        found += [base.having(item.where, item.name, one) for one in chosen.get(item.name, [])[1:]]
+    for item, known in chosen:
+        found += [base.having(item.where, item.name, one) for one in known[1:]]
     found += [replace(base, body=value) for _, value in bodies[1:]]
     return found
 

@@ -49,24 +49,24 @@ class RestInterface:
     @property
     def path(self) -> str:
         """A path for GET without parameters."""
-        return plain_path(self.run.contract)
+        return plain_path(self.run.contract, self.call_rules)
 
 
-def plain_path(contract: Contract) -> str:
+def plain_path(contract: Contract, rules: CallRules) -> str:
     """Return a path of the contract for GET without parameters, to check whether a robot responds."""
     if contract.described:
-        return _described_path(contract)
+        return _described_path(contract, rules)
     for path, operations in contract.openapi.get("paths", {}).items():
         if "get" in operations and "{" not in path and not operations["get"].get("x-roaas-optional"):
             return str(path)
     return "/"
 
 
-def _described_path(contract: Contract) -> str:
-    """Return a path for GET without required parameters, which harms nothing and does not stream; else "/"."""
+def _described_path(contract: Contract, rules: CallRules) -> str:
+    """Return a path for GET without required parameters, harmless and without a stream; "/" if there is none."""
     for operation in operations_of(contract):
         required = any(item.required for item in operation.parameters)
         streams = any(name.startswith(("text/event-stream", "multipart/", "video/")) for name in operation.formats)
-        if operation.method == "GET" and not required and not streams and CallRules().decide(operation).may:
+        if operation.method == "GET" and not required and not streams and rules.decide(operation).may:
             return operation.template
     return "/"

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Final
 
-from conformance.api.rest.inputs import NOTHING, Inputs
+from conformance.api.rest.inputs import FORM, MULTIPART, NOTHING, Inputs
 from conformance.api.rest.values import fits, sample
 from conformance.api.rest.variations import DEPTH, LONG, UNKNOWN, Kind, Variation, place_of, shown, with_member
 from conformance.documents.json_schema import Schema, kinds_of
@@ -29,17 +29,25 @@ def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
             yield Variation(
                 Kind.INVALID, f"{shown(value)} as {place}, {why}", place, usual.having(item.where, item.name, value)
             )
+    if usual.media_type in {FORM, MULTIPART} and isinstance(usual.body, dict):
+        for name in operation.bodies[usual.media_type].schema.get("required", ()):
+            less = {key: item for key, item in usual.body.items() if key != name}
+            yield Variation(Kind.MISSING, f"no field {name}", f"body /{name}", replace(usual, body=less))
     if not is_json(usual.media_type) or usual.media_type not in operation.bodies:
         return
     body = operation.bodies[usual.media_type]
     if operation.body_required:
         yield Variation(Kind.MISSING, "no body", "body", replace(usual, body=b""))
-    cut = Variation(Kind.MALFORMED, "a body that is not JSON", "body", replace(usual, body=b'{"roaas": '))
-    yield cut
+    yield Variation(Kind.MALFORMED, "a body that is not JSON", "body", replace(usual, body=b'{"roaas": '))
+    # RFC 8259 8.1: JSON is UTF-8.
+    not_utf8 = replace(usual, body=b'{"roaas": "\xff\xfe"}')
+    yield Variation(Kind.MALFORMED, "a body that is not UTF-8", "body", not_utf8)
     if "object" in kinds_of(body.schema) and len(kinds_of(body.schema)) == 1:
         yield Variation(Kind.INVALID, "a list instead of an object", "body", replace(usual, body=[]))
     if isinstance(usual.body, dict):
-        yield from _invalid_members(usual, usual.body, body.schema, ())
+        # What one alternative of a union forbids, another one may allow.
+        found = _invalid_members(usual, usual.body, body.schema, ())
+        yield from (one for one in found if not fits(body.schema, one.inputs.body))
 
 
 def _invalid_members(usual: Inputs, value: Any, schema: Schema, steps: tuple[str, ...]) -> Iterator[Variation]:

@@ -105,7 +105,8 @@ def _of_query(operation: Operation, query: str) -> list[_Said]:
     for name, item in known.items():
         if name in texts:
             said.append(_of_text(item, texts[name], "query-parameter"))
-        elif item.required:
+        elif item.required and "object" not in kinds_of(item.schema):
+            # An object may be written as its members.
             said.append((INVALID, "query-missing", f"no parameter {name}"))
     return said
 

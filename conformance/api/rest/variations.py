@@ -1,4 +1,7 @@
-"""Requests for one operation that differ from its usual request in one thing, valid and invalid ones."""
+"""Requests for one operation that differ from its usual request in one thing, valid and invalid ones.
+
+Over 300 lines because one table of variations is read as a whole.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Final
 
-from conformance.api.rest.inputs import NOTHING, Inputs, whole_body
+from conformance.api.rest.inputs import FORM, MULTIPART, NOTHING, Inputs, whole_body
 from conformance.api.rest.values import Values, fits, sample
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.openapi import Operation, Parameter, is_json

@@ -11,7 +11,7 @@ import jsonschema_rs
 
 from conformance.api.rest.variations import Kind
 from conformance.documents.json_schema import Schema, kinds_of, shape_of
-from conformance.documents.json_text import read_json
+from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.rules.told_once import Fault, told_once, without_numbers
 from conformance.scenarios.rule import Outcome, rule
@@ -27,6 +27,7 @@ _ANY_TIME = frozenset(
 # ... and these, unless the request was the operation's usual one.
 _OF_REQUEST = frozenset({405, 406, 415, 501})
 _CRASHES = frozenset({500, 502, 504})
+_FORMAT = re.compile(r'"format": "([^"]+)"')
 _BAD_REQUEST, _NO_CONTENT = 400, 204
 _PLAIN = frozenset({Kind.USUAL, Kind.AGAIN, Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL})
 
@@ -57,10 +58,11 @@ def _in_question(probe: Probe, status: int) -> bool:
 @rule("description/status-declared", on=_ON)
 def status_declared(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether each status is declared for its operation; a crash is another requirement's affair."""
+    lacking = {item.label for item in operations_of(run.contract) if trace.lacks(item)}
     judged = {
         id(probe): (operation, answer)
         for probe, operation, answer in _answered(trace, run)
-        if _in_question(probe, answer.status) and answer.status not in _CRASHES
+        if _in_question(probe, answer.status) and answer.status not in _CRASHES and probe.operation not in lacking
     }
 
     def fault(probe: Probe) -> Fault | None:
@@ -129,8 +131,8 @@ def formats(trace: Survey, run: Run) -> Iterable[Outcome]:
 
     def fault(probe: Probe) -> Fault | None:
         schema, answer = judged[id(probe)]
-        wrong = _unformatted(schema, answer)
-        return Fault(without_numbers(wrong), wrong) if wrong else None
+        wrong, wanted = _unformatted(schema, answer)
+        return Fault(wanted, wrong) if wrong else None
 
     yield from told_once((one for one in trace.probes if id(one) in judged), "strings of the declared format", fault)
 
@@ -174,14 +176,18 @@ def _formatted(key: int, text: str) -> Any:  # noqa: ARG001 - the text keeps the
 _SCHEMAS: dict[int, Schema] = {}
 
 
-def _unformatted(schema: Schema, answer: Response) -> str:
-    """Return the first string that does not have its declared format."""
+def _unformatted(schema: Schema, answer: Response) -> tuple[str, str]:
+    """Return the first string that does not have its declared format with its place, and the format; or empty."""
     _SCHEMAS[id(schema)] = schema
     error = next(iter(_formatted(id(schema), _text(schema)).iter_errors(read_json(answer.body).value)), None)
     if error is None:
-        return ""
+        return "", ""
     place = "/".join("*" if isinstance(part, int) else part for part in error.instance_path)
-    return f"{error.message[:200]} at /{place}"
+    rule: Any = schema
+    for step in error.schema_path[:-1]:
+        rule = rule[step]
+    wanted = " or ".join(sorted(set(_FORMAT.findall(_text(rule))))) or "value of the declared format"
+    return f"{shown(error.instance)} at /{place}, which is no {wanted}", wanted
 
 
 @rule("description/headers", on=_ON)

@@ -28,8 +28,7 @@ def test_valid(run: Run, judge: Judge) -> None:
 @pytest.mark.requirement("description/references")
 def test_references(run: Run, judge: Judge) -> None:
     """Follow every reference."""
-    found = [*run.contract.unresolved, *faults.unresolved(run.contract.openapi)]
-    _tell(judge, "description/references", found, "references that lead to something")
+    _tell(judge, "description/references", list(run.contract.unresolved), "references that lead to something")
 
 
 @pytest.mark.requirement("description/ids-unique")

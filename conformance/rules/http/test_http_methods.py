@@ -1,14 +1,16 @@
 """Methods: those that a resource has, those that it lacks, and the Allow field (RFC 9110 9, 10.2.1, 15.5.6)."""
 
+from http import HTTPStatus
+
 import pytest
 
 from conformance.api.expectation import expect
 from conformance.api.permission import permitted
 from conformance.api.rest import by_hand
-from conformance.api.rest.applicable import reads
+from conformance.api.rest.applicable import allowed, reads
 from conformance.api.rest.calls import JSON, Call, example_call
 from conformance.api.rest.interface import RestInterface
-from conformance.documents.openapi import Resource, resources_of
+from conformance.documents.openapi import SAFE, Resource, resources_of
 from conformance.transport import raw
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
 from conformance.verdict.evidence import Judge
@@ -20,13 +22,20 @@ _STANDARD = ("GET", "PUT", "POST", "DELETE", "PATCH", "HEAD")
 _UNKNOWN = ("PROPFIND", "FOO")
 # How often the lengths of GET and HEAD are compared: the numbers in a resource have more digits or fewer each time.
 _LENGTHS = 8
+# As many resources are named in one finding.
+_LISTED = 12
 _ALWAYS_ALLOWED = frozenset({"HEAD", "OPTIONS", "TRACE"})
 
 
 def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
-    """Return each resource with a valid request for it, without optional resources that this robot lacks."""
+    """Return each resource with a valid request for it, without optional resources that this robot lacks.
+
+    Of an API that is known by its description alone, resources with an operation that may be called.
+    """
     found = []
     for resource in resources_of(api.run.contract):
+        if api.run.contract.described and not any(allowed(api, item) for item in resource.operations.values()):
+            continue
         first = example_call(api, next(iter(resource.operations.values())))
         # Only the address is used: a request with a body, or one that moves the robot, is never sent from here.
         call = Call(first.operation, first.values)
@@ -41,15 +50,21 @@ def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
 @pytest.mark.requirement("http/method-not-allowed", "http/allow", "http/allow-agrees")
 def test_methods_that_a_resource_has_not(api: RestInterface, judge: Judge) -> None:
     """Send to each resource each method that the contract does not define for it: the robot must respond 405."""
+    seen: list[tuple[Resource, Exchange]] = []
     for resource, call in _resources(api):
         there = {*resource.methods, *(("HEAD",) if "GET" in resource.methods else ())}
+        if api.run.contract.described:
+            # A method that the description does not have may act all the same; a safe one does not (RFC 9110 9.2.1).
+            there |= set(_STANDARD) - SAFE
         lacking = [name for name in _STANDARD if name not in there]
         sendable = permitted(api.run, api.client, lacking, call.path, "http/method-not-allowed", "http/allow")
         for method in api.run.effort.subsample(sendable, 2):
             exchange = call.send(api, method=method)
             cause = f"{method} {exchange.response.status}"
-            if expect(judge, "http/method-not-allowed", exchange).status(405, cause=cause):
-                _judge_allow(judge, "http/allow", resource, exchange)
+            refused = expect(judge, "http/method-not-allowed", exchange).status(405, cause=cause)
+            if refused and _judge_allow(judge, "http/allow", exchange):
+                seen.append((resource, exchange))
+    _judge_agreement(api, judge, seen)
 
 
 @pytest.mark.requirement("http/unknown-method", "http/unknown-method-refused")
@@ -69,37 +84,55 @@ def test_methods_that_nobody_knows(api: RestInterface, judge: Judge) -> None:
             expect(judge, "http/unknown-method", attempt).status(405, 501, cause=method)
 
 
-@pytest.mark.requirement("http/options", "http/allow-agrees", "description/allow")
+@pytest.mark.requirement("http/options", "http/allow", "http/allow-agrees", "description/allow")
 def test_options(api: RestInterface, judge: Judge) -> None:
     """Send OPTIONS to each resource and judge the Allow header."""
+    seen: list[tuple[Resource, Exchange]] = []
     for resource, call in _resources(api):
         exchange = call.send(api, method="OPTIONS")
-        if expect(judge, "http/options", exchange).status(200, 204):
-            _judge_allow(judge, "http/options", resource, exchange)
-        elif exchange.response.status == 405:
-            _judge_allow(judge, "http/allow", resource, exchange)
+        if exchange.response.status == HTTPStatus.METHOD_NOT_ALLOWED and api.run.contract.described:
+            there = _judge_allow(judge, "http/allow", exchange)
+        else:
+            expected = expect(judge, "http/options", exchange).status(200, 204)
+            there = expected and _judge_allow(judge, "http/options", exchange)
+        if there:
+            seen.append((resource, exchange))
+    _judge_agreement(api, judge, seen)
 
 
-def _judge_allow(judge: Judge, requirement: str, resource: Resource, exchange: Exchange) -> None:
-    """Judge whether Allow is there, and names what the contract gives the resource and nothing else."""
-    if not expect(judge, requirement, exchange).header("Allow"):
-        return
-    value = exchange.response.header("allow") or ""
-    named = {name.strip() for name in value.split(",")} - {""}
-    wanted = set(resource.methods) - _ALWAYS_ALLOWED
-    if judge.knows("description/allow"):
-        # What a description leaves out is its fault, and no fault of the header.
+def _judge_allow(judge: Judge, requirement: str, exchange: Exchange) -> bool:
+    """Judge whether Allow is there."""
+    return expect(judge, requirement, exchange).header("Allow")
+
+
+def _judge_agreement(api: RestInterface, judge: Judge, seen: list[tuple[Resource, Exchange]]) -> None:
+    """Judge whether each Allow names what the contract gives its resource and nothing else.
+
+    A device whose description is all that is known may have further methods; a framework that leaves methods out does
+    so for every resource, which is one finding.
+    """
+    described = api.run.contract.described
+    wrong: list[tuple[Resource, Exchange]] = []
+    for resource, exchange in seen:
+        named = {name.strip() for name in (exchange.response.header("allow") or "").split(",")} - {""}
+        wanted = set(resource.methods) - _ALWAYS_ALLOWED
         more = sorted(named - wanted - _ALWAYS_ALLOWED)
-        expect(judge, "description/allow", exchange).that(
-            not more, f"methods that are declared: {', '.join(sorted(wanted))}", f"Allow: {value}", cause=str(more)
+        declared = f"Allow with declared methods only: {', '.join(sorted(wanted))}"
+        expect(judge, "description/allow", exchange).that(not more, declared, f"{more} besides", cause=str(more))
+        if wanted <= named <= (named if described else wanted) | _ALWAYS_ALLOWED:
+            expect(judge, "http/allow-agrees", exchange).that(holds=True, expected="Allow with all methods")
+        else:
+            wrong.append((resource, exchange))
+    for resource, exchange in wrong[:1] if described else wrong:
+        wanted = set(resource.methods) - _ALWAYS_ALLOWED
+        others = [other.template for other, _ in wrong[1:]] if described else []
+        more = f". The same for {len(others)} other resources: {', '.join(others[:_LISTED])}" if others else ""
+        expect(judge, "http/allow-agrees", exchange).that(
+            holds=False,
+            expected=f"Allow: {', '.join(sorted(wanted))} (HEAD, OPTIONS and TRACE may stand beside them)",
+            got=f"Allow: {exchange.response.header('allow')}{more}",
+            cause="methods left out" if described else resource.template,
         )
-        named &= wanted | _ALWAYS_ALLOWED
-    expect(judge, "http/allow-agrees", exchange).that(
-        wanted <= named <= wanted | _ALWAYS_ALLOWED,
-        f"Allow: {', '.join(sorted(wanted))} (HEAD, OPTIONS and TRACE may stand beside them)",
-        f"Allow: {value}",
-        cause=resource.template,
-    )
 
 
 def _formats(call: Call, most: int) -> list[str]:

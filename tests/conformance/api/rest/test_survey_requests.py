@@ -1,0 +1,167 @@
+"""Usual requests are valid, each variation differs in one thing, and what is called invalid is so for any reader."""
+
+import json
+
+import pytest
+
+from conformance.api.rest.inputs import NOTHING, Inputs, usual_inputs, written
+from conformance.api.rest.values import Values, fits
+from conformance.api.rest.variations import (
+    Kind,
+    invalid_variations,
+    odd_variations,
+    unknown_variations,
+    valid_variations,
+)
+from conformance.documents.openapi import read_operations
+
+_POSE = {
+    "type": "object",
+    "required": ["x", "id"],
+    "properties": {
+        "id": {"type": "integer", "readOnly": True},
+        "x": {"type": "number", "minimum": 0, "maximum": 2},
+        "frame": {"enum": ["map", "odom"], "default": "map"},
+        "inner": {"type": "object", "required": ["y"], "properties": {"y": {"type": "string", "maxLength": 3}}},
+    },
+}
+
+
+def _operation(method="post", path="/a/{id}", parameters=(), body=None, media_type="application/json"):
+    given = {"responses": {}, "parameters": [*parameters]}
+    if body is not None:
+        given["requestBody"] = {"required": True, "content": {media_type: {"schema": body}}}
+    (found,) = read_operations({"paths": {path: {method: given}}}, closed=True)
+    return found
+
+
+def _item(name, schema, where="query", **more):
+    return {"name": name, "in": where, "schema": schema, "required": where == "path", **more}
+
+
+_MANY = _operation(
+    parameters=[
+        _item("id", {"anyOf": [{"type": "integer"}, {"type": "string"}]}, "path"),
+        _item("id", {"type": "integer", "minimum": 4}, required=True),
+        _item("n", {"type": "integer", "maximum": 9}),
+        _item("many", {"type": "array", "items": {"type": "string"}, "minItems": 2}, required=True, explode=False),
+        _item("X-H", {"type": "boolean"}, "header", required=True),
+        _item("c", {"type": "string"}, "cookie", required=True),
+    ],
+    body=_POSE,
+)
+
+
+def test_the_usual_request_has_what_is_required():
+    inputs = usual_inputs(_MANY, Values())[0]
+    request = written(_MANY, inputs)
+    assert request.target == "/a/1?id=4&many=roaas,roaas"
+    assert dict(request.headers) == {"X-H": "true", "Cookie": "c=roaas"}
+    assert json.loads(request.body) == {"x": 0}
+
+
+@pytest.mark.parametrize(
+    ("media_type", "schema", "body"),
+    [
+        ("application/x-www-form-urlencoded", {"type": "object", "example": {"a": "b c"}}, b"a=b+c"),
+        ("text/plain", {"type": "string", "example": "go"}, b"go"),
+        ("application/vnd.x+json", {"type": "integer"}, b"1"),
+        ("application/json", {"type": "string"}, b'"roaas"'),
+    ],
+)  # fmt: skip
+def test_bodies_are_written_by_their_media_types(media_type, schema, body):
+    operation = _operation(path="/a", body=schema, media_type=media_type)
+    request = written(operation, usual_inputs(operation, Values())[0])
+    assert (request.media_type, request.body) == (media_type, body)
+
+
+def _variations(operation, of):
+    return list(of(operation, usual_inputs(operation, Values())[0]))
+
+
+def test_valid_variations_fit():
+    usual = usual_inputs(_MANY, Values())[0]
+    found = list(valid_variations(_MANY, usual, Values()))
+    schema = _MANY.bodies["application/json"].schema
+    assert all(fits(schema, one.inputs.body) and one.inputs != usual for one in found)
+    assert {(one.kind, one.place) for one in found} >= {
+        (Kind.BOUND, "query n"),
+        (Kind.BOUND, "body /x"),
+        (Kind.ENUM, "body /frame"),
+        (Kind.DEFAULT, "body /frame"),
+        (Kind.OPTIONAL, "body /inner"),
+        (Kind.ENUM, "header X-H"),
+    }
+
+
+def test_invalid_variations_do_not_fit():
+    found = _variations(_MANY, invalid_variations)
+    schema = _MANY.bodies["application/json"].schema
+    bodies = [one.inputs.body for one in found if one.place.startswith("body /")]
+    assert not any(fits(schema, body) for body in bodies)
+    places = {(one.kind, one.place) for one in found}
+    assert places >= {
+        (Kind.MISSING, "query id"),
+        (Kind.INVALID, "query id"),
+        (Kind.INVALID, "query n"),
+        (Kind.MISSING, "header X-H"),
+        (Kind.MISSING, "body"),
+        (Kind.MISSING, "body /x"),
+        (Kind.INVALID, "body /x"),
+        (Kind.INVALID, "body /frame"),
+        (Kind.MALFORMED, "body"),
+    }
+    assert not any(place.rpartition("/")[2] == "id" or place == "path id" for _, place in places)
+
+
+@pytest.mark.parametrize(
+    "schema",
+    [
+        {},
+        {"type": "string"},
+        {"anyOf": [{"type": "integer"}, {"type": "string"}]},
+        {"type": ["integer", "string"]},
+        {"type": "object"},
+        {"type": "array", "items": {"type": "integer"}},
+    ],
+)
+def test_a_text_that_some_reading_allows_is_not_called_invalid(schema):
+    operation = _operation("get", parameters=[_item("id", schema, "path")])
+    assert _variations(operation, invalid_variations) == []
+
+
+def test_what_another_alternative_allows_is_not_called_invalid():
+    a, b = ({"type": "object", "required": [name], "properties": {name: {"type": "integer"}}} for name in "ab")
+    operation = _operation(path="/a", body={"anyOf": [a, b, {"type": "object", "maxProperties": 0}]})
+    assert [
+        one for one in _variations(operation, invalid_variations) if one.kind is Kind.MISSING and one.place != "body"
+    ] == []
+
+
+@pytest.mark.parametrize(
+    ("schema", "value"),
+    [
+        ({"type": "string"}, "roaas-unknown"),
+        ({"type": "integer"}, 987_654_321),
+        ({"type": "string", "format": "uuid", "pattern": "^[0-9a-f-]{36}$"}, "00000000-0000-4000-8000-000000000000"),
+        ({"type": "integer", "maximum": 3}, None),
+        ({"enum": ["a"]}, None),
+    ],
+)
+def test_identifiers_of_what_does_not_exist(schema, value):
+    found = _variations(_operation("get", parameters=[_item("id", schema, "path")]), unknown_variations)
+    assert [one.inputs.path["id"] for one in found] == ([] if value is None else [value])
+
+
+def test_odd_values_can_be_sent():
+    found = _variations(_MANY, odd_variations)
+    assert len(found) > 20
+    for one in found:
+        request = written(_MANY, one.inputs)
+        assert "/../" not in request.target
+        assert all("\r" not in value and "\n" not in value and "\x00" not in value for _, value in request.headers)
+
+
+def test_inputs_are_replaced_and_left_out():
+    inputs = Inputs(query={"a": 1}).having("query", "b", 2).having("query", "a", NOTHING).having("header", "h", 3)
+    assert (inputs.query, inputs.headers) == ({"b": 2}, {"h": 3})

@@ -1,0 +1,84 @@
+"""The survey's values fit their schemas, and what one response named is used in the next request."""
+
+import json
+
+import pytest
+
+from conformance.api.rest.values import Values, fits, sample
+from conformance.documents.json_schema import modern
+from conformance.documents.openapi import Operation, Parameter
+from conformance.transport.exchange import Exchange, Request, Response
+
+_LIST, _ONE = Operation("", "GET", "/jobs"), Operation("", "GET", "/jobs/{job_id}")
+
+
+@pytest.mark.parametrize(
+    "schema",
+    [
+        {},
+        {"type": "string", "minLength": 9, "maxLength": 9},
+        {"type": "string", "maxLength": 2},
+        {"type": "string", "pattern": "^[A-Z]{3}-[0-9]+$"},
+        {"type": "string", "format": "date-time"},
+        {"type": "string", "format": "uuid", "example": 1},
+        {"type": ["null", "integer"], "minimum": 3},
+        {"anyOf": [{"type": "null"}, {"type": "integer"}]},
+        {"anyOf": [{"type": "integer"}, {"type": "string"}]},
+        {"type": "integer", "exclusiveMinimum": 3, "multipleOf": 5},
+        {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 0.1},
+        {"type": "integer", "maximum": -4},
+        {"type": "integer", "minimum": 0, "exclusiveMinimum": True},
+        {"type": "number", "maximum": 0, "exclusiveMaximum": True},
+        {"type": "boolean"},
+        {"enum": [None, "a"]},
+        {"const": 7},
+        {"type": "array", "items": {"type": "integer"}, "minItems": 3, "uniqueItems": True},
+        {"type": "array", "prefixItems": [{"type": "integer"}, {"type": "string"}], "items": False, "minItems": 2},
+        {"type": "object", "required": ["a"], "properties": {"a": {"type": "object", "required": ["b"]}}},
+        {"allOf": [{"type": "object", "required": ["a"], "properties": {"a": {"const": 4}}}, {"required": ["c"]}]},
+        {"oneOf": [{"type": "object", "required": ["k"], "properties": {"k": {"enum": ["x"]}}}, {"type": "array"}]},
+        {"type": "object", "minProperties": 0, "additionalProperties": {"type": "string"}},
+    ],
+)  # fmt: skip
+def test_a_sample_fits_its_schema(schema):
+    schema = modern(schema)
+    for whole in (False, True):
+        value = sample(schema, whole=whole)
+        assert fits(schema, value), value
+
+
+def test_what_only_responses_have_is_not_sent():
+    part = {"type": "integer", "readOnly": True}
+    schema = {"type": "object", "required": ["id", "n"], "properties": {"id": part, "n": {"type": "integer"}}}
+    assert sample(schema) == sample(schema, whole=True) == {"n": 1}
+
+
+def _response(body, status=200, **headers):
+    fields = (("Content-Type", "application/json"), *headers.items())
+    return Exchange(Request("GET", "http://h/", (), b""), Response(status, fields, json.dumps(body).encode(), 1.0))
+
+
+@pytest.mark.parametrize(
+    ("operation", "exchange", "known"),
+    [
+        (_LIST, _response([{"id": "x"}, {"id": "y"}]), ["y", "x"]),
+        (_LIST, _response(["x", "y"]), ["y", "x"]),
+        (Operation("", "POST", "/jobs"), _response({"uuid": "x"}, 201), ["x"]),
+        (Operation("", "POST", "/jobs"), _response({}, 201, Location="/v1/jobs/x?y=1"), ["x"]),
+        (Operation("", "GET", "/else"), _response({"last": {"jobId": "x"}}), ["x"]),
+        (_LIST, _response([{"id": "x"}], 404), []),
+    ],
+)
+def test_ids_come_from_earlier_responses(operation, exchange, known):
+    values = Values()
+    values.learn(operation, exchange)
+    parameter = Parameter("job_id", "path", required=True, schema={"type": "string"})
+    assert values.of(_ONE, parameter) == [*known, "roaas"]
+
+
+def test_what_the_user_gives_comes_first_and_the_description_next():
+    values = Values({"jobId": ["given", 5]})
+    parameter = Parameter("job_id", "path", required=True, schema={"type": "string"}, examples=("shown", 6))
+    assert values.of(_ONE, parameter) == ["given", 5, "shown", "roaas"]
+    schema = {"type": "object", "required": ["job_id"], "properties": {"job_id": {"type": "string"}}}
+    assert values.body(schema, ({"job_id": "e"},)) == [{"job_id": "e"}, {"job_id": "given"}]

@@ -1,0 +1,62 @@
+"""What may be called: safe methods, what patterns allow, and nothing that is excluded, harmful or moves the device."""
+
+import pytest
+
+from conformance.api.call_rules import CallRules, Reason, told
+from conformance.documents.openapi import Operation, read_operations
+
+_GOTO = Operation("goTo", "POST", "/move/goto", tags=("move",))
+_READ = Operation("", "GET", "/state/{id}")
+
+
+@pytest.mark.parametrize(
+    ("operation", "rules", "reason"),
+    [
+        (_READ, CallRules(), Reason.SAFE),
+        (Operation("", "HEAD", "/a"), CallRules(), Reason.SAFE),
+        (_GOTO, CallRules(), Reason.CHANGES),
+        (_GOTO, CallRules(("POST /move/*",)), Reason.ALLOWED),
+        (_GOTO, CallRules(("post /move/goto",)), Reason.ALLOWED),
+        (_GOTO, CallRules(("/move/*",)), Reason.ALLOWED),
+        (_GOTO, CallRules(("* /move/goto",)), Reason.ALLOWED),
+        (_GOTO, CallRules(("goTo",)), Reason.ALLOWED),
+        (_GOTO, CallRules(("move",)), Reason.ALLOWED),
+        (_GOTO, CallRules(("PUT /move/*", "/state/*")), Reason.CHANGES),
+        (_GOTO, CallRules(("move",), ("goTo",)), Reason.NEVER),
+        (_READ, CallRules(never=("GET /state/*",)), Reason.NEVER),
+        (Operation("", "POST", "/system/shutdown"), CallRules(("/system/*",)), Reason.HARMFUL),
+        (Operation("", "POST", "/system/shutdown"), CallRules(("POST /system/shutdown",)), Reason.ALLOWED),
+        (Operation("factoryReset", "POST", "/a"), CallRules(("*",)), Reason.HARMFUL),
+        (Operation("factoryReset", "POST", "/a"), CallRules(("factoryReset",)), Reason.ALLOWED),
+        (Operation("", "GET", "/hf-auth/start"), CallRules(), Reason.HARMFUL),
+        (Operation("", "GET", "/hf-auth/start"), CallRules(("GET /hf-auth/start",)), Reason.SAFE),
+        (Operation("", "GET", "/tokenize/{token}"), CallRules(), Reason.SAFE),
+        (Operation("a_delete", "DELETE", "/a"), CallRules(("/a",)), Reason.ALLOWED),
+        (Operation("", "POST", "/delete/{id}"), CallRules(("*",)), Reason.HARMFUL),
+        (Operation("", "POST", "/a", motion=True), CallRules(("/a",)), Reason.MOVES),
+        (Operation("", "POST", "/a", motion=True), CallRules(("/a",), motion=True), Reason.ALLOWED),
+        (Operation("", "GET", "/a", motion=True), CallRules(), Reason.MOVES),
+        (Operation("", "GET", "/a", motion=True), CallRules(motion=True), Reason.ALLOWED),
+        (Operation("", "GET", "/a", never=True), CallRules(("GET /a",)), Reason.EXCLUDED),
+    ],
+)
+def test_decisions(operation, rules, reason):
+    assert rules.decide(operation) is reason
+
+
+def test_a_run_says_what_it_calls_and_why():
+    lines = told(CallRules(("/move/*", "/gone"), ("/state/*",)), [_GOTO, _READ, Operation("", "PUT", "/a")])
+    assert lines[0] == "Calls 1 of 3 operations (1 change state); 2 are not called."
+    assert [line.split(":")[-1].strip() for line in lines[1:]] == ["POST /move/goto", "PUT /a", "GET /state/{id}"]
+    assert CallRules(("/move/*", "/gone")).unused([_GOTO]) == ["/gone"]
+
+
+def test_what_the_description_says_of_motion_and_of_tests():
+    said = {"responses": {}, "x-roaas-motion": True}
+    paths = {
+        "/a": {"get": said},
+        "/b": {"post": {"responses": {}, "x-roaas-never": True}},
+        "/c": {"put": {"responses": {}}},
+    }
+    found = read_operations({"paths": paths}, closed=True)
+    assert [(one.motion, one.never) for one in found] == [(True, False), (False, True), (False, False)]

@@ -1,0 +1,221 @@
+"""The rules of the classes `description` and `robustness` by traces made by hand: right devices, and one fault each."""
+
+import json
+
+import pytest
+
+from conformance.api.rest.variations import Kind
+from conformance.contract.described import write_described_pack
+from conformance.contract.pack import Contract
+from conformance.rules.description import test_answers as answers
+from conformance.rules.description import test_requests as requests
+from conformance.rules.robustness import test_robustness as robustness
+from conformance.scenarios.survey import Probe, Survey
+from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
+from conformance.verdict.run import Run
+
+_SCHEMA = {
+    "type": "object",
+    "required": ["n"],
+    "properties": {"n": {"type": "integer"}, "at": {"type": ["string", "null"], "format": "date-time"}},
+}
+_ERROR = {"description": "", "content": {"application/problem+json": {"schema": {"required": ["detail"]}}}}
+_LABEL, _OTHER, _PLAIN = "GET /a/{id}", "POST /b", "GET /c"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    well = {
+        "description": "",
+        "content": {"application/json": {"schema": _SCHEMA}},
+        "headers": {"X-N": {"required": True, "schema": {"type": "integer"}}},
+    }
+    parameters = [{"name": "id", "in": "path", "required": True, "schema": {"type": "integer"}}]
+    paths = {
+        "/a/{id}": {"get": {"parameters": parameters, "responses": {"200": well, "404": _ERROR}}},
+        "/b": {
+            "post": {
+                "requestBody": {"content": {"application/json": {"schema": _SCHEMA}}},
+                "responses": {"2XX": {"description": ""}, "404": _ERROR},
+            }
+        },
+        "/c": {"get": {"responses": {"200": {"description": ""}}}},
+    }
+    document = {"openapi": "3.1.0", "info": {"title": "t", "version": "1"}, "paths": paths}
+    return Run(contract=Contract.load(write_described_pack(tmp_path_factory.mktemp("pack"), document, document)))
+
+
+def _probe(
+    status=200,
+    body=None,
+    kind=Kind.USUAL,
+    *,
+    operation=_LABEL,
+    media_type="application/json",
+    x_n="1",
+    sent=b"",
+    **more,
+):
+    method = operation.split()[0]
+    content = json.dumps({"n": 1} if body is None else body).encode() if not isinstance(body, bytes) else body
+    fields = (("Content-Type", media_type), *((("X-N", x_n),) if x_n else ()))
+    headers = (("Content-Type", "application/json"),) if sent else ()
+    target = operation.split()[1].replace("{id}", "1")
+    request = Request(method, f"http://h{target}", headers, sent)
+    return Probe(operation, kind, exchange=Exchange(request, Response(status, fields, content, 1.0)), **more)
+
+
+def _silent(kind_of_silence, kind=Kind.ODD, operation=_LABEL):
+    unanswered = Unanswered(Request("GET", "http://h/a/1", (), b""), "nothing came", kind_of_silence)
+    return Probe(operation, kind, unanswered=unanswered)
+
+
+def _page(status=404, **more):
+    return _probe(status, b"<html>", media_type="text/html", x_n="", **more)
+
+
+_PROBLEM = {"media_type": "application/problem+json", "x_n": ""}
+_OK = _probe()
+_RIGHT = [
+    _OK,
+    _probe(404, {"detail": ""}, Kind.UNKNOWN, **_PROBLEM),
+    _probe(body={"n": 1, "at": "2026-01-31T12:00:00Z", "more": 1}),
+    _probe(body={"n": 1, "at": None}),
+    _probe(304, b""),
+    _probe(401, b"", x_n=""),
+    _probe(429, b"", x_n=""),
+    _page(400, kind=Kind.ODD),
+    _page(414, kind=Kind.ODD),
+    _page(405, kind=Kind.ODD),
+    _probe(201, b"", operation=_OTHER, sent=b'{"n": 1}'),
+    _probe(404, {"detail": ""}, operation=_OTHER, **_PROBLEM),
+    _probe(200, operation=_PLAIN, kind=Kind.AGAIN),
+    _silent(NoAnswer.CIRCUIT_OPEN),
+    _silent(NoAnswer.TIMEOUT, operation="GET /events"),
+]
+_ALL = [
+    answers.status_declared,
+    answers.media_type,
+    answers.body_schema,
+    answers.formats,
+    answers.headers,
+    requests.operations,
+    requests.invalid_refused,
+    requests.required,
+    requests.optional,
+    requests.enums,
+    requests.examples,
+    requests.defaults,
+    requests.valid_accepted,
+    robustness.no_server_error,
+    robustness.no_crash,
+    robustness.no_hang,
+    robustness.no_internals,
+    robustness.recovers,
+]
+
+
+def _failed(rule, trace, run):
+    return [one for one in rule.outcomes(trace, {"run": run}.__getitem__) if not getattr(one, "holds", True)]
+
+
+@pytest.mark.parametrize("rule", _ALL, ids=lambda rule: rule.requirement)
+def test_a_right_device_is_not_blamed(rule, run):
+    assert _failed(rule, Survey(tuple(_RIGHT)), run) == []
+
+
+@pytest.mark.parametrize(
+    ("rule", "probes"),
+    [
+        (answers.status_declared, [_probe(409)]),
+        (answers.status_declared, [_probe(503, kind=Kind.ODD)]),
+        (answers.status_declared, [_probe(400, kind=Kind.ODD)]),
+        (answers.status_declared, [_page(400, kind=Kind.INVALID)]),
+        (answers.media_type, [_page(200)]),
+        (answers.media_type, [_page(404, kind=Kind.UNKNOWN)]),
+        (answers.body_schema, [_probe(body={})]),
+        (answers.body_schema, [_probe(body={"n": 1.5})]),
+        (answers.body_schema, [_probe(body=b"{")]),
+        (answers.body_schema, [_probe(body=b"")]),
+        (answers.body_schema, [_probe(404, {}, **_PROBLEM)]),
+        (answers.formats, [_probe(body={"n": 1, "at": "2026-01-31T12:00:00"})]),
+        (answers.headers, [_probe(x_n="")]),
+        (answers.headers, [_probe(x_n="one")]),
+        (requests.operations, [_page(operation=_PLAIN)]),
+        (requests.operations, [_page(405, operation=_PLAIN)]),
+        (requests.invalid_refused, [_probe(kind=Kind.INVALID)]),
+        (requests.invalid_refused, [_probe(kind=Kind.GENERATED, operation=_OTHER, sent=b'{"n": "x"}')]),
+        (requests.invalid_refused, [_probe(kind=Kind.GENERATED, opinions=(("ST201", "taken"),))]),
+        (requests.required, [_probe(kind=Kind.MISSING)]),
+        (requests.optional, [_probe(422, operation=_PLAIN), _probe(operation=_PLAIN, kind=Kind.OPTIONAL)]),
+        (requests.enums, [_OK, _probe(422, kind=Kind.ENUM)]),
+        (requests.examples, [_probe(400, kind=Kind.EXAMPLE)]),
+        (requests.defaults, [_OK, _probe(422, kind=Kind.DEFAULT)]),
+        (requests.valid_accepted, [_OK, _probe(400, kind=Kind.BOUND)]),
+        (requests.valid_accepted, [_OK, _probe(400, kind=Kind.GENERATED, opinions=(("ST202", "refused"),))]),
+        (robustness.no_server_error, [_probe(500, kind=Kind.ODD)]),
+        (robustness.no_crash, [_silent(NoAnswer.CLOSED)]),
+        (robustness.no_hang, [_silent(NoAnswer.TIMEOUT)]),
+        (robustness.no_hang, [_OK, _silent(NoAnswer.TIMEOUT)]),
+        (robustness.no_internals, [_probe(404, b'{"detail": "/usr/lib/python3/robot.py"}')]),
+        (robustness.no_internals, [_probe(500, b"Traceback (most recent call last)")]),
+        (robustness.recovers, [_OK, _silent(NoAnswer.CLOSED, Kind.AGAIN)]),
+        (robustness.recovers, [_OK, _probe(500, kind=Kind.AGAIN)]),
+    ],
+)  # fmt: skip
+def test_a_fault_is_one_finding(rule, probes, run):
+    assert len(_failed(rule, Survey((*_RIGHT[1:], *probes)), run)) == 1
+
+
+@pytest.mark.parametrize(
+    ("rule", "probes"),
+    [
+        (answers.status_declared, [_page(404, operation=_PLAIN)]),
+        (answers.status_declared, [_probe(500)]),
+        (answers.media_type, [_page(500)]),
+        (requests.operations, [_page(404)]),
+        (requests.operations, [_probe(404, {"detail": "no"}, operation=_OTHER, **_PROBLEM)]),
+        (requests.enums, [_probe(422), _probe(422, kind=Kind.ENUM)]),
+        (requests.optional, [_probe(422), _probe(422, kind=Kind.OPTIONAL)]),
+        (requests.valid_accepted, [_probe(400, kind=Kind.GENERATED, opinions=(("ST202", "refused"),))]),
+        (robustness.recovers, [_probe(500), _probe(500, kind=Kind.AGAIN)]),
+        (robustness.no_internals, [_probe(200, b'"/usr/lib/python3/robot.py"')]),
+    ],
+)
+def test_what_another_rule_judges_is_not_told_twice(rule, probes, run):
+    assert _failed(rule, Survey(tuple(probes)), run) == []
+
+
+def test_what_operations_have_in_common_is_told_once(run):
+    probes = [_page(418), _page(418, kind=Kind.INVALID, says="x"), _page(418, operation=_OTHER)]
+    (finding,) = _failed(answers.status_declared, Survey(tuple(probes)), run)
+    assert (finding.subject, finding.cause) == (_LABEL, "418") or finding.subject == _OTHER
+    assert "The same for 1 other operation: " in finding.observed
+    apart = [_probe(500), _probe(500, kind=Kind.ODD), _probe(500, operation=_OTHER)]
+    assert len(_failed(robustness.no_server_error, Survey(tuple(apart)), run)) == 2
+
+
+def test_types_that_a_framework_converts_are_told_once(run):
+    at = {"n": 1, "at": 5}
+    probes = [
+        _probe(kind=Kind.GENERATED, operation=_OTHER, sent=json.dumps(one).encode())
+        for one in ({"n": "1"}, {"n": "2"}, {"n": True}, at)
+    ]
+    found = _failed(requests.invalid_refused, Survey(tuple(probes)), run)
+    assert sorted(one.cause for one in found) == ["boolean integer", "number ['string', 'null']", "string integer"]
+
+
+@pytest.mark.parametrize(
+    ("times", "holds"),
+    [
+        ([5.0] * 90, True),
+        ([5.0] * 30 + [70.0] * 30 + [140.0] * 30, False),
+        ([140.0] * 30 + [70.0] * 30 + [5.0] * 30, True),
+        ([1.0] * 30 + [3.0] * 30 + [9.0] * 30, True),
+        ([float(i * 3) for i in range(90)], False),
+        ([5.0, 500.0] * 45, True),
+    ],
+)
+def test_latency_that_grows(times, holds, run):
+    (found,) = robustness.steady_latency.outcomes(Survey((), tuple(times), _OK.exchange), {"run": run}.__getitem__)
+    assert found.holds is holds
