@@ -1,0 +1,345 @@
+"""Mutants that treat requests otherwise than the description says: they take, refuse or crash at some values."""
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import parse_qsl, quote, unquote, urlencode
+
+from conformance.api.rest.values import sample
+from conformance.documents.json_schema import Schema, kinds_of
+from conformance.documents.openapi import Operation, is_json
+from conformance.documents.representation import flat
+from conformance.mutation.messages import Change, Forward, Request, Response
+from conformance.selftest.generated.breaches import valid
+from conformance.selftest.generated.mutant import GeneratedMutant, Tally
+from conformance.selftest.generated.places import Exchange
+
+_SUCCESS = range(200, 300)
+_DEPTH, _LONG, _BIG = 3, 1000, 10**9
+_NOTHING = object()
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")
+
+
+@dataclass(frozen=True)
+class Input:
+    """A parameter or member of a body.
+
+    Attributes:
+        where: path, query or body.
+        steps: its name, after those of the objects that hold it.
+        schema: of its value, flattened.
+        required: whether requests must have it.
+    """
+
+    where: str
+    steps: tuple[str, ...]
+    schema: Schema
+    required: bool
+
+    @property
+    def label(self) -> str:
+        """Return its part of a mutant's name."""
+        return f"{self.where}.{'.'.join(self.steps)}"
+
+    def read(self, exchange: Exchange, request: Request) -> Any:
+        """Return the value in a request as its schema has it; _NOTHING where it is not there or cannot be read."""
+        if self.where == "body":
+            holder = self._holder(_body(request))
+            return holder.get(self.steps[-1], _NOTHING) if holder is not None else _NOTHING
+        text = self._texts(exchange, request).get(self.steps[0])
+        return _NOTHING if text is None else _value(self.schema, text)
+
+    def written(self, exchange: Exchange, request: Request, value: Any) -> Request:
+        """Return the request with another value; _NOTHING leaves it out."""
+        if self.where == "body":
+            whole = _body(request)
+            holder = self._holder(whole)
+            if holder is not None:
+                holder.pop(self.steps[-1], None)
+                if value is not _NOTHING:
+                    holder[self.steps[-1]] = value
+            return request.copy(body=json.dumps(whole).encode())
+        text = value if isinstance(value, str) else json.dumps(value)
+        if self.where == "query":
+            pairs = [
+                (key, item) for key, item in parse_qsl(request.query, keep_blank_values=True) if key != self.steps[0]
+            ]
+            pairs += [(self.steps[0], text)] if value is not _NOTHING else []
+            return request.copy(target=request.path + (f"?{urlencode(pairs)}" if pairs else ""))
+        found = re.fullmatch(exchange.path, request.path)
+        number = exchange.parameters.index(self.steps[0]) + 1
+        if found is None or value is _NOTHING:
+            return request
+        path = request.path[: found.start(number)] + quote(text, safe="") + request.path[found.end(number) :]
+        return request.copy(target=path + (f"?{request.query}" if request.query else ""))
+
+    def there(self, request: Request) -> bool:
+        """Return whether the object that holds it is in a request."""
+        return self.where != "body" or self._holder(_body(request)) is not None
+
+    def _holder(self, value: Any) -> dict[str, Any] | None:
+        for step in self.steps[:-1]:
+            value = value.get(step) if isinstance(value, dict) else None
+        return value if isinstance(value, dict) else None
+
+    def _texts(self, exchange: Exchange, request: Request) -> dict[str, str]:
+        if self.where == "query":
+            return dict(parse_qsl(request.query, keep_blank_values=True))
+        found = re.fullmatch(exchange.path, request.path)
+        return {
+            name: unquote(text)
+            for name, text in zip(exchange.parameters, found.groups() if found else (), strict=False)
+        }
+
+
+def _body(request: Request) -> Any:
+    try:
+        return json.loads(request.body) if request.media_type.endswith("json") else None
+    except (ValueError, RecursionError):
+        return None
+
+
+def _value(schema: Schema, text: str) -> Any:
+    """Return what the text of a parameter stands for."""
+    kinds = kinds_of(schema)
+    if kinds & {"integer", "number"} and _NUMBER.fullmatch(text):
+        number = float(text)
+        return int(text) if text.lstrip("-").isdigit() else number
+    if "boolean" in kinds and text in {"true", "false"}:
+        return text == "true"
+    return text
+
+
+def inputs_of(operation: Operation) -> Iterator[Input]:
+    """Yield the parameters in path and query that are scalars, and the members of a JSON body."""
+    for item in operation.parameters:
+        kinds = kinds_of(item.schema)
+        if item.where in {"path", "query"} and kinds and not kinds & {"object", "array"}:
+            yield Input(item.where, (item.name,), flat(item.schema), item.required)
+    for name, body in operation.bodies.items():
+        if is_json(name):
+            yield from _members(body.schema, ())
+            return
+
+
+def _members(schema: Schema, steps: tuple[str, ...]) -> Iterator[Input]:
+    schema = flat(schema)
+    for name, part in schema.get("properties", {}).items():
+        flatter = flat(part)
+        if not flatter.get("readOnly"):
+            yield Input("body", (*steps, name), flatter, name in schema.get("required", ()))
+            if kinds_of(flatter) == {"object"} and len(steps) < _DEPTH:
+                yield from _members(flatter, (*steps, name))
+
+
+def _made(
+    operator: str, exchange: Exchange, item: Input, says: str, make: Callable[[Tally], Change]
+) -> GeneratedMutant:
+    name = f"{operator}:{exchange.name}:{item.label}"
+    return GeneratedMutant(name, f"{exchange.name} {says} {item.label}.", operator, exchange, exchange.classes, make)
+
+
+# What a schema says of values, and how a mutant that does not look at it is called.
+_LOOSE: dict[str, tuple[str, ...]] = {
+    "takes-type": ("type",),
+    "takes-any-text": ("enum", "const"),
+    "takes-below": ("minimum", "exclusiveMinimum"),
+    "takes-above": ("maximum", "exclusiveMaximum"),
+    "takes-short": ("minLength", "minItems"),
+    "takes-long": ("maxLength", "maxItems"),
+    "takes-form": ("pattern", "format"),
+}
+
+
+def lenient(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
+    """Yield mutants that do not look at one rule of an input: what breaks that rule alone is taken."""
+    for item in inputs_of(operation):
+        good = sample(item.schema)
+        for operator, keys in _LOOSE.items():
+            rules = [key for key in keys if key in item.schema]
+            # Every text of a path or query is a text; null is no value there.
+            textual = "string" in kinds_of(item.schema)
+            if rules and not (operator == "takes-type" and item.where != "body" and textual):
+                yield _made(
+                    operator, exchange, item, "does not look at a rule of", _taking(exchange, item, rules, good)
+                )
+        if item.required and item.where != "path":
+            yield _made("takes-missing", exchange, item, "does not need", _filling(exchange, item, good))
+
+
+def _taking(exchange: Exchange, item: Input, rules: list[str], good: Any) -> Callable[[Tally], Change]:
+    free = {key: value for key, value in item.schema.items() if key not in rules}
+
+    def forbidden(value: Any) -> bool:
+        # What the other rules forbid as well is for them; without a type, rules of types that are not there are void.
+        if value is _NOTHING or valid(item.schema, value):
+            return False
+        return valid(free, value) or "type" in rules
+
+    return _forwarding(
+        exchange,
+        lambda request: forbidden(item.read(exchange, request)),
+        lambda request: item.written(exchange, request, good),
+    )
+
+
+def _filling(exchange: Exchange, item: Input, good: Any) -> Callable[[Tally], Change]:
+    def missing(request: Request) -> bool:
+        return item.there(request) and item.read(exchange, request) is _NOTHING
+
+    return _forwarding(exchange, missing, lambda request: item.written(exchange, request, good))
+
+
+def _forwarding(
+    exchange: Exchange, when: Callable[[Request], bool], edit: Callable[[Request], Request]
+) -> Callable[[Tally], Change]:
+    """Return a change that edits a request, counted where the device takes the edited one."""
+
+    def make(tally: Tally) -> Change:
+        def change(request: Request, forward: Forward) -> Response:
+            if not exchange.concerns(request) or not when(request):
+                return forward(request)
+            response = forward(edit(request))
+            if response.status in _SUCCESS:
+                tally()
+            return response
+
+        return change
+
+    return make
+
+
+def strict(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
+    """Yield mutants that refuse what the description allows."""
+    refusal = _refusal(operation)
+    for item in inputs_of(operation):
+        schema = item.schema
+        values = [value for value in schema.get("enum", ()) if value is not None][:6]
+        if kinds_of(schema) == {"boolean"}:
+            values = [True, False]
+        for value in values:
+            yield _refusing("refuses-value", exchange, item, json.dumps(value), refusal, value)
+        for key in ("minimum", "maximum", "default"):
+            if key in schema and schema[key] is not None:
+                yield _refusing(f"refuses-{key}", exchange, item, key, refusal, schema[key])
+        for key in ("minLength", "maxLength"):
+            if (
+                isinstance(schema.get(key), int)
+                and "pattern" not in schema
+                and "format" not in schema
+                and "enum" not in schema
+            ):
+                yield _refusing(f"refuses-{key}", exchange, item, key, refusal, None, schema[key])
+        if not item.required:
+            yield _refusing("refuses-optional", exchange, item, "any value", refusal)
+            yield _needing(exchange, item, refusal)
+
+
+def _refusal(operation: Operation) -> Callable[[Request], Response]:
+    """Return a maker of refusals as the description has them: 422 or 400 where they are declared."""
+    status = next((code for code in (422, 400) if operation.response_key(code) is not None), 422)
+    content = operation.declared(status) or {}
+    name, schema = next(((name, schema) for name, schema in content.items() if is_json(name)), ("application/json", {}))
+    body = json.dumps(sample(schema, whole=True) if schema else {}).encode()
+    return lambda request: Response(status, [("Content-Type", name)], body, method=request.method)
+
+
+def _refusing(
+    operator: str, exchange: Exchange, item: Input, says: str, refusal: Callable[[Request], Response],
+    value: Any = _NOTHING, length: int | None = None,
+) -> GeneratedMutant:  # fmt: skip
+    def fits(given: Any) -> bool:
+        if given is _NOTHING or not valid(item.schema, given):
+            return False
+        if length is not None:
+            return isinstance(given, str) and len(given) == length
+        return value is _NOTHING or (given == value and isinstance(given, bool) == isinstance(value, bool))
+
+    made = _made(
+        operator,
+        exchange,
+        item,
+        f"refuses {says} of",
+        _answering(exchange, lambda request: fits(item.read(exchange, request)), refusal),
+    )
+    return made if says == "any value" else _named(made, says)
+
+
+def _named(mutant: GeneratedMutant, more: str) -> GeneratedMutant:
+    from dataclasses import replace
+
+    return replace(mutant, name=f"{mutant.name}:{more}")
+
+
+def _needing(exchange: Exchange, item: Input, refusal: Callable[[Request], Response]) -> GeneratedMutant:
+    def missing(request: Request) -> bool:
+        return item.there(request) and item.read(exchange, request) is _NOTHING
+
+    return _made("needs-optional", exchange, item, "needs the optional", _answering(exchange, missing, refusal))
+
+
+def _answering(
+    exchange: Exchange, when: Callable[[Request], bool], answer: Callable[[Request], Response], *, anyway: bool = False
+) -> Callable[[Tally], Change]:
+    """Return a change that answers in the device's place; unless ``anyway``, where the device itself accepts."""
+
+    def make(tally: Tally) -> Change:
+        def change(request: Request, forward: Forward) -> Response:
+            if not exchange.concerns(request) or not when(request):
+                return forward(request)
+            response = forward(request)
+            if response.status not in _SUCCESS and not anyway:
+                return response
+            tally()
+            return answer(request)
+
+        return change
+
+    return make
+
+
+def crashing(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
+    """Yield mutants that fail with 500 at a kind of value in one input, or at what is missing."""
+    kinds: dict[str, Callable[[Any], bool]] = {
+        "crash-empty": lambda value: value == "",
+        "crash-letters": lambda value: isinstance(value, str) and not value.isascii(),
+        "crash-long": lambda value: isinstance(value, str) and len(value) > _LONG,
+        "crash-quote": lambda value: isinstance(value, str) and "'" in value,
+        "crash-null-byte": lambda value: isinstance(value, str) and "\x00" in value,
+        "crash-big": lambda value: isinstance(value, int | float) and value > _BIG,
+        "crash-negative": lambda value: isinstance(value, int | float) and value < 0,
+        "crash-null": lambda value: value is None,
+        "crash-type": lambda value: isinstance(value, dict | list),
+    }
+
+    def failed(request: Request) -> Response:
+        return Response(500, [("Content-Type", "text/plain")], b"Internal Server Error", method=request.method)
+
+    for item in inputs_of(operation):
+        of = kinds_of(item.schema)
+        for operator, strikes in kinds.items():
+            numeric = operator in {"crash-big", "crash-negative"}
+            if numeric and not of & {"integer", "number"}:
+                continue
+            if not numeric and operator not in {"crash-null", "crash-type"} and "string" not in of:
+                continue
+            if operator in {"crash-null", "crash-type"} and item.where != "body":
+                continue
+            if (item.where == "path" and operator == "crash-empty") or (
+                operator == "crash-type" and of & {"object", "array"}
+            ):
+                continue
+
+            def when(request: Request, item: Input = item, strikes: Callable[[Any], bool] = strikes) -> bool:
+                value = item.read(exchange, request)
+                return value is not _NOTHING and strikes(value)
+
+            yield _made(
+                operator,
+                exchange,
+                item,
+                "fails with 500 at a value of",
+                _answering(exchange, when, failed, anyway=True),
+            )
