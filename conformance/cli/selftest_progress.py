@@ -76,7 +76,7 @@ def compare(
     progress: Progress,
     settings: Callable[[], Settings] | None = None,
 ) -> None:
-    """Run plain Schemathesis on the REST mutants, and add the results to the report; ``settings`` makes its settings."""
+    """Run plain Schemathesis on the REST mutants, with settings that are made then, and add the results."""
     from conformance.selftest import comparison  # noqa: PLC0415 - it costs what --help need not pay
 
     if comparison.command() is None:

@@ -157,7 +157,7 @@ def refuse(_request: Request, error: RequestValidationError) -> JSONResponse:
 def tell(request: Request, error: StarletteHTTPException) -> JSONResponse:
     """Answer an error; 405 names the methods of all routes of the path, where Starlette names those of the first."""
     headers = dict(error.headers or {})
-    if error.status_code == 405:  # noqa: PLR2004 - method not allowed
+    if error.status_code == 405:
         there = [route for route in app.routes if route.matches(request.scope)[0] is not Match.NONE]
         headers["Allow"] = ", ".join(sorted({name for route in there for name in getattr(route, "methods", ())}))
     return JSONResponse({"detail": str(error.detail)}, error.status_code, headers)

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 
 from conformance.selftest.comparison import SchemathesisResult
 from conformance.selftest.generated.judging import KILLED, NOT_REACHED, SURVIVED, GeneratedResult
-from conformance.selftest.generated.sampling import Rate, rate_of, rates_by
+from conformance.selftest.generated.sampling import Rate, group_of, rate_of, rates_by
 
 _COUNTED = frozenset({KILLED, SURVIVED})
 
@@ -34,6 +34,10 @@ def tools(
     return rows
 
 
+def _cells(rate: Rate) -> str:
+    return f"{rate.killed} | {rate.reached} | {rate.share:.1%} | {rate.bound:.1%} to {rate.top:.1%}"
+
+
 def only_theirs(results: Iterable[GeneratedResult], compared: Iterable[SchemathesisResult]) -> list[str]:
     """Return the mutants that Schemathesis kills and this suite does not, with what it reports."""
     theirs = {one.mutant: ", ".join(one.findings) for one in compared if one.killed}
@@ -55,36 +59,28 @@ def page(
     """Return a Markdown page."""
     results, compared = list(results), list(compared)
     not_reached = sum(one.outcome == NOT_REACHED for one in results)
-    lines = [
-        f"# Mutants by rule before {target}",
-        "",
+    about = (
         f"{len(results)} mutants, of which {not_reached} altered nothing and do not count. A mutant alters a message "
         "only where the altered one breaks a norm or the description, so that what both leave open is never counted. "
         "It is killed when the tool says something that it does not say of the unchanged device. Bounds are those of "
-        "Wilson's 95 % interval.",
-        "",
+        "Wilson's 95 % interval."
+    )
+    lines = [f"# Mutants by rule before {target}", "", about, ""]
+    lines += [
         "| tool | killed | of | rate | interval | false alarms on the unchanged device |",
         "|---|---|---|---|---|---|",
     ]
     for name, rate, alarms in tools(results, blamed, compared, good):
         said = f"{len(alarms)}: {', '.join(alarms)}" if alarms else "0"
-        lines.append(
-            f"| {name} | {rate.killed} | {rate.reached} | {rate.share:.1%} | {rate.bound:.1%} to {rate.top:.1%} | {said} |"
-        )
+        lines.append(f"| {name} | {_cells(rate)} | {said} |")
     killed_by_them = {one.mutant for one in compared if one.killed}
+    more = (" plain Schemathesis |", "---|") if compared else ("", "")
     for key in ("class", "operator"):
-        head = " plain Schemathesis |" if compared else ""
-        lines += [
-            "",
-            f"| {key} | killed | of | rate | interval |{head}",
-            f"|---|---|---|---|---|{'---|' if head else ''}",
-        ]
+        lines += ["", f"| {key} | killed | of | rate | interval |{more[0]}", f"|---|---|---|---|---|{more[1]}"]
         for name, rate in rates_by(results, key).items():
-            named = {"class": lambda one: one.mutant.exchange.class_, "operator": lambda one: one.mutant.operator}[key]
-            theirs = [one for one in results if named(one) == name and one.outcome in _COUNTED]
-            more = f" {sum(one.mutant.name in killed_by_them for one in theirs)} |" if compared else ""
-            span = f"{rate.bound:.1%} to {rate.top:.1%}"
-            lines.append(f"| `{name}` | {rate.killed} | {rate.reached} | {rate.share:.1%} | {span} |{more}")
+            named = [one.mutant.name for one in results if one.outcome in _COUNTED and group_of(one, key) == name]
+            theirs = f" {len(killed_by_them.intersection(named))} |" if compared else ""
+            lines.append(f"| `{name}` | {_cells(rate)} |{theirs}")
     if compared:
         lines += ["", "Killed by plain Schemathesis alone:", ""]
         lines += [f"- `{one}`" for one in only_theirs(results, compared)] or ["- none"]

@@ -11,6 +11,7 @@ from conformance.api.rest.values import sample
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.mutation.messages import Change, Response
+from conformance.selftest.generated import described_failures as failures
 from conformance.selftest.generated import described_http, described_requests
 from conformance.selftest.generated.bodies import BODIES, crossed
 from conformance.selftest.generated.breaches import breaks, undeclared_status, undeclared_type
@@ -117,9 +118,15 @@ def _field_alter(operator: Any, place: Place, schema: Any, code: int) -> Alter:
     return alter
 
 
+def _kinds(operation: Operation) -> dict[str, range]:
+    """Return the kinds of responses: what has no input, and declares no error, has none to alter."""
+    errs = operation.parameters or operation.bodies or any(status.startswith("4") for status in operation.responses)
+    return _KINDS if errs else {"answer": _SUCCESS}
+
+
 def _of_statuses(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
     """Yield mutants that answer with a status that is not declared."""
-    for kind, within in _KINDS.items():
+    for kind, within in _kinds(operation).items():
         for other in _STATUSES:
             if not undeclared_status(operation, Response(other)):
                 continue
@@ -137,7 +144,7 @@ def _of_statuses(operation: Operation, exchange: Exchange) -> Iterator[Generated
 
 def _of_types(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
     """Yield mutants that send another media type than the declared ones."""
-    for kind, within in _KINDS.items():
+    for kind, within in _kinds(operation).items():
         for other in _TYPES:
 
             def alter(_: Any, response: Response, other: str = other, within: range = within) -> Response | None:
@@ -151,7 +158,7 @@ def _of_types(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMut
 
 def _of_bodies(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
     """Yield mutants whose body as a whole is no JSON, or none that is declared."""
-    for kind, within in _KINDS.items():
+    for kind, within in _kinds(operation).items():
         for name, edit in {**BODIES, **_MORE}.items():
 
             def alter(_: Any, response: Response, edit: Any = edit, within: range = within) -> Response | None:
@@ -170,22 +177,25 @@ def _of_bodies(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMu
 
 def _whole(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
     """Yield mutants that fail, cut, cross or refuse whole responses, always or now and then."""
-    from conformance.selftest.generated import described_http as http
-
     for mode, when in {"": "every time", **MODES}.items():
         suffix = f"@{mode}" if mode else ""
-        fail = in_mode(mode, answers(exchange, lambda answer: answer.status in _SUCCESS, http.failed))
+        fail = in_mode(mode, answers(exchange, lambda answer: answer.status in _SUCCESS, failures.failed))
         yield _mutant(f"failing{suffix}", exchange, "answer", f"fails with 500, {when}", fail)
         half = _breaching(operation, exchange, _halved, mode)
         yield _mutant(f"cut{suffix}", exchange, "answer", f"sends half of the body, {when}", half)
         yield _mutant(
-            f"hang-up{suffix}", exchange, "answer", f"closes the connection, {when}", http.hanging_up(exchange, mode)
+            f"hang-up{suffix}",
+            exchange,
+            "answer",
+            f"closes the connection, {when}",
+            failures.hanging_up(exchange, mode),
         )
         cross = crossed(exchange, mode, lambda answer: breaks(operation, answer))
         yield _mutant(f"crossed{suffix}", exchange, "answer", f"sends the answer before, {when}", cross)
-    yield _mutant("hang", exchange, "answer", "does not answer", http.hanging(exchange))
-    yield _mutant("slower", exchange, "answer", "answers later every time", http.slower(exchange))
-    yield _mutant("insides", exchange, "error", "shows a traceback in errors", http.showing_insides(exchange))
+    yield _mutant("hang", exchange, "answer", "does not answer", failures.hanging(exchange))
+    yield _mutant("slower", exchange, "answer", "answers later every time", failures.slower(exchange))
+    if "error" in _kinds(operation):
+        yield _mutant("insides", exchange, "error", "shows a traceback in errors", failures.showing_insides(exchange))
 
 
 def _halved(_: Any, response: Response) -> Response | None:

@@ -1,119 +1,17 @@
-"""Mutants of HTTP itself before a described device: fields, methods, framing, connections and times."""
+"""Mutants of HTTP itself before a described device: fields, methods, framing."""
 
-import json
 import re
-import threading
-import time
 from collections.abc import Callable, Iterator
 
 from conformance.documents.openapi import Operation
-from conformance.mutation.messages import Change, Forward, HangUpError, Request, Response
-from conformance.selftest.generated.mutant import GeneratedMutant, Mode, Tally
+from conformance.mutation.messages import Request, Response
+from conformance.selftest.generated.described_failures import Edit, edited, failed
+from conformance.selftest.generated.mutant import GeneratedMutant
 from conformance.selftest.generated.places import Exchange
 
-_SUCCESS, _METHOD_NOT_ALLOWED, _BAD_REQUEST = range(200, 300), 405, 400
-# How long a hanging mutant waits before it gives up, s: longer than a request's deadline. How much later a slower one
-# answers after each request, and at most, s.
-_HANGS_S, _LATER_S, _LATEST_S = 30.0, 0.002, 0.4
-_TRACEBACK = json.dumps(
-    'Traceback (most recent call last):\n  File "/srv/device/app/handlers.py", line 83, in handle\n    '
-    "value = table[key]\nKeyError: 'speed'\n"
-).encode()
-Edit = Callable[[Request, Response], Response | None]
-
-
-def failed(answer: Response) -> None:
-    """Make a response the 500 of a server that failed."""
-    answer.status, answer.reason, answer.body = 500, "", b"Internal Server Error"
-    answer.put("Content-Type", "text/plain")
-
-
-def hanging_up(exchange: Exchange, mode_name: str) -> Callable[[Tally], Change]:
-    """Return a change that closes the connection in place of a successful response, in a mode."""
-
-    def make(tally: Tally) -> Change:
-        mode = Mode(mode_name)
-
-        def change(request: Request, forward: Forward) -> Response:
-            together = mode.begin()
-            response: Response | None = None
-            try:
-                response = forward(request)
-                fits = exchange.concerns(request) and response.status in _SUCCESS
-                if fits and mode.strikes(together=together):
-                    tally()
-                    raise HangUpError
-                return response
-            finally:
-                mode.end(response)
-
-        return change
-
-    return make
-
-
-def hanging(exchange: Exchange) -> Callable[[Tally], Change]:
-    """Return a change that does not answer an operation's requests until the client has gone."""
-
-    def make(tally: Tally) -> Change:
-        def change(request: Request, forward: Forward) -> Response:
-            if not exchange.concerns(request):
-                return forward(request)
-            tally()
-            time.sleep(_HANGS_S)
-            raise HangUpError
-
-        return change
-
-    return make
-
-
-def slower(exchange: Exchange) -> Callable[[Tally], Change]:
-    """Return a change that answers an operation later with each request."""
-
-    def make(tally: Tally) -> Change:
-        lock, count = threading.Lock(), 0
-
-        def change(request: Request, forward: Forward) -> Response:
-            nonlocal count
-            if exchange.concerns(request):
-                with lock:
-                    count += 1
-                    later = min(count * _LATER_S, _LATEST_S)
-                tally()
-                time.sleep(later)
-            return forward(request)
-
-        return change
-
-    return make
-
-
-def showing_insides(exchange: Exchange) -> Callable[[Tally], Change]:
-    """Return a change that puts a traceback into the first text of a JSON error."""
-
-    def edit(_request: Request, answer: Response) -> Response | None:
-        altered = answer.copy()
-        altered.body = re.sub(rb'(:\s*)"[^"\\]*"', lambda found: found[1] + _TRACEBACK, answer.body, count=1)
-        bad = answer.status >= _BAD_REQUEST and answer.media_type.endswith("json")
-        return altered if bad and altered.body != answer.body else None
-
-    return _edited(exchange.concerns, edit)
-
-
-def _edited(where: Callable[[Request], bool], edit: Edit) -> Callable[[Tally], Change]:
-    def make(tally: Tally) -> Change:
-        def change(request: Request, forward: Forward) -> Response:
-            response = forward(request)
-            altered = edit(request, response) if where(request) else None
-            if altered is None:
-                return response
-            tally()
-            return altered
-
-        return change
-
-    return make
+_SUCCESS, _METHOD_NOT_ALLOWED = range(200, 300), 405
+# By how many octets a wrong length is wrong.
+_OFF = 7
 
 
 def of_http(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
@@ -143,7 +41,7 @@ def of_http(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutan
             name,
             exchange,
             exchange.classes,
-            _edited(where, edit),
+            edited(where, edit),
         )
 
 
@@ -186,28 +84,6 @@ def _without_length(head: bytes) -> bytes:
     return re.sub(rb"(?i)\r\ncontent-length: \d+", b"", head)
 
 
-# What is done to successful responses, with the clause.
-_ANSWERS: dict[str, tuple[str, Edit]] = {
-    "no-type": ("sends no Content-Type (RFC 9110 8.3)", _changed(lambda answer: answer.drop("Content-Type"), _with_body)),
-    "half-type": ("sends a malformed Content-Type (RFC 9110 8.3.1)", _changed(lambda answer: answer.put("Content-Type", answer.media_type.partition("/")[0]), _with_body)),
-    "two-types": ("sends Content-Type twice (RFC 9110 5.3)", _changed(lambda answer: answer.fields.append(("Content-Type", "text/plain")), _with_body)),
-    "name-twice": ("sends an object with a name twice (RFC 8259 4)", _changed(lambda answer: setattr(answer, "body", re.sub(rb'\{("[^"]+"\s*:)', rb"{\1null,\1", answer.body, count=1)), lambda answer: _with_body(answer) and answer.media_type.endswith("json") and b'{"' in answer.body)),
-    "no-date": ("sends no Date (RFC 9110 6.6.1)", _changed(lambda answer: answer.drop("Date"), lambda answer: _fine(answer) and answer.field("Date") is not None)),
-    "bad-date": ("sends a Date that is no IMF-fixdate (RFC 9110 5.6.7)", _changed(lambda answer: answer.put("Date", "2026-01-31T12:00:00Z"), _fine)),
-    "bad-etag": ("sends an ETag without quotes (RFC 9110 8.8.3)", _changed(lambda answer: answer.put("ETag", "abc"), _fine)),
-    "bad-modified": ("sends a Last-Modified that is no IMF-fixdate (RFC 9110 8.8.2)", _changed(lambda answer: answer.put("Last-Modified", "yesterday"), _fine)),
-    "long-length": ("sends a Content-Length that is too great (RFC 9112 6.3)", _changed(_raw(lambda head, body: _length(head, 7) + b"\r\n\r\n" + body), _with_body)),
-    "short-length": ("sends a Content-Length that is too small (RFC 9112 6.3)", _changed(_raw(lambda head, body: _length(head, -7) + b"\r\n\r\n" + body), lambda answer: _with_body(answer) and len(answer.body) > 7)),  # noqa: PLR2004 - as above
-    "two-lengths": ("sends two Content-Lengths (RFC 9110 8.6)", _changed(_raw(lambda head, body: head + b"\r\nContent-Length: 3\r\n\r\n" + body), _with_body)),
-    "chunked-and-length": ("sends Transfer-Encoding and Content-Length (RFC 9112 6.2)", _changed(_raw(lambda head, body: head + b"\r\nTransfer-Encoding: chunked\r\n\r\n%x\r\n" % len(body) + body + b"\r\n0\r\n\r\n"), _with_body)),
-    "bad-chunk": ("sends chunks with a wrong size (RFC 9112 7.1)", _changed(_raw(lambda head, body: _without_length(head) + b"\r\nTransfer-Encoding: chunked\r\n\r\n%x\r\n" % (len(body) + 4) + body + b"\r\n0\r\n\r\n"), _with_body)),
-    "folded-field": ("folds a field over two lines (RFC 9112 5.2)", _changed(_raw(lambda head, body: head + b"\r\nX-Note: one\r\n two\r\n\r\n" + body), _fine)),
-    "space-before-colon": ("has a space before a colon (RFC 9112 5.1)", _changed(_raw(lambda head, body: head + b"\r\nX-Note : one\r\n\r\n" + body), _fine)),
-    "unasked-part": ("answers 206 where no range was asked for (RFC 9110 15.3.7)", _changed(lambda answer: (setattr(answer, "status", 206), answer.put("Content-Range", "bytes 0-9/99")), _with_body)),
-    "unasked-304": ("answers 304 without a condition (RFC 9110 15.4.5)", lambda request, answer: _unasked(request, answer)),
-}  # fmt: skip
-
-
 def _unasked(request: Request, answer: Response) -> Response | None:
     conditional = any(name.lower().startswith("if-") for name, _ in request.fields)
     if conditional or not _fine(answer) or request.method != "GET":
@@ -217,18 +93,125 @@ def _unasked(request: Request, answer: Response) -> Response | None:
     return altered
 
 
-_HEADS: dict[str, tuple[str, Edit]] = {
-    "head-body": ("sends a body in response to HEAD (RFC 9110 9.3.2)", _changed(lambda answer: setattr(answer, "raw", answer.octets() + b'{"roaas": 1}'), lambda answer: answer.status in _SUCCESS)),
-    "head-type": ("sends another Content-Type for HEAD than for GET (RFC 9110 9.3.2)", _changed(lambda answer: answer.put("Content-Type", "text/html"), lambda answer: answer.status in _SUCCESS)),
-    "head-length": ("sends another Content-Length for HEAD than for GET (RFC 9110 8.6)", _changed(lambda answer: answer.put("Content-Length", "1"), lambda answer: answer.status in _SUCCESS)),
-    "head-fails": ("answers HEAD with 500", lambda request, answer: _failing(request, answer)),
-}  # fmt: skip
-
-
 def _failing(_request: Request, answer: Response) -> Response | None:
     altered = answer.copy()
     failed(altered)
     return altered
+
+
+# What is done to successful responses, with the clause.
+_ANSWERS: dict[str, tuple[str, Edit]] = {
+    "no-type": (
+        "sends no Content-Type (RFC 9110 8.3)",
+        _changed(lambda answer: answer.drop("Content-Type"), _with_body),
+    ),
+    "half-type": (
+        "sends a malformed Content-Type (RFC 9110 8.3.1)",
+        _changed(lambda answer: answer.put("Content-Type", answer.media_type.partition("/")[0]), _with_body),
+    ),
+    "two-types": (
+        "sends Content-Type twice (RFC 9110 5.3)",
+        _changed(lambda answer: answer.fields.append(("Content-Type", "text/plain")), _with_body),
+    ),
+    "name-twice": (
+        "sends an object with a name twice (RFC 8259 4)",
+        _changed(
+            lambda answer: setattr(answer, "body", re.sub(rb'\{("[^"]+"\s*:)', rb"{\1null,\1", answer.body, count=1)),
+            lambda answer: _with_body(answer) and answer.media_type.endswith("json") and b'{"' in answer.body,
+        ),
+    ),
+    "no-date": (
+        "sends no Date (RFC 9110 6.6.1)",
+        _changed(lambda answer: answer.drop("Date"), lambda answer: _fine(answer) and answer.field("Date") is not None),
+    ),
+    "bad-date": (
+        "sends a Date that is no IMF-fixdate (RFC 9110 5.6.7)",
+        _changed(lambda answer: answer.put("Date", "2026-01-31T12:00:00Z"), _fine),
+    ),
+    "bad-etag": (
+        "sends an ETag without quotes (RFC 9110 8.8.3)",
+        _changed(lambda answer: answer.put("ETag", "abc"), _fine),
+    ),
+    "bad-modified": (
+        "sends a Last-Modified that is no IMF-fixdate (RFC 9110 8.8.2)",
+        _changed(lambda answer: answer.put("Last-Modified", "yesterday"), _fine),
+    ),
+    "long-length": (
+        "sends a Content-Length that is too great (RFC 9112 6.3)",
+        _changed(_raw(lambda head, body: _length(head, _OFF) + b"\r\n\r\n" + body), _with_body),
+    ),
+    "short-length": (
+        "sends a Content-Length that is too small (RFC 9112 6.3)",
+        _changed(
+            _raw(lambda head, body: _length(head, -_OFF) + b"\r\n\r\n" + body),
+            lambda answer: _with_body(answer) and len(answer.body) > _OFF,
+        ),
+    ),
+    "two-lengths": (
+        "sends two Content-Lengths (RFC 9110 8.6)",
+        _changed(_raw(lambda head, body: head + b"\r\nContent-Length: 3\r\n\r\n" + body), _with_body),
+    ),
+    "chunked-and-length": (
+        "sends Transfer-Encoding and Content-Length (RFC 9112 6.2)",
+        _changed(
+            _raw(
+                lambda head, body: (
+                    head + b"\r\nTransfer-Encoding: chunked\r\n\r\n%x\r\n" % len(body) + body + b"\r\n0\r\n\r\n"
+                )
+            ),
+            _with_body,
+        ),
+    ),
+    "bad-chunk": (
+        "sends chunks with a wrong size (RFC 9112 7.1)",
+        _changed(
+            _raw(
+                lambda head, body: (
+                    _without_length(head)
+                    + b"\r\nTransfer-Encoding: chunked\r\n\r\n%x\r\n" % (len(body) + 4)
+                    + body
+                    + b"\r\n0\r\n\r\n"
+                )
+            ),
+            _with_body,
+        ),
+    ),
+    "folded-field": (
+        "folds a field over two lines (RFC 9112 5.2)",
+        _changed(_raw(lambda head, body: head + b"\r\nX-Note: one\r\n two\r\n\r\n" + body), _fine),
+    ),
+    "space-before-colon": (
+        "has a space before a colon (RFC 9112 5.1)",
+        _changed(_raw(lambda head, body: head + b"\r\nX-Note : one\r\n\r\n" + body), _fine),
+    ),
+    "unasked-part": (
+        "answers 206 where no range was asked for (RFC 9110 15.3.7)",
+        _changed(
+            lambda answer: (setattr(answer, "status", 206), answer.put("Content-Range", "bytes 0-9/99")), _with_body
+        ),
+    ),
+    "unasked-304": ("answers 304 without a condition (RFC 9110 15.4.5)", _unasked),
+}
+
+
+_HEADS: dict[str, tuple[str, Edit]] = {
+    "head-body": (
+        "sends a body in response to HEAD (RFC 9110 9.3.2)",
+        _changed(
+            lambda answer: setattr(answer, "raw", answer.octets() + b'{"roaas": 1}'),
+            lambda answer: answer.status in _SUCCESS,
+        ),
+    ),
+    "head-type": (
+        "sends another Content-Type for HEAD than for GET (RFC 9110 9.3.2)",
+        _changed(lambda answer: answer.put("Content-Type", "text/html"), lambda answer: answer.status in _SUCCESS),
+    ),
+    "head-length": (
+        "sends another Content-Length for HEAD than for GET (RFC 9110 8.6)",
+        _changed(lambda answer: answer.put("Content-Length", "1"), lambda answer: answer.status in _SUCCESS),
+    ),
+    "head-fails": ("answers HEAD with 500", _failing),
+}
 
 
 def _taken(_request: Request, answer: Response) -> Response | None:

@@ -1,137 +1,21 @@
 """Mutants that treat requests otherwise than the description says: they take, refuse or crash at some values."""
 
 import json
-import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
-from urllib.parse import parse_qsl, quote, unquote, urlencode
 
 from conformance.api.rest.values import sample
-from conformance.documents.json_schema import Schema, kinds_of
+from conformance.documents.json_schema import kinds_of
 from conformance.documents.openapi import Operation, is_json
-from conformance.documents.representation import flat
 from conformance.mutation.messages import Change, Forward, Request, Response
 from conformance.selftest.generated.breaches import valid
+from conformance.selftest.generated.described_inputs import NOTHING, Input, inputs_of
 from conformance.selftest.generated.mutant import GeneratedMutant, Tally
 from conformance.selftest.generated.places import Exchange
 
 _SUCCESS = range(200, 300)
-_DEPTH, _LONG, _BIG = 3, 1000, 10**9
-_NOTHING = object()
-_NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")
-
-
-@dataclass(frozen=True)
-class Input:
-    """A parameter or member of a body.
-
-    Attributes:
-        where: path, query or body.
-        steps: its name, after those of the objects that hold it.
-        schema: of its value, flattened.
-        required: whether requests must have it.
-    """
-
-    where: str
-    steps: tuple[str, ...]
-    schema: Schema
-    required: bool
-
-    @property
-    def label(self) -> str:
-        """Return its part of a mutant's name."""
-        return f"{self.where}.{'.'.join(self.steps)}"
-
-    def read(self, exchange: Exchange, request: Request) -> Any:
-        """Return the value in a request as its schema has it; _NOTHING where it is not there or cannot be read."""
-        if self.where == "body":
-            holder = self._holder(_body(request))
-            return holder.get(self.steps[-1], _NOTHING) if holder is not None else _NOTHING
-        text = self._texts(exchange, request).get(self.steps[0])
-        return _NOTHING if text is None else _value(self.schema, text)
-
-    def written(self, exchange: Exchange, request: Request, value: Any) -> Request:
-        """Return the request with another value; _NOTHING leaves it out."""
-        if self.where == "body":
-            whole = _body(request)
-            holder = self._holder(whole)
-            if holder is not None:
-                holder.pop(self.steps[-1], None)
-                if value is not _NOTHING:
-                    holder[self.steps[-1]] = value
-            return request.copy(body=json.dumps(whole).encode())
-        text = value if isinstance(value, str) else json.dumps(value)
-        if self.where == "query":
-            pairs = [
-                (key, item) for key, item in parse_qsl(request.query, keep_blank_values=True) if key != self.steps[0]
-            ]
-            pairs += [(self.steps[0], text)] if value is not _NOTHING else []
-            return request.copy(target=request.path + (f"?{urlencode(pairs)}" if pairs else ""))
-        found = re.fullmatch(exchange.path, request.path)
-        number = exchange.parameters.index(self.steps[0]) + 1
-        if found is None or value is _NOTHING:
-            return request
-        path = request.path[: found.start(number)] + quote(text, safe="") + request.path[found.end(number) :]
-        return request.copy(target=path + (f"?{request.query}" if request.query else ""))
-
-    def there(self, request: Request) -> bool:
-        """Return whether the object that holds it is in a request."""
-        return self.where != "body" or self._holder(_body(request)) is not None
-
-    def _holder(self, value: Any) -> dict[str, Any] | None:
-        for step in self.steps[:-1]:
-            value = value.get(step) if isinstance(value, dict) else None
-        return value if isinstance(value, dict) else None
-
-    def _texts(self, exchange: Exchange, request: Request) -> dict[str, str]:
-        if self.where == "query":
-            return dict(parse_qsl(request.query, keep_blank_values=True))
-        found = re.fullmatch(exchange.path, request.path)
-        return {
-            name: unquote(text)
-            for name, text in zip(exchange.parameters, found.groups() if found else (), strict=False)
-        }
-
-
-def _body(request: Request) -> Any:
-    try:
-        return json.loads(request.body) if request.media_type.endswith("json") else None
-    except (ValueError, RecursionError):
-        return None
-
-
-def _value(schema: Schema, text: str) -> Any:
-    """Return what the text of a parameter stands for."""
-    kinds = kinds_of(schema)
-    if kinds & {"integer", "number"} and _NUMBER.fullmatch(text):
-        number = float(text)
-        return int(text) if text.lstrip("-").isdigit() else number
-    if "boolean" in kinds and text in {"true", "false"}:
-        return text == "true"
-    return text
-
-
-def inputs_of(operation: Operation) -> Iterator[Input]:
-    """Yield the parameters in path and query that are scalars, and the members of a JSON body."""
-    for item in operation.parameters:
-        kinds = kinds_of(item.schema)
-        if item.where in {"path", "query"} and kinds and not kinds & {"object", "array"}:
-            yield Input(item.where, (item.name,), flat(item.schema), item.required)
-    for name, body in operation.bodies.items():
-        if is_json(name):
-            yield from _members(body.schema, ())
-            return
-
-
-def _members(schema: Schema, steps: tuple[str, ...]) -> Iterator[Input]:
-    schema = flat(schema)
-    for name, part in schema.get("properties", {}).items():
-        flatter = flat(part)
-        if not flatter.get("readOnly"):
-            yield Input("body", (*steps, name), flatter, name in schema.get("required", ()))
-            if kinds_of(flatter) == {"object"} and len(steps) < _DEPTH:
-                yield from _members(flatter, (*steps, name))
+_LONG, _BIG = 1000, 10**9
 
 
 def _made(
@@ -174,7 +58,7 @@ def _taking(exchange: Exchange, item: Input, rules: list[str], good: Any) -> Cal
 
     def forbidden(value: Any) -> bool:
         # What the other rules forbid as well is for them; without a type, rules of types that are not there are void.
-        if value is _NOTHING or valid(item.schema, value):
+        if value is NOTHING or valid(item.schema, value):
             return False
         return valid(free, value) or "type" in rules
 
@@ -187,7 +71,7 @@ def _taking(exchange: Exchange, item: Input, rules: list[str], good: Any) -> Cal
 
 def _filling(exchange: Exchange, item: Input, good: Any) -> Callable[[Tally], Change]:
     def missing(request: Request) -> bool:
-        return item.there(request) and item.read(exchange, request) is _NOTHING
+        return item.there(request) and item.read(exchange, request) is NOTHING
 
     return _forwarding(exchange, missing, lambda request: item.written(exchange, request, good))
 
@@ -248,14 +132,14 @@ def _refusal(operation: Operation) -> Callable[[Request], Response]:
 
 def _refusing(
     operator: str, exchange: Exchange, item: Input, says: str, refusal: Callable[[Request], Response],
-    value: Any = _NOTHING, length: int | None = None,
+    value: Any = NOTHING, length: int | None = None,
 ) -> GeneratedMutant:  # fmt: skip
     def fits(given: Any) -> bool:
-        if given is _NOTHING or not valid(item.schema, given):
+        if given is NOTHING or not valid(item.schema, given):
             return False
         if length is not None:
             return isinstance(given, str) and len(given) == length
-        return value is _NOTHING or (given == value and isinstance(given, bool) == isinstance(value, bool))
+        return value is NOTHING or (given == value and isinstance(given, bool) == isinstance(value, bool))
 
     made = _made(
         operator,
@@ -268,14 +152,12 @@ def _refusing(
 
 
 def _named(mutant: GeneratedMutant, more: str) -> GeneratedMutant:
-    from dataclasses import replace
-
     return replace(mutant, name=f"{mutant.name}:{more}")
 
 
 def _needing(exchange: Exchange, item: Input, refusal: Callable[[Request], Response]) -> GeneratedMutant:
     def missing(request: Request) -> bool:
-        return item.there(request) and item.read(exchange, request) is _NOTHING
+        return item.there(request) and item.read(exchange, request) is NOTHING
 
     return _made("needs-optional", exchange, item, "needs the optional", _answering(exchange, missing, refusal))
 
@@ -334,7 +216,7 @@ def crashing(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMuta
 
             def when(request: Request, item: Input = item, strikes: Callable[[Any], bool] = strikes) -> bool:
                 value = item.read(exchange, request)
-                return value is not _NOTHING and strikes(value)
+                return value is not NOTHING and strikes(value)
 
             yield _made(
                 operator,

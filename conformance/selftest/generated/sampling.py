@@ -89,7 +89,11 @@ def rates_by(results: Iterable[GeneratedResult], key: str) -> dict[str, Rate]:
     """Return kill rates grouped by ``operator`` (with its mode), ``class`` or ``effort`` (of the last run)."""
     groups: dict[str, list[GeneratedResult]] = defaultdict(list)
     for result in results:
-        mutant = result.mutant
-        names = {"operator": mutant.operator, "class": mutant.exchange.class_, "effort": result.effort}
-        groups[names[key]].append(result)
+        groups[group_of(result, key)].append(result)
     return {name: rate_of(group) for name, group in sorted(groups.items())}
+
+
+def group_of(result: GeneratedResult, key: str) -> str:
+    """Return a result's ``operator``, ``class`` or ``effort``."""
+    mutant = result.mutant
+    return {"operator": mutant.operator, "class": mutant.exchange.class_, "effort": result.effort}[key]
