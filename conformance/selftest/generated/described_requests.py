@@ -121,17 +121,31 @@ def strict(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant
             yield _needing(exchange, item, refusal)
 
 
-def _refusal(operation: Operation) -> Callable[[Request], Response]:
-    """Return a maker of refusals as the description has them: 422 or 400 where they are declared."""
+Answer = Callable[[Response], Response]
+
+
+def _refusal(operation: Operation) -> Answer:
+    """Return what makes a response a refusal as the description has it: 422 or 400, whichever is declared."""
     status = next((code for code in (422, 400) if operation.response_key(code) is not None), 422)
     content = operation.declared(status) or {}
     name, schema = next(((name, schema) for name, schema in content.items() if is_json(name)), ("application/json", {}))
-    body = json.dumps(sample(schema, whole=True) if schema else {}).encode()
-    return lambda request: Response(status, [("Content-Type", name)], body, method=request.method)
+    return _instead(status, name, json.dumps(sample(schema, whole=True) if schema else {}).encode())
+
+
+def _instead(status: int, media_type: str, body: bytes) -> Answer:
+    """Return what replaces status and body of a response, and keeps its other fields, which are right."""
+
+    def answer(response: Response) -> Response:
+        altered = response.copy()
+        altered.status, altered.reason, altered.body = status, "", body
+        altered.put("Content-Type", media_type)
+        return altered
+
+    return answer
 
 
 def _refusing(
-    operator: str, exchange: Exchange, item: Input, says: str, refusal: Callable[[Request], Response],
+    operator: str, exchange: Exchange, item: Input, says: str, refusal: Answer,
     value: Any = NOTHING, length: int | None = None,
 ) -> GeneratedMutant:  # fmt: skip
     def fits(given: Any) -> bool:
@@ -155,7 +169,7 @@ def _named(mutant: GeneratedMutant, more: str) -> GeneratedMutant:
     return replace(mutant, name=f"{mutant.name}:{more}")
 
 
-def _needing(exchange: Exchange, item: Input, refusal: Callable[[Request], Response]) -> GeneratedMutant:
+def _needing(exchange: Exchange, item: Input, refusal: Answer) -> GeneratedMutant:
     def missing(request: Request) -> bool:
         return item.there(request) and item.read(exchange, request) is NOTHING
 
@@ -163,7 +177,7 @@ def _needing(exchange: Exchange, item: Input, refusal: Callable[[Request], Respo
 
 
 def _answering(
-    exchange: Exchange, when: Callable[[Request], bool], answer: Callable[[Request], Response], *, anyway: bool = False
+    exchange: Exchange, when: Callable[[Request], bool], answer: Answer, *, anyway: bool = False
 ) -> Callable[[Tally], Change]:
     """Return a change that answers in the device's place; unless ``anyway``, where the device itself accepts."""
 
@@ -175,7 +189,7 @@ def _answering(
             if response.status not in _SUCCESS and not anyway:
                 return response
             tally()
-            return answer(request)
+            return answer(response)
 
         return change
 
@@ -196,9 +210,7 @@ def crashing(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMuta
         "crash-type": lambda value: isinstance(value, dict | list),
     }
 
-    def failed(request: Request) -> Response:
-        return Response(500, [("Content-Type", "text/plain")], b"Internal Server Error", method=request.method)
-
+    failed = _instead(500, "text/plain", b"Internal Server Error")
     for item in inputs_of(operation):
         of = kinds_of(item.schema)
         for operator, strikes in kinds.items():
