@@ -25,7 +25,7 @@ def _made(
     return GeneratedMutant(name, f"{exchange.name} {says} {item.label}.", operator, exchange, exchange.classes, make)
 
 
-# What a schema says of values, and how a mutant that does not look at it is called.
+# What a schema says of values (a format is a remark only, JSON Schema 2020-12 Validation 7.2.1), and how a mutant that does not look at it is called.
 _LOOSE: dict[str, tuple[str, ...]] = {
     "takes-type": ("type",),
     "takes-any-text": ("enum", "const"),
@@ -33,7 +33,7 @@ _LOOSE: dict[str, tuple[str, ...]] = {
     "takes-above": ("maximum", "exclusiveMaximum"),
     "takes-short": ("minLength", "minItems"),
     "takes-long": ("maxLength", "maxItems"),
-    "takes-form": ("pattern", "format"),
+    "takes-form": ("pattern",),
 }
 
 
