@@ -10,7 +10,7 @@ from typing import Any
 from conformance.api.rest.values import sample
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation, is_json, operations_of
-from conformance.mutation.messages import Change, Response
+from conformance.mutation.messages import Change, Request, Response
 from conformance.selftest.generated import described_failures as failures
 from conformance.selftest.generated import described_http, described_requests
 from conformance.selftest.generated.bodies import BODIES, crossed
@@ -94,7 +94,7 @@ def _of_fields(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMu
             for operator in FIELD_OPERATORS:
                 for mode in ("", *MODES) if operator.name == "null" and code in _SUCCESS else ("",):
                     alter = _field_alter(operator, place, part, code)
-                    tried = alter(None, whole)
+                    tried = alter(Request("rest"), whole)
                     if tried is None or not breaks(operation, tried):
                         continue  # what the schema leaves open
                     name = f"{operator.name}@{mode}" if mode else operator.name

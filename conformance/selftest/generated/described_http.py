@@ -84,6 +84,11 @@ def _without_length(head: bytes) -> bytes:
     return re.sub(rb"(?i)\r\ncontent-length: \d+", b"", head)
 
 
+def _as_part(answer: Response) -> None:
+    answer.status, answer.reason = 206, ""
+    answer.put("Content-Range", "bytes 0-9/99")
+
+
 def _unasked(request: Request, answer: Response) -> Response | None:
     conditional = any(name.lower().startswith("if-") for name, _ in request.fields)
     if conditional or not _fine(answer) or request.method != "GET":
@@ -186,9 +191,7 @@ _ANSWERS: dict[str, tuple[str, Edit]] = {
     ),
     "unasked-part": (
         "answers 206 where no range was asked for (RFC 9110 15.3.7)",
-        _changed(
-            lambda answer: (setattr(answer, "status", 206), answer.put("Content-Range", "bytes 0-9/99")), _with_body
-        ),
+        _changed(_as_part, lambda answer: answer.status in _SUCCESS and bool(answer.body)),
     ),
     "unasked-304": ("answers 304 without a condition (RFC 9110 15.4.5)", _unasked),
 }
