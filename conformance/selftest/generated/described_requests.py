@@ -25,7 +25,8 @@ def _made(
     return GeneratedMutant(name, f"{exchange.name} {says} {item.label}.", operator, exchange, exchange.classes, make)
 
 
-# What a schema says of values (a format is a remark only, JSON Schema 2020-12 Validation 7.2.1), and how a mutant that does not look at it is called.
+# What a schema says of values, and how a mutant that does not look at it is called. A format is a remark only (JSON
+# Schema 2020-12, Validation 7.2.1).
 _LOOSE: dict[str, tuple[str, ...]] = {
     "takes-type": ("type",),
     "takes-any-text": ("enum", "const"),
