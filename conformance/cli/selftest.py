@@ -65,6 +65,15 @@ _SHORT = 15
     metavar="N",
     help="Judge N mutants made by rule from the pack's descriptions, in place of those made by hand.",
 )
+@click.option(
+    "--api",
+    metavar="URL|FILE",
+    help="With --generated: put the mutants before the running device with this description. Only GET, HEAD and "
+    "OPTIONS are sent, unless --call allows more.",
+)
+@click.option("--base-url", metavar="URL", help="With --api: where the operations of the description are.")
+@click.option("--call", "allow", multiple=True, metavar="PATTERN", help="With --api: as in roaas certify; repeatable.")
+@click.option("--never", multiple=True, metavar="PATTERN", help="With --api: as in roaas certify; repeatable.")
 @click.option("--seed", type=int, default=0, help="Seed of the sample of generated mutants.")
 @click.option("--list", "listed", is_flag=True, help="List the mutants, and run nothing.")
 @click.option(
@@ -80,6 +89,9 @@ def selftest(context: click.Context, /, **options: Any) -> None:
     Each mutant is a good device behind a proxy with one named change. Exit code: 0 all killed and no false positive;
     1 otherwise; 2 usage; 3 a device does not start; 130 interrupted.
     """
+    if options["api"]:
+        _by_api(context, options)
+        return
     contract = loaded(options["pack"])
     try:
         if options["generated"]:
@@ -151,11 +163,32 @@ def _by_rule(context: click.Context, contract: Contract, options: dict[str, Any]
         for mutant in chosen:
             click.echo(f"{mutant.name} {mutant.says}")
         return
-    given = {name for name in options if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE}
-    compared = options["compare"] and "compare" in given
+    compared = options["compare"] and _is_given(context, "compare")
     target = _target(contract, options["target"] or self_test_of(contract).quick)
     report = Report(contract, target.name, seed=options["seed"])
     _finish(report, lambda: run_generated(report, chosen, options, compared=compared), options)
+
+
+def _by_api(context: click.Context, options: dict[str, Any]) -> None:
+    """Judge generated mutants of a running device by its description."""
+    from conformance.cli.selftest_api import chosen_of_api, described_device, run_api  # noqa: PLC0415 - see _by_hand()
+    from conformance.selftest.report import Report  # noqa: PLC0415 - see _by_hand()
+
+    if not options["generated"]:
+        raise click.UsageError("--api takes mutants that are made by rule: say how many with --generated N")
+    contract, base_url = described_device(options)
+    chosen = chosen_of_api(contract, base_url, options)
+    if options["listed"]:
+        for mutant in chosen:
+            click.echo(f"{mutant.name} {mutant.says}")
+        return
+    report = Report(contract, base_url, seed=options["seed"])
+    compared = options["compare"] and _is_given(context, "compare")
+    _finish(report, lambda: run_api(report, base_url, chosen, options, compared=compared), options)
+
+
+def _is_given(context: click.Context, name: str) -> bool:
+    return context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
 
 
 def _finish(report: Report, run: Callable[[], None], options: dict[str, Any]) -> None:

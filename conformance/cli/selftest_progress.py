@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from conformance.mutation.mutant import Mutant
-    from conformance.selftest.comparison import SchemathesisResult
+    from conformance.selftest.comparison import SchemathesisResult, Settings
     from conformance.selftest.controls import ControlResult
     from conformance.selftest.generated.judging import GeneratedResult
-    from conformance.selftest.mutant_run import MutantResult, RobotPool
+    from conformance.selftest.mutant_run import MutantResult, Pool
     from conformance.selftest.report import Report
 
 
@@ -69,16 +69,23 @@ def _few(result: MutantResult) -> str:
     return ", ".join(result.mutant.catches) + (f" and {rest} more" if rest > 0 else "")
 
 
-def compare(report: Report, pool: RobotPool, mutants: Iterable[Mutant], progress: Progress) -> None:
-    """Run plain Schemathesis on the REST mutants, and add the results to the report."""
+def compare(
+    report: Report,
+    pool: Pool,
+    mutants: Iterable[Mutant],
+    progress: Progress,
+    settings: Callable[[], Settings] | None = None,
+) -> None:
+    """Run plain Schemathesis on the REST mutants, with settings that are made then, and add the results."""
     from conformance.selftest import comparison  # noqa: PLC0415 - it costs what --help need not pay
 
     if comparison.command() is None:
         report.notes.append("Schemathesis' command line is not installed, so that nothing was compared with it.")
         return
-    good, report.compared = comparison.compare(pool, mutants, tell=progress.compared)
+    chosen = settings() if settings else comparison.Settings()
+    good, report.compared = comparison.compare(pool, mutants, settings=chosen, tell=progress.compared)
     report.good = tuple(sorted(f"{operation} {code}" for operation, code in good))
     report.notes.append(
-        f"Schemathesis ran with --max-examples {comparison.EXAMPLES}, phases examples, coverage, fuzzing, and at most "
-        f"{comparison.LIMIT_S:g} s for each mutant; findings that it has of the good device as well do not count."
+        f"Schemathesis ran with all checks, --max-examples {chosen.examples}, phases {chosen.phases}, and at most "
+        f"{chosen.limit_s:g} s for each mutant; findings that it has of the good device as well do not count."
     )

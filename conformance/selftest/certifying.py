@@ -173,7 +173,8 @@ def robot_of(job: Job, folder: Path) -> RobotUnderTest:
         statement=statement,
         contract=contract,
         claims=statement.claimed(contract),
-        allow_motion=True,
+        # A device that belongs to somebody is not moved.
+        allow_motion=not contract.described,
         seed=job.seed,
         effort=Effort(job.effort),
     )

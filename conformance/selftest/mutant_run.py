@@ -4,6 +4,7 @@ import queue
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Self
 
 from conformance.contract.pack import Contract
@@ -44,8 +45,63 @@ class MutantResult:
     reasons: dict[str, str] = field(default_factory=dict)
 
 
-class RobotPool:
+class Pool:
     """Good devices, each with a proxy in front that can turn it into a mutant; one for each parallel run.
+
+    Args:
+        contract: the pack.
+        kind: the devices' name.
+        size: number of devices.
+    """
+
+    def __init__(self, contract: Contract, kind: str, size: int) -> None:
+        self.contract, self.kind, self.size = contract, kind, size
+        self._stack = ExitStack()
+        self._free: queue.Queue[tuple[Robot, Proxy]] = queue.Queue()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def add(self, robot: Robot) -> None:
+        """Put a proxy in front of a device, and the two into the pool."""
+        proxy = Proxy(robot.rest, robot.publishers or robot.subscribers)
+        self._stack.callback(proxy.close)
+        self._free.put((robot, proxy))
+
+    def take(self) -> tuple[Robot, Proxy]:
+        """Return a device that no run uses, and its proxy."""
+        return self._free.get()
+
+    def give(self, robot: Robot, proxy: Proxy) -> None:
+        """Return a device and its proxy to the pool, and remove the mutant from the proxy."""
+        proxy.change, proxy.incomplete_request = unchanged, None
+        proxy.serial = proxy.backwards = proxy.forgetful = False
+        proxy.broken = []
+        self._free.put((robot, proxy))
+
+
+class DescribedPool(Pool):
+    """A running device of which only its description is known, behind several proxies.
+
+    Args:
+        contract: made from its description.
+        base_url: URL below which its operations are.
+        statement: file with what may be called.
+        size: number of proxies.
+    """
+
+    def __init__(self, contract: Contract, base_url: str, statement: Path, size: int) -> None:
+        super().__init__(contract, base_url, size)
+        device = GoodDevice(base_url, lambda _: [], statement)
+        for _ in range(size):
+            self.add(Robot(contract.directory, device, base_url))
+
+
+class RobotPool(Pool):
+    """Good devices that are started for the pool.
 
     Args:
         contract: the pack.
@@ -58,36 +114,13 @@ class RobotPool:
     """
 
     def __init__(self, contract: Contract, device: GoodDevice, size: int, domain_id: int = 0) -> None:
-        self.contract, self.kind = contract, device.name
-        self._stack = ExitStack()
-        self._free: queue.Queue[tuple[Robot, Proxy]] = queue.Queue()
-        self.size = size
+        super().__init__(contract, device.name, size)
         try:
             for number in range(size):
-                robot = self._stack.enter_context(running(contract, device, domain_id + number))
-                proxy = Proxy(robot.rest, robot.publishers or robot.subscribers)
-                self._stack.callback(proxy.close)
-                self._free.put((robot, proxy))
+                self.add(self._stack.enter_context(running(contract, device, domain_id + number)))
         except BaseException:
             self._stack.close()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stack.close()
-
-    def take(self) -> tuple[Robot, Proxy]:
-        """Return a device that no run uses, and its proxy."""
-        return self._free.get()
-
-    def give(self, robot: Robot, proxy: Proxy) -> None:
-        """Return a device and its proxy to the pool, and remove the mutant from the proxy."""
-        proxy.change, proxy.incomplete_request = unchanged, None
-        proxy.serial = proxy.backwards = proxy.forgetful = False
-        proxy.broken = []
-        self._free.put((robot, proxy))
 
 
 def become(proxy: Proxy, mutant: Mutant) -> None:
@@ -102,7 +135,7 @@ def job_for(robot: Robot, proxy: Proxy, effort: str, seed: int, **more: Any) -> 
     return job_at(proxy.before(robot), effort=effort, seed=seed, timeout_s=_TIMEOUTS[effort], **more)
 
 
-def run_unchanged(pool: RobotPool, effort: str = "quick", seed: int = 0) -> Outcome:
+def run_unchanged(pool: Pool, effort: str = "quick", seed: int = 0) -> Outcome:
     """Return the outcome of the good robot behind a proxy that changes nothing: the A/A control."""
     robot, proxy = pool.take()
     try:
@@ -112,7 +145,7 @@ def run_unchanged(pool: RobotPool, effort: str = "quick", seed: int = 0) -> Outc
 
 
 def run_mutants(
-    pool: RobotPool,
+    pool: Pool,
     mutants: Iterable[Mutant],
     *,
     effort: str = "quick",

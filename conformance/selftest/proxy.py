@@ -75,7 +75,8 @@ class Proxy:
     def before(self, robot: Robot) -> Robot:
         """Return the robot with the proxy's addresses, as its clients reach it."""
         publishers, subscribers = self.wsdl(robot.publishers), self.wsdl(robot.subscribers)
-        return replace(robot, rest=self.rest, publishers=publishers, subscribers=subscribers)
+        base = urlsplit(robot.rest).path.rstrip("/")
+        return replace(robot, rest=self.rest + base, publishers=publishers, subscribers=subscribers)
 
     @property
     def listens(self) -> dict[str, tuple[str, int]]:

@@ -8,6 +8,7 @@ from typing import Any
 from conformance.contract.pack import Contract
 from conformance.selftest.comparison import SchemathesisResult
 from conformance.selftest.controls import ControlResult
+from conformance.selftest.generated import api_report
 from conformance.selftest.generated import report as by_rule
 from conformance.selftest.generated.judging import KILLED, NOT_REACHED, GeneratedResult
 from conformance.selftest.mutant_run import MutantResult
@@ -26,6 +27,7 @@ class Report:
         notes: remarks for the reader.
         generated_results: results of the generated mutants.
         seed: seed of the sample of generated mutants.
+        blamed: requirements that the unchanged described device does not pass, with the reason.
     """
 
     contract: Contract
@@ -38,6 +40,7 @@ class Report:
     seconds: float = 0.0
     generated_results: list[GeneratedResult] = field(default_factory=list)
     seed: int = 0
+    blamed: dict[str, str] = field(default_factory=dict)
 
     @property
     def tried(self) -> list[MutantResult]:
@@ -112,6 +115,7 @@ class Report:
                 if self.generated_results
                 else {}
             ),
+            **({"false_alarms": self.blamed} if self.contract.described else {}),
         }
 
     def write(self, out: Path) -> Path:
@@ -128,6 +132,9 @@ class Report:
 
     def matrix(self) -> str:
         """Return Markdown tables: each mutant with the requirements that killed it; rates of generated mutants."""
+        if self.contract.described:
+            seen = self.generated_results, self.blamed, self.compared, self.good
+            return api_report.page(self.target, *seen, self.notes)
         if self.generated_results:
             theirs = {seen.mutant: seen.killed for seen in self.compared}
             return by_rule.rates_page(self.contract, self.generated_results, self.target, self.seed, theirs, self.notes)
@@ -181,6 +188,11 @@ class Report:
             lines.append(f"FALSE POSITIVE {one.robot}{where}, seed {one.seed}, exit code {code}: {said}")
         if self.generated_results:
             lines.append(by_rule.summary(self.contract, self.generated_results))
+        if self.contract.described:
+            alarms = "; ".join(f"{id_}: {why[:200]}" for id_, why in self.blamed.items()) or "none"
+            lines.append(f"False alarms on the unchanged device: {alarms}")
+            only = api_report.only_theirs(self.generated_results, self.compared)
+            lines += [f"KILLED BY SCHEMATHESIS ALONE {one}" for one in only]
         if self.compared:
             theirs = {seen.mutant for seen in self.compared if seen.killed}
             ours = {result.mutant.name for result in self.tried if not result.survived}

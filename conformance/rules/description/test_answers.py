@@ -26,6 +26,9 @@ _ANY_TIME = frozenset(
 )
 # ... and these, unless the request was the operation's usual one.
 _OF_REQUEST = frozenset({405, 406, 415, 501})
+# Of these, HTTP knows these only as responses to requests with one of these fields (RFC 9110 13, 14).
+_ASKED_FOR = frozenset({206, 304})
+_ASKING = frozenset({"range", "if-range", "if-match", "if-none-match", "if-modified-since", "if-unmodified-since"})
 _CRASHES = frozenset({500, 502, 504})
 _FORMAT = re.compile(r'"format": "([^"]+)"')
 _BAD_REQUEST, _NO_CONTENT = 400, 204
@@ -51,7 +54,10 @@ def _by_server(probe: Probe) -> bool:
 
 
 def _in_question(probe: Probe, status: int) -> bool:
-    """Return whether the description has to declare a status."""
+    """Return whether the description has to declare a status; HTTP has no part and no 304 that nobody asked for."""
+    if status in _ASKED_FOR:
+        names = {name.lower() for name, _ in probe.exchange.request.headers} if probe.exchange else _ASKING
+        return not names & _ASKING
     return status not in _ANY_TIME and (probe.kind in _PLAIN or status not in _OF_REQUEST)
 
 

@@ -19,7 +19,7 @@ def _numbers(change: Callable[[float], str]) -> Callable[[bytes], bytes]:
     return lambda body: _NUMBER.sub(lambda found: change(float(found[0])).encode(), body)
 
 
-_BODIES: dict[str, Callable[[bytes], bytes]] = {
+BODIES: dict[str, Callable[[bytes], bytes]] = {
     "body-truncate": lambda body: body[: len(body) // 2],
     "body-empty": lambda _: b"",
     "body-duplicate": lambda body: body + body,
@@ -40,7 +40,7 @@ def of_bodies(exchange: Exchange) -> Iterator[GeneratedMutant]:
     """Yield mutants that alter the whole body of successful responses in each format, and the numbers in plain text."""
     for media_type in exchange.formats:
         form = media_type.rpartition("/")[2].replace("plain", "text")
-        edits = {**_BODIES, **_NUMBERS} if form == "text" else _BODIES
+        edits = {**BODIES, **_NUMBERS} if form == "text" else BODIES
         json_ = form == "json"
         classes = classes_of_answers(exchange) if json_ or exchange.side == "soap" else ("rest-formats", "http")
         for operator, edit in edits.items():
@@ -61,8 +61,16 @@ def of_bodies(exchange: Exchange) -> Iterator[GeneratedMutant]:
             )
 
 
-def crossed(exchange: Exchange, mode: str) -> Callable[[Tally], Change]:
-    """Return a change that sends the robot's previous response, of any operation, instead of the current one."""
+def crossed(
+    exchange: Exchange, mode: str, breaks: Callable[[Response], bool] = lambda _: True
+) -> Callable[[Tally], Change]:
+    """Return a change that sends the robot's previous response, of any operation, instead of the current one.
+
+    Args:
+        exchange: the operation.
+        mode: when.
+        breaks: whether such a response breaks a rule; others are left as they are.
+    """
 
     def make(tally: Tally) -> Change:
         before: list[Response] = []
@@ -70,7 +78,7 @@ def crossed(exchange: Exchange, mode: str) -> Callable[[Tally], Change]:
         def alter(request: Request, response: Response) -> Response | None:
             then = before[-1] if before else None
             before[:] = [response]
-            if then is None or not exchange.concerns(request) or then.body == response.body:
+            if then is None or not exchange.concerns(request) or then.body == response.body or not breaks(then):
                 return None
             return then.copy()
 

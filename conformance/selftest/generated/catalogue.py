@@ -6,6 +6,7 @@ from functools import cache
 
 from conformance.contract.pack import Contract
 from conformance.selftest.generated import bodies, heads, lenience
+from conformance.selftest.generated.described import described_mutants
 from conformance.selftest.generated.mutant import MODES, GeneratedMutant, classes_of_answers, of_answer, of_request
 from conformance.selftest.generated.open_places import open_place
 from conformance.selftest.generated.operators import OPERATORS, Operator
@@ -26,6 +27,8 @@ def every_change(contract: Contract) -> tuple[GeneratedMutant, ...]:
 @cache
 def generated_mutants(contract: Contract) -> tuple[GeneratedMutant, ...]:
     """Return the generated mutants: the changes that break a clause of the contract."""
+    if contract.described:
+        return described_mutants(contract)
     return tuple(change for change in every_change(contract) if open_place(contract, change) is None)
 
 

@@ -12,7 +12,7 @@ from conformance.mutation.messages import unchanged
 from conformance.selftest.at_once import each_at_once
 from conformance.selftest.certifying import Outcome, run_job, statement_of
 from conformance.selftest.generated.mutant import GeneratedMutant, Tally
-from conformance.selftest.mutant_run import RobotPool, job_for
+from conformance.selftest.mutant_run import Pool, job_for
 from conformance.selftest.proxy import Proxy
 from conformance.selftest.robots import Robot
 
@@ -56,7 +56,7 @@ class GeneratedResult:
 
 
 def judge(
-    pool: RobotPool,
+    pool: Pool,
     mutants: Iterable[GeneratedMutant],
     *,
     efforts: tuple[str, ...] = ("quick", "standard"),
@@ -96,10 +96,22 @@ class _Control:
         """Return the requirements that the unchanged device has failed or warned so far at an effort."""
         return frozenset(id_ for id_, refuted in self._known.get(effort, {}).items() if refuted)
 
-    def without(self, ids: tuple[str, ...], robot: Robot, proxy: Proxy, effort: str) -> tuple[str, ...]:
-        """Return those of the given requirements that the unchanged device passes; each is tried on it once."""
+    def without(
+        self, ids: tuple[str, ...], robot: Robot, proxy: Proxy, effort: str, *, described: bool = False
+    ) -> tuple[str, ...]:
+        """Return those of the given requirements that the unchanged device passes; each is tried on it once.
+
+        Of a ``described`` device all are tried at once.
+        """
         with self._lock:
             known = self._known.setdefault(effort, {})
+            if described and not known:
+                # Alone, a requirement sees less than in a whole run: of what every check sends, observers see all.
+                proxy.change = unchanged
+                outcome = run_job(job_for(robot, proxy, effort, self._seed))
+                if outcome.exit_code < 0:
+                    return ()
+                known |= {id_: id_ in outcome.not_passed() for id_ in outcome.verdicts}
             if new := tuple(id_ for id_ in ids if id_ not in known):
                 proxy.change = unchanged
                 classes = tuple(dict.fromkeys(id_.split("/")[0] for id_ in new))
@@ -122,7 +134,10 @@ def _judge(
 ) -> GeneratedResult:
     result = GeneratedResult(mutant)
     tally = Tally()
-    musts = frozenset(id_ for id_, requirement in contract.ledger.items() if requirement.level is Level.MUST)
+    # Any requirement ends a run on a described device: what else it does not keep is of no use.
+    musts = frozenset(
+        id_ for id_, requirement in contract.ledger.items() if contract.described or requirement.level is Level.MUST
+    )
     given_up = False
     claimed = statement_of(job_for(robot, proxy, efforts[0], seed), contract).claimed(contract)
     waiting = [(effort, attempt) for effort in efforts for attempt in _attempts(contract, mutant, claimed)]
@@ -139,11 +154,12 @@ def _judge(
         if proxy.broken:
             result.outcome, result.reason = BROKEN, proxy.broken[0]
             return result
-        if shown := control.without(outcome.not_passed(), robot, proxy, effort):
+        if shown := control.without(outcome.not_passed(), robot, proxy, effort, described=contract.described):
             _note(result, outcome, shown)
             return result
         # The good device does not pass what ended the run, which is known by now: once more, to its end.
-        if not (outcome.fails & musts) - known:
+        ended_by = frozenset(outcome.not_passed()) if contract.described else outcome.fails
+        if outcome.exit_code < 0 or not (ended_by & musts) - known:
             waiting.pop(0)
     result.outcome = GIVEN_UP if given_up else SURVIVED if tally.altered else NOT_REACHED
     return result
@@ -156,7 +172,13 @@ def _note(result: GeneratedResult, outcome: Outcome, by: tuple[str, ...]) -> Non
 
 
 def _attempts(contract: Contract, mutant: GeneratedMutant, claimed: tuple[str, ...]) -> Iterator[Attempt]:
-    """Yield what to judge a mutant by: first the requirements that name its operation, then whole classes."""
+    """Yield what to judge a mutant by: first the requirements that name its operation, then whole classes.
+
+    A described device's classes are judged all at once: its mutants may be noticed by any of them.
+    """
+    if contract.described:
+        yield claimed, ()
+        return
     classes = tuple(class_ for class_ in mutant.classes if class_ in claimed)
     if not classes or classes[0] != mutant.classes[0]:
         # The class that should see it is not judged: any other may.

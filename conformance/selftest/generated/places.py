@@ -112,7 +112,7 @@ def classes_of(contract: Contract, operation: str, interface: Interface) -> tupl
 @cache
 def exchanges(contract: Contract) -> tuple[Exchange, ...]:
     """Return every operation of a contract, REST before SOAP."""
-    found = [_rest(contract, operation) for operation in operations_of(contract)]
+    found = [rest_exchange(contract, operation) for operation in operations_of(contract)]
     for interface, description in _services(contract):
         for operation in description.operations:
             classes = classes_of(contract, operation.name, interface)
@@ -129,8 +129,9 @@ def _services(contract: Contract) -> Iterator[tuple[Interface, wsdl.Description]
             yield interface, wsdl.read_file(path)
 
 
-def _rest(contract: Contract, operation: Operation) -> Exchange:
-    parts = PARAMETER.split(operation.template)
+def rest_exchange(contract: Contract, operation: Operation, base: str = "") -> Exchange:
+    """Return the exchange of an operation below a base path."""
+    parts = PARAMETER.split(base + operation.template)
     pattern = "".join(re.escape(part) if i % 2 == 0 else "([^/]*)" for i, part in enumerate(parts))
     statuses = [
         status
@@ -190,6 +191,12 @@ def _of_schema(exchange: Exchange, part: str, medium: str, schema: Schema, examp
             value = value.get(step) if isinstance(value, dict) else None
         known = value if isinstance(value, str | int | float) else None
         yield Place(exchange, part, medium, steps, kind_of(item), siblings, required, known)
+
+
+def fields_of(exchange: Exchange, schema: Schema) -> Iterator[tuple[Place, Schema]]:
+    """Yield each member of the JSON responses of a schema, with its own schema."""
+    for steps, item, siblings, required in _walk(schema, ()):
+        yield Place(exchange, "answer", "json", steps, kind_of(item), siblings, required), item
 
 
 def _walk(schema: Schema, steps: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Schema, tuple[str, ...], bool]]:

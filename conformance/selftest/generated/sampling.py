@@ -61,11 +61,17 @@ class Rate:
     @property
     def bound(self) -> float:
         """Return the lower bound of Wilson's 95 % interval for the share (E. B. Wilson, JASA 22, 1927)."""
+        return self._wilson(-1) if self.reached else 0.0
+
+    @property
+    def top(self) -> float:
+        """Return the upper bound of the same interval."""
+        return min(1.0, self._wilson(1)) if self.reached else 1.0
+
+    def _wilson(self, side: int) -> float:
         n, p = self.reached, self.share
-        if not n:
-            return 0.0
         centre = p + _Z**2 / (2 * n)
-        return (centre - _Z * math.sqrt(p * (1 - p) / n + _Z**2 / (4 * n**2))) / (1 + _Z**2 / n)
+        return (centre + side * _Z * math.sqrt(p * (1 - p) / n + _Z**2 / (4 * n**2))) / (1 + _Z**2 / n)
 
     def words(self) -> str:
         """Return the rate as a phrase for people."""
@@ -83,7 +89,11 @@ def rates_by(results: Iterable[GeneratedResult], key: str) -> dict[str, Rate]:
     """Return kill rates grouped by ``operator`` (with its mode), ``class`` or ``effort`` (of the last run)."""
     groups: dict[str, list[GeneratedResult]] = defaultdict(list)
     for result in results:
-        mutant = result.mutant
-        names = {"operator": mutant.operator, "class": mutant.exchange.class_, "effort": result.effort}
-        groups[names[key]].append(result)
+        groups[group_of(result, key)].append(result)
     return {name: rate_of(group) for name, group in sorted(groups.items())}
+
+
+def group_of(result: GeneratedResult, key: str) -> str:
+    """Return a result's ``operator``, ``class`` or ``effort``."""
+    mutant = result.mutant
+    return {"operator": mutant.operator, "class": mutant.exchange.class_, "effort": result.effort}[key]

@@ -1,0 +1,97 @@
+"""``roaas selftest --api``: mutants by rule before any running device with a description."""
+
+from __future__ import annotations
+
+import fnmatch
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+import click
+
+from conformance.api.call_rules import CallRules
+from conformance.cli.selftest_progress import Progress, compare
+from conformance.contract.toml_file import basic_string
+from conformance.documents.description import DescriptionError
+from conformance.documents.openapi import operations_of
+from conformance.engine.describing import UnreachableError, described_contract
+from conformance.statement.statement import Endpoints
+
+if TYPE_CHECKING:
+    from conformance.contract.pack import Contract
+    from conformance.selftest.generated.mutant import GeneratedMutant
+    from conformance.selftest.report import Report
+
+
+def described_device(options: dict[str, Any]) -> tuple[Contract, str]:
+    """Return the contract of the device's description, and the URL below which its operations are.
+
+    Raises:
+        click.UsageError: there is no usable description.
+    """
+    from conformance.engine.pytest_run import connection_of  # noqa: PLC0415 - see selftest.py
+
+    try:
+        contract, where, _ = described_contract(
+            options["api"], (), options["base_url"], Endpoints(), connection_of(Endpoints()), options["out"]
+        )
+    except (DescriptionError, UnreachableError, OSError) as error:
+        raise click.UsageError(str(error)) from error
+    return contract, str(where.rest)
+
+
+def chosen_of_api(contract: Contract, base_url: str, options: dict[str, Any]) -> list[GeneratedMutant]:
+    """Return the sample of mutants of the operations that may be called.
+
+    Raises:
+        click.UsageError: no mutant has such a name.
+    """
+    from conformance.selftest.generated.described import described_mutants  # noqa: PLC0415 - see selftest.py
+    from conformance.selftest.generated.sampling import sample  # noqa: PLC0415 - see selftest.py
+
+    called, patterns = set(callable_operations(contract, options)), options["patterns"] or ("*",)
+    every = described_mutants(contract, urlsplit(base_url).path.rstrip("/"))
+    fitting = [one for one in every if one.exchange.name in called]
+    fitting = [one for one in fitting if any(fnmatch.fnmatch(one.name, pattern) for pattern in patterns)]
+    if not fitting:
+        raise click.UsageError(f"no mutant of an operation that may be called has a name like {', '.join(patterns)}")
+    return sample(fitting, options["generated"], options["seed"])
+
+
+def callable_operations(contract: Contract, options: dict[str, Any]) -> tuple[str, ...]:
+    """Return the operations that the options allow to be called."""
+    rules = CallRules(options["allow"], options["never"])
+    return tuple(item.label for item in operations_of(contract) if rules.decide(item).may)
+
+
+def run_api(
+    report: Report, base_url: str, chosen: list[GeneratedMutant], options: dict[str, Any], *, compared: bool
+) -> None:
+    """Judge the unchanged device and the mutants, and add the results to the report."""
+    from conformance.selftest.comparison import best_settings  # noqa: PLC0415 - see selftest.py
+    from conformance.selftest.generated.judging import judge  # noqa: PLC0415 - as above
+    from conformance.selftest.mutant_run import DescribedPool, run_unchanged  # noqa: PLC0415 - as above
+
+    progress = Progress(report, len(chosen))
+    with tempfile.TemporaryDirectory() as folder:
+        statement = Path(folder) / "calls.toml"
+        allow, never = (", ".join(map(basic_string, options[key])) for key in ("allow", "never"))
+        statement.write_text(f"[calls]\nallow = [{allow}]\nnever = [{never}]\n", encoding="utf-8")
+        with DescribedPool(report.contract, base_url, statement, options["parallel"]) as pool:
+            unchanged = run_unchanged(pool, "standard")
+            report.blamed = {id_: unchanged.reasons.get(id_, "") for id_ in unchanged.not_passed()}
+            for id_, reason in report.blamed.items():
+                click.echo(f"the unchanged device: {id_}: {reason}"[:400], err=True)
+            efforts = ("quick", "standard") if options["effort"] == "quick" else ("standard",)
+            started = time.monotonic()
+            report.generated_results = judge(pool, chosen, efforts=efforts, seed=options["seed"], tell=progress.by_rule)
+            report.notes.append(
+                f"A run of the unchanged device took {unchanged.seconds:.0f} s at standard effort with "
+                f"{unchanged.requests} requests; the mutants took {time.monotonic() - started:.0f} s."
+            )
+            if compared:
+                operations = callable_operations(report.contract, options)
+                mutants = [one.as_mutant() for one in chosen]
+                compare(report, pool, mutants, progress, lambda: best_settings(pool, operations, unchanged.seconds))

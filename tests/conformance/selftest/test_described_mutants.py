@@ -1,0 +1,130 @@
+"""Mutants by rule of described devices: only what breaks a norm or the description counts."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from conformance.contract.described import write_described_pack
+from conformance.contract.pack import Contract
+from conformance.mutation.messages import Request, Response
+from conformance.selftest.comparison import SchemathesisResult
+from conformance.selftest.generated.api_report import only_theirs, page
+from conformance.selftest.generated.described import described_mutants
+from conformance.selftest.generated.judging import KILLED, SURVIVED, GeneratedResult
+from conformance.selftest.generated.mutant import GeneratedMutant, Tally
+
+_LAMP = {
+    "type": "object",
+    "required": ["id", "state"],
+    "properties": {
+        "id": {"type": "integer", "minimum": 1},
+        "state": {"type": "string", "enum": ["on", "off"]},
+        "note": {"type": ["string", "null"]},
+    },
+}
+_JSON = {"application/json": {"schema": _LAMP}}
+_DESCRIPTION = {
+    "openapi": "3.1.0",
+    "info": {"title": "Lamps", "version": "1"},
+    "paths": {
+        "/lamps/{id}": {
+            "get": {
+                "parameters": [
+                    {"name": "id", "in": "path", "required": True, "schema": {"type": "integer", "maximum": 9}},
+                    {"name": "fine", "in": "query", "schema": {"type": "boolean"}},
+                ],
+                "responses": {"200": {"description": "it", "content": _JSON}, "404": {"description": "none"}},
+            }
+        }
+    },
+}
+_GOOD = {"id": 3, "state": "on", "note": None}
+
+
+@pytest.fixture(name="mutants")
+def mutants_fixture(tmp_path: Path) -> dict[str, GeneratedMutant]:
+    """Return the mutants of a lamp, by name."""
+    contract = Contract.load(write_described_pack(tmp_path, _DESCRIPTION, _DESCRIPTION))
+    return {one.name.replace("GET /lamps/{id}", "lamp"): one for one in described_mutants(contract, "/v1")}
+
+
+def _sent(mutant: GeneratedMutant, target: str, value: object = None) -> tuple[Response, int]:
+    """Return what a client gets, and how many messages were altered; invalid ids and texts are refused with 404."""
+    tally = Tally()
+
+    def lamp(request: Request) -> Response:
+        is_id = request.path.rpartition("/")[2] in set("123456789")
+        fine = request.query in {"", "fine=true", "fine=false"}
+        body = json.dumps(_GOOD if value is None else value).encode()
+        return Response(200, [("Content-Type", "application/json")], body) if is_id and fine else Response(404)
+
+    response = mutant.make(tally)(Request("rest", "GET", target), lamp)
+    return response, tally.altered
+
+
+@pytest.mark.parametrize(
+    ("name", "member", "becomes"),
+    [("drop:lamp:200.id", "id", None), ("below:lamp:200.id", "id", 0), ("enum:lamp:200.state", "state", "roaas")],
+)
+def test_a_member_that_breaks_the_schema_is_altered(
+    mutants: dict[str, GeneratedMutant], name: str, member: str, becomes: object
+) -> None:
+    """Alter a member, so that the body breaks its schema."""
+    response, altered = _sent(mutants[name], "/v1/lamps/3")
+    assert json.loads(response.body).get(member) == becomes
+    assert altered == 1
+
+
+@pytest.mark.parametrize("name", ["drop:lamp:200.note", "null:lamp:200.note", "status:lamp:answer-404"])
+def test_what_the_description_leaves_open_is_no_mutant(mutants: dict[str, GeneratedMutant], name: str) -> None:
+    """Make no mutant that only does what the description allows."""
+    assert name not in mutants
+
+
+def test_what_breaks_the_schema_anyway_is_left_as_it_is(mutants: dict[str, GeneratedMutant]) -> None:
+    """Alter no response that the device itself got wrong: that would be no fault of the mutant."""
+    response, altered = _sent(mutants["drop:lamp:200.id"], "/v1/lamps/3", {"id": 3, "state": "purple"})
+    assert json.loads(response.body)["id"] == 3
+    assert altered == 0
+
+
+def test_another_path_is_left_as_it_is(mutants: dict[str, GeneratedMutant]) -> None:
+    """Alter nothing outside the base path."""
+    assert _sent(mutants["drop:lamp:200.id"], "/lamps/3")[1] == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "target", "status"),
+    [
+        ("takes-type:lamp:query.fine", "/v1/lamps/3?fine=perhaps", 200),
+        ("takes-above:lamp:path.id", "/v1/lamps/10", 200),
+        ("refuses-value:lamp:query.fine:false", "/v1/lamps/3?fine=false", 422),
+        ("needs-optional:lamp:query.fine", "/v1/lamps/3", 422),
+        ("crash-negative:lamp:path.id", "/v1/lamps/-1", 500),
+    ],
+)
+def test_requests_are_treated_otherwise_than_described(
+    mutants: dict[str, GeneratedMutant], name: str, target: str, status: int
+) -> None:
+    """Take what the description forbids, refuse what it allows, fail at what is unusual."""
+    response, altered = _sent(mutants[name], target)
+    assert (response.status, altered) == (status, 1)
+
+
+def test_a_valid_request_is_left_as_it_is(mutants: dict[str, GeneratedMutant]) -> None:
+    """Let a lenient mutant treat valid requests as the device does."""
+    assert _sent(mutants["takes-above:lamp:path.id"], "/v1/lamps/3")[1] == 0
+
+
+def test_the_page_has_both_tools_in_one_table_and_names_what_only_the_other_kills(
+    mutants: dict[str, GeneratedMutant],
+) -> None:
+    """Compare on the same mutants, and name each that only Schemathesis kills."""
+    ours, theirs = mutants["drop:lamp:200.id"], mutants["enum:lamp:200.state"]
+    results = [GeneratedResult(ours, KILLED, altered=1), GeneratedResult(theirs, SURVIVED, altered=1)]
+    compared = [SchemathesisResult(ours.name, False, ()), SchemathesisResult(theirs.name, True, ("GET /x ST108",))]
+    text = page("http://lamp", results, {}, compared, ("GET /x ST104",), ())
+    assert "| roaas certify | 1 | 2 | 50.0% |" in text
+    assert "| plain Schemathesis | 1 | 2 | 50.0% |" in text
+    assert only_theirs(results, compared) == [f"{theirs.name}: GET /x ST108"]
