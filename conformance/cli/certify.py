@@ -224,7 +224,7 @@ def _certify(chosen: Statement, options: dict[str, Any], contract: Contract, sta
         if chosen.endpoints.ca_file:
             connection.tls()
         requirements = judged_by(contract, options["requirements"])
-        baseline = load_baseline(options["baseline"], contract.ledger) if options["baseline"] else ()
+        baseline = load_baseline(options["baseline"], contract.ledger, contract.renamed) if options["baseline"] else ()
         given = Given(
             statement=file_digest(statement) if statement else None,
             baseline=file_digest(options["baseline"]) if options["baseline"] else None,
@@ -244,7 +244,7 @@ def _run(chosen: Statement, options: dict[str, Any], contract: Contract) -> Run:
     """Return the run that the options describe."""
     from conformance.verdict.run import Run, seed_of_nonce  # noqa: PLC0415 - see _certify
 
-    known = {item.class_ for item in contract.ledger.values()}
+    known = {name for item in contract.ledger.values() for name in item.classes}
     return Run(
         statement=chosen,
         contract=contract,

@@ -86,8 +86,8 @@ def certify(
         remarks.append("The run was interrupted; what follows is what was judged until then.")
     remarks += run.remarks
     seen, causes = draw_verdicts(run)
-    if run.requirement_set is not None:
-        seen = score(seen, run.requirement_set.requirements, f"requirement set {run.requirement_set.name}")
+    if run.requirement_set is not None and run.scored is not None:
+        seen = score(seen, run.scored, f"requirement set {run.requirement_set.name}")
     verdicts = apply_baseline(seen, baseline, dt.datetime.now(dt.UTC).date())
     # A baseline makes a run green, not a robot conformant: the classes fail all the same.
     classes, accepted = class_verdicts(seen, run.claims), class_verdicts(verdicts, run.claims)
@@ -118,8 +118,7 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
         evidence = judge.evidence[requirement.id]
         if run.aborted and not (evidence.cases or evidence.skips or evidence.errors):
             judge.stopped(requirement.id, run.aborted)
-    scored = run.requirement_set.requirements if run.requirement_set else None
-    seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, scored)
+    seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, run.scored)
     verdicts = [
         verdict_of(requirement, seen[requirement.id], run.claims, run.statement.undeclared)
         for requirement in run.contract.ledger.values()

@@ -142,7 +142,7 @@ def look_again(run: Run, connection: Connection, rest: RestInterface | None = No
     findings = [
         (number, finding, finding.exchange)
         for id_, evidence in run.judge.evidence.items()
-        if run.contract.ledger[id_].class_ in run.claims
+        if run.contract.ledger[id_].binds(run.claims)
         for number, finding in enumerate(evidence.findings.values())
         if isinstance(finding.exchange, Exchange) and _may_be_sent(run, finding.exchange)
     ]

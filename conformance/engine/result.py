@@ -107,6 +107,10 @@ def _requirement(verdict: Verdict) -> dict[str, Any]:
     return {
         "id": requirement.id,
         "class": requirement.class_,
+        **({"also": list(requirement.also)} if requirement.also else {}),
+        **({"aliases": list(requirement.aliases)} if requirement.aliases else {}),
+        "topic": requirement.topic,
+        **({"breaks": requirement.breaks} if requirement.breaks else {}),
         "level": requirement.level,
         "source": requirement.source,
         "origin": requirement.origin,

@@ -49,6 +49,7 @@ class _Checks:
 
     def __init__(self, contract: Contract) -> None:
         self._ledger, self._everywhere = contract.ledger, contract.name == DEFAULT_PACK
+        self._renamed = contract.renamed
         self.found: dict[str, dict[str, None]] = defaultdict(dict)
         self.broken = ""
 
@@ -57,7 +58,8 @@ class _Checks:
         marked = (id_ for mark in item.iter_markers("requirement") for id_ in mark.args)
         # What the generic suite judges by convention binds only packs whose ledger has it.
         own = self._everywhere or GENERIC_RULES not in item.path.parents
-        for id_ in expanded(marked, self._ledger):
+        for part in expanded(marked, self._ledger):
+            id_ = self._renamed.get(part, part)
             if own or id_ in self._ledger:
                 self.found[id_][f"{item.path.stem}::{item.name.partition('[')[0]}"] = None
 

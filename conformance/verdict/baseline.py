@@ -1,9 +1,10 @@
 """A baseline: a file of expected failures, each with a reason and an expiry date."""
 
 import datetime as dt
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 import msgspec
 
@@ -33,18 +34,35 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     expected: tuple[Expectation, ...] = ()
 
 
-def load_baseline(path: Path, known: Iterable[str]) -> tuple[Expectation, ...]:
+def load_baseline(
+    path: Path, known: Iterable[str], renamed: Mapping[str, str] = MappingProxyType({})
+) -> tuple[Expectation, ...]:
     """Read a baseline file: ``[[expected]]`` tables with requirement, reason and expires.
+
+    Args:
+        path: the file.
+        known: ids of the contract's requirements.
+        renamed: the present id by each older one; an entry with an older id names it in its reason.
 
     Raises:
         BaselineError: the file cannot be read, or an entry is incomplete or names an unknown requirement.
     """
     baseline = read_toml(path, _File, BaselineError).expected
     ids = set(known)
+    baseline = tuple(_renewed(entry, renamed) for entry in baseline)
     for entry in baseline:
         if entry.requirement not in ids:
             raise BaselineError(f"{path}: {entry.requirement!r} is no requirement; `roaas contract list` shows them")
     return baseline
+
+
+def _renewed(entry: Expectation, renamed: Mapping[str, str]) -> Expectation:
+    """Return an entry with its requirement's present id."""
+    new = renamed.get(entry.requirement)
+    if new is None:
+        return entry
+    reason = f"{entry.reason}; {entry.requirement} is {new} now"
+    return msgspec.structs.replace(entry, requirement=new, reason=reason)
 
 
 def apply_baseline(verdicts: Iterable[Verdict], baseline: Iterable[Expectation], today: dt.date) -> list[Verdict]:

@@ -72,6 +72,14 @@ class Run:
         self.judge = Judge(self.contract.ledger)
 
     @property
+    def scored(self) -> frozenset[str] | None:
+        """The requirements that count: those of the frozen set, some of them by an alias; None: all."""
+        if self.requirement_set is None:
+            return None
+        frozen, ledger = self.requirement_set.requirements.keys(), self.contract.ledger.values()
+        return frozenset(item.id for item in ledger if not frozen.isdisjoint({item.id, *item.aliases}))
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """Remarks for the report about cases that were omitted because responses took long or time ran out."""
         found = [self.effort.speed.remark] if self.effort.speed.remark else []

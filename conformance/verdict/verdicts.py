@@ -97,7 +97,7 @@ def verdict_of(
     def verdict(value: Value, reason: str = "") -> Verdict:
         return Verdict(requirement, value, reason, evidence)
 
-    if requirement.class_ not in claims:
+    if not requirement.binds(frozenset(claims)):
         return verdict(Value.NOT_CLAIMED, f"class {requirement.class_} is not claimed")
     if evidence.unclaimed and not evidence.cases:
         return verdict(Value.NOT_CLAIMED, evidence.unclaimed)
@@ -110,6 +110,7 @@ def verdict_of(
         value = {Level.MUST: Value.FAIL, Level.SHOULD: Value.WARN}.get(requirement.level)
         return verdict(value, reason) if value else verdict(Value.PASS, f"The requirement is optional. {reason}")
     because = evidence.because
+    parts = evidence.parts.items()
     for value, reasons in (
         (Value.SKIP, [requirement.untestable] if requirement.untestable else []),
         (Value.ERROR, evidence.errors),
@@ -117,6 +118,7 @@ def verdict_of(
         (Value.SKIP, [undeclared[need] for need in requirement.needs if need in undeclared]),
         (Value.SKIP, evidence.skips),
         (Value.SKIP, [] if evidence.cases else evidence.notes or ["nothing was executed for it"]),
+        (Value.SKIP, [f"nothing was executed for {part}, a part of it" for part, cases in parts if not cases]),
     ):
         if reasons:
             return verdict(value, "; ".join(reasons))
@@ -140,7 +142,8 @@ def class_verdicts(verdicts: Iterable[Verdict], claims: Iterable[str]) -> dict[s
     """Return verdict and reason of each class that has requirements: pass, fail, inconclusive or not-claimed."""
     by_class: dict[str, list[Verdict]] = {}
     for verdict in verdicts:
-        by_class.setdefault(verdict.requirement.class_, []).append(verdict)
+        for name in verdict.requirement.classes:
+            by_class.setdefault(name, []).append(verdict)
     return {name: _class_verdict(items, name in claims) for name, items in by_class.items()}
 
 
