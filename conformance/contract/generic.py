@@ -21,6 +21,7 @@ class ClassEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     interfaces: tuple[Interface, ...] | None = None
     one_is_enough: bool = False
     topic: Topic | None = None
+    acts: bool = False
 
 
 class _Classes(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

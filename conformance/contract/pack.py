@@ -145,6 +145,11 @@ class Contract:
             found[entry.name] = ConformanceClass(entry.name, entry.title or known.title, interfaces, enough, topic)  # type: ignore[union-attr] # checked above
         return found
 
+    @property
+    def acting(self) -> frozenset[str]:
+        """The classes whose requests have effects that only ROS, or a class about ROS, shows."""
+        return frozenset(entry.name for entry in self.manifest.class_ if entry.acts) if self.manifest else frozenset()
+
     @cached_property
     def profiles(self) -> dict[str, tuple[str, ...]]:
         """The classes that each profile claims; "full" claims all.

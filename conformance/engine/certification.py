@@ -92,6 +92,8 @@ def certify(
     # A baseline makes a run green, not a robot conformant: the classes fail all the same.
     classes, accepted = class_verdicts(seen, run.claims), class_verdicts(verdicts, run.claims)
     failed = overall(classes) is Overall.NOT_CONFORMANT
+    if not run.enough:
+        remarks.append(f"Nothing can be said of a robot {run.less}: the verdict is inconclusive unless it failed.")
     document = result_document(
         robot,
         verdicts,
@@ -108,7 +110,8 @@ def certify(
     write_traces(recordings, out)
     if run.interrupted:
         return Certification(ExitCode.INTERRUPTED, document, path)
-    return Certification(OF_VERDICT[overall(accepted)] if reached else ExitCode.UNREACHABLE, document, path)
+    code = OF_VERDICT[overall(accepted, enough=run.enough)] if reached else ExitCode.UNREACHABLE
+    return Certification(code, document, path)
 
 
 def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:

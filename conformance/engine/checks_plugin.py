@@ -276,4 +276,4 @@ class ChecksPlugin:
         """Return the Hypothesis runner, seeded by the run's seed and the check's name."""
         from conformance.verdict.explorer import Explorer  # noqa: PLC0415 - as above
 
-        return Explorer(run.seed, request.node.nodeid.rsplit("/", 1)[-1], run.effort, run.cut_short)
+        return Explorer(run.seed, request.node.nodeid.rsplit("/", 1)[-1], run.effort, run.tally)

@@ -7,7 +7,7 @@ from functools import cache
 
 import pytest
 
-from conformance.contract.classes import Level
+from conformance.contract.classes import QUESTIONS, Level
 from conformance.contract.generic import generic_ledger
 from conformance.contract.ledger import Requirement, expanded
 from conformance.contract.locating import GENERIC_RULES, ContractError
@@ -145,17 +145,17 @@ def page(contract: Contract) -> str:
         option="" if default else " --contract PACK", page="docs/coverage.md" if default else "coverage.md"
     )
     lines = [_TITLE, about, figures]
-    for class_ in contract.classes:
-        lines += ["", f"## {class_}", "", "| requirement | level | origin | text | source | checks | mutants |"]
+    for topic, question in QUESTIONS.items():
+        lines += ["", f"## {question}", "", "| requirement | level | origin | text | source | checks | mutants |"]
         lines += ["|---|---|---|---|---|---|---|"]
         for binding in found:
             item = binding.requirement
-            if item.class_ == class_:
+            if item.topic is topic:
                 cells = (
-                    f"`{item.id.split('/')[1]}`",
+                    f"`{item.id}`",
                     item.level,
                     item.origin,
-                    item.text,
+                    f"{item.text} If not: {item.breaks}" if item.breaks else item.text,
                     item.source,
                     _listed(binding.checks) or (f"untestable: {item.untestable}" if item.untestable else ""),
                     _listed(binding.mutants),

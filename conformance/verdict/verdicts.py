@@ -169,15 +169,25 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
     return ClassValue.PASS, ""
 
 
-def views(verdicts: Iterable[Verdict]) -> dict[str, View]:
-    """Return what observed each claimed class that a ROS probe could judge further."""
+def views(verdicts: Iterable[Verdict], acting: Container[str] = ()) -> dict[str, View]:
+    """Return what observed each claimed class that a ROS probe could judge further.
+
+    Args:
+        verdicts: of the run.
+        acting: classes whose requests have effects on ROS that requirements of another class are about: they were seen
+            there if what needs an observer was judged in a run with a probe.
+    """
+    verdicts = [one for one in verdicts if one.value is not Value.NOT_CLAIMED]
     seen: dict[str, View] = {}
     for verdict in verdicts:
-        if verdict.value is Value.NOT_CLAIMED or Prerequisite.PROBE not in verdict.requirement.needs:
-            continue
-        on_ros = verdict.evidence.cases > 0 and seen.get(verdict.requirement.class_) is not View.BLACK_BOX
-        seen[verdict.requirement.class_] = View.ON_ROS if on_ros else View.BLACK_BOX
-    return seen
+        for name in verdict.requirement.classes if Prerequisite.PROBE in verdict.requirement.needs else ():
+            on_ros = verdict.evidence.cases > 0 and seen.get(name) is not View.BLACK_BOX
+            seen[name] = View.ON_ROS if on_ros else View.BLACK_BOX
+    watched = View.ON_ROS in seen.values() and any(
+        Prerequisite.OBSERVER in one.requirement.needs and one.evidence.cases for one in verdicts
+    )
+    others = {name for one in verdicts for name in one.requirement.classes if name in acting}
+    return dict.fromkeys(sorted(others), View.ON_ROS if watched else View.BLACK_BOX) | seen
 
 
 def _holds_back(requirement: Requirement) -> bool:
@@ -192,11 +202,16 @@ def _holds_back(requirement: Requirement) -> bool:
     )
 
 
-def overall(classes: Mapping[str, tuple[ClassValue, str]]) -> Overall:
-    """Return the verdict on the robot: conformant, not-conformant or inconclusive."""
+def overall(classes: Mapping[str, tuple[ClassValue, str]], *, enough: bool = True) -> Overall:
+    """Return the verdict on the robot: conformant, not-conformant or inconclusive.
+
+    Args:
+        classes: verdict and reason of each class.
+        enough: whether so many cases were tried that a robot can be conformant by them.
+    """
     values = {value for value, _ in classes.values()} - {ClassValue.NOT_CLAIMED}
     if ClassValue.FAIL in values:
         return Overall.NOT_CONFORMANT
-    if ClassValue.INCONCLUSIVE in values or not values:
+    if ClassValue.INCONCLUSIVE in values or not values or not enough:
         return Overall.INCONCLUSIVE
     return Overall.CONFORMANT

@@ -48,23 +48,25 @@ class VelocityMachine(RuleBasedStateMachine):
         """Command a velocity within the limits, which the robot must reach."""
         ahead = self._ahead(linear, forward=forward) if which in "a2" else 0.0
         turn = angular * _ANGULAR_SHARE * self._robot.limits.angular_rad_s * (1 if left else -1) if which in "b2" else 0
-        self._walk.step(lambda: self._full(Velocity(linear_x=ahead, angular_z=turn if self._robot.actuated(5) else 0)))
+        self._walk.command(
+            lambda: self._full(Velocity(linear_x=ahead, angular_z=turn if self._robot.actuated(5) else 0))
+        )
 
     @rule()
     def stop(self) -> None:
         """Command zero velocity."""
-        self._walk.step(lambda: self._full(STILL))
+        self._walk.command(lambda: self._full(STILL))
 
     @rule(forward=st.booleans(), linear=_SHARES)
     def command_linear(self, *, forward: bool, linear: float) -> None:
         """PUT a linear part; the robot must keep the angular part."""
-        self._walk.step(lambda: self._linear(self._ahead(linear, forward=forward)))
+        self._walk.command(lambda: self._linear(self._ahead(linear, forward=forward)))
 
     @precondition(lambda self: self._wanted != STILL)
     @rule(component=st.integers(0, 5), times=st.sampled_from((1.0, -1.0)))
     def refused(self, component: int, times: float) -> None:
         """PUT a velocity beyond the limits; the robot must reject it and drive on as before."""
-        self._walk.step(lambda: self._refuse(component, times))
+        self._walk.command(lambda: self._refuse(component, times))
 
     def _ahead(self, share: float, *, forward: bool) -> float:
         if not self._robot.actuated(0):
