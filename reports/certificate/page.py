@@ -205,7 +205,8 @@ class Certificate:
 
     def with_verdict(self, verdict: str) -> tuple[Mapping[str, Any], ...]:
         """Return the requirements with that verdict, of all classes."""
-        return tuple(r for c in self.classes for r in c.requirements if r["verdict"] == verdict)
+        found = {r["id"]: r for c in self.classes for r in c.requirements if r["verdict"] == verdict}
+        return tuple(found.values())
 
     def counts(self) -> Iterator[tuple[str, int]]:
         """Yield each verdict that occurs with its number of requirements, the worst verdict first."""

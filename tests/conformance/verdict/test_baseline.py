@@ -62,3 +62,12 @@ def test_a_wrong_baseline_is_refused_by_name(tmp_path, text, named):
     with pytest.raises(BaselineError) as error:
         load_baseline(path, {"http/date"})
     assert named in str(error.value)
+
+
+def test_an_entry_with_an_id_that_went_is_one_of_the_requirement_that_asks_it_now(tmp_path):
+    path = tmp_path / "baseline.toml"
+    path.write_text('[[expected]]\nrequirement = "http/old"\nreason = "ticket 7"\nexpires = 2026-12-31\n')
+    (entry,) = load_baseline(path, ["http/date"], {"http/old": "http/date"})
+    assert (entry.requirement, entry.reason) == ("http/date", "ticket 7; http/old is http/date now")
+    with pytest.raises(BaselineError, match="no requirement"):
+        load_baseline(path, ["http/date"])
