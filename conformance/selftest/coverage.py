@@ -146,21 +146,23 @@ def page(contract: Contract) -> str:
     )
     lines = [_TITLE, about, figures]
     for topic, question in QUESTIONS.items():
+        own = [binding for binding in found if binding.requirement.topic is topic]
+        if not own:
+            continue
         lines += ["", f"## {question}", "", "| requirement | level | origin | text | source | checks | mutants |"]
         lines += ["|---|---|---|---|---|---|---|"]
-        for binding in found:
+        for binding in own:
             item = binding.requirement
-            if item.topic is topic:
-                cells = (
-                    f"`{item.id}`",
-                    item.level,
-                    item.origin,
-                    f"{item.text} If not: {item.breaks}" if item.breaks else item.text,
-                    item.source,
-                    _listed(binding.checks) or (f"untestable: {item.untestable}" if item.untestable else ""),
-                    _listed(binding.mutants),
-                )
-                lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+            cells = (
+                f"`{item.id}`",
+                item.level,
+                item.origin,
+                f"{item.text} If not: {item.breaks}" if item.breaks else item.text,
+                item.source,
+                _listed(binding.checks) or (f"untestable: {item.untestable}" if item.untestable else ""),
+                _listed(binding.mutants),
+            )
+            lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
     return "\n".join([*lines, *page_part(contract)]) + "\n"
 
 
