@@ -10,6 +10,7 @@ from conformance.mutation.changes import (
     Make,
     Where,
     altered,
+    hanging_up,
     header,
     instead,
     parsed,
@@ -145,6 +146,11 @@ def _page(response: Response) -> None:
 _mutant("http-large-body-fine", "content-too-large", "Bodies over 10 MiB return 204.").made(
     _big(10 * 1024 * 1024, plain(204))
 )
+_mutant(
+    "http-large-body-closes",
+    "content-too-large-answered",
+    "Bodies over 10 MiB close the connection without a response.",
+).made(hanging_up(lambda request: request.side == "rest" and len(request.body) > 10 * 1024 * 1024))
 _mutant("http-small-limit", "content-too-large", "Bodies over 20 KiB return 413.").made(
     _big(20_000, problem(413, "too large"))
 )
