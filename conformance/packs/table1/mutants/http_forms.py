@@ -206,8 +206,8 @@ _mutant(
 _mutant(
     "http-head-of-what-cannot-be-read", "method-not-allowed", "HEAD of a delivery returns 200, though GET returns 405."
 ).instead(_having(lambda request: _HEAD(request) and deliveries(request.copy(method="PUT"))), plain(200))
-_mutant("http-no-chunks", "chunked", "Chunked request bodies return 411.").instead(
-    _chunked, problem(411, "a length, please")
+_mutant("http-no-chunks", "chunked", "Chunked request bodies return 400.").instead(
+    _chunked, problem(400, "a length, please")
 )
 _mutant("http-few-chunks", "chunked", "The robot reads only 1 KiB of a chunked request body.").rewritten(
     _chunked, _shortened

@@ -144,8 +144,8 @@ _mutant("bp-type-case", "media-type-case", "A Content-Type with a capital letter
 _mutant("bp-quoted-charset", "charset-forms", "A charset in quotation marks returns 415.").instead(
     lambda request: posted(request) and '"' in (request.field("Content-Type") or ""), problem(415, "text/xml, please")
 )
-_mutant("bp-no-chunks", "chunked", "A chunked message returns 411.").instead(
-    _in_chunks, problem(411, "a length, please")
+_mutant("bp-no-chunks", "chunked", "A chunked message returns 400.").instead(
+    _in_chunks, problem(400, "a length, please")
 )
 _mutant("bp-few-chunks", "chunked", "The robot reads only 8 KiB of a chunked message.").rewritten(
     _in_chunks, _first_part
