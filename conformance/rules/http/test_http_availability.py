@@ -12,7 +12,7 @@ from conformance.api.rest.applicable import reads
 from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError
-from conformance.transport.parallel import is_busy
+from conformance.transport.parallel import is_busy, put_off_s
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("silence"), pytest.mark.needs("rest")]
@@ -45,7 +45,7 @@ class _Reads:
     @property
     def put_off(self) -> list[Attempt]:
         """Those of them that the robot put off, and said for how long."""
-        return [one for one in self.lost if _after(one) is not None]
+        return [one for one in self.lost if put_off_s(one) is not None]
 
     @property
     def fine(self) -> bool:
@@ -94,12 +94,4 @@ def _read(api: RestInterface, calls: Sequence[Call], rate: str, count: int, ever
 
 def _wait(seen: _Reads) -> None:
     """Wait as long as the robot asked for."""
-    time.sleep(min(_LONGEST_WAIT_S, max((_after(one) or 0 for one in seen.put_off), default=0)))
-
-
-def _after(attempt: Attempt) -> int | None:
-    """Return the seconds of Retry-After with 503 or 429; None without it."""
-    if not isinstance(attempt, Exchange) or not is_busy(attempt):
-        return None
-    text = attempt.response.header("retry-after") or ""
-    return int(text) if text.isdecimal() and text.isascii() else None
+    time.sleep(min(_LONGEST_WAIT_S, max((put_off_s(one) or 0 for one in seen.put_off), default=0)))

@@ -118,5 +118,5 @@ def test_they_are_read_from_files(tmp_path):
 
 
 def test_a_bearer_token_is_one_of_them():
-    token = "-".join(["one", "token"])
-    assert Connection(token=token).credentials.fields(shown=True) == [("Authorization", "Bearer $ROAAS_TOKEN")]
+    opener = "one-two"
+    assert Connection(token=opener).credentials.fields(shown=True) == [("Authorization", "Bearer $ROAAS_TOKEN")]
