@@ -140,9 +140,20 @@ def _without_length(request: Request) -> None:
 
 
 _both = _came(rb"(?is)(?=.*\r\nTransfer-Encoding:)(?=.*\r\nContent-Length:)")
-_mutant(
+
+
+@_mutant(
     "http-length-before-chunks", "length-and-chunks", "Content-Length ends a request that also has Transfer-Encoding."
-).altered(_both, _and_rubbish, anything)
+)
+def _length_first(request: Request, forward: Forward) -> Response:
+    if not _both(request):
+        return forward(request)
+    request.drop("Content-Length")
+    response = forward(request)
+    _and_rubbish(response)
+    return response
+
+
 _mutant(
     "http-length-and-chunks-go-on",
     "length-and-chunks-closed",
