@@ -79,6 +79,14 @@ _OBJECTS = 20_000
     "--baseline", type=click.Path(path_type=Path), help="Accepted failures, each with reason and expiry date (TOML)."
 )
 @click.option("--token-file", type=_FILE, help="File with the bearer token to send.")
+@click.option("--basic-file", type=_FILE, help="File with user:password for basic authentication.")
+@click.option(
+    "--api-key", metavar="'PLACE NAME'", help="Where the API key goes: header, query or cookie, and its name."
+)
+@click.option("--api-key-file", type=_FILE, help="File with the API key.")
+@click.option("--headers-file", type=_FILE, help="File with headers to send, 'Name: value' in each line.")
+@click.option("--client-cert-file", type=_FILE, help="Client certificate (PEM) for HTTPS.")
+@click.option("--client-key-file", type=_FILE, help="Its key, if it is not in the same file.")
 @click.option(
     "--out", type=click.Path(file_okay=False, path_type=Path), default=Path("out"), help="Folder for the results."
 )

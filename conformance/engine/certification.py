@@ -106,6 +106,7 @@ def certify(
         notes=remarks,
         interrupted=run.interrupted,
     )
+    document = robot.connection.credentials.hidden_in(document)
     path = write_result(document, out)
     write_traces(recordings, out)
     if run.interrupted:

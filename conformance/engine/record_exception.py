@@ -4,7 +4,7 @@ import traceback
 from collections.abc import Callable
 
 from conformance.scenarios.scenario import NotPossibleError
-from conformance.transport.exchange import NoAnswerError
+from conformance.transport.exchange import NoAnswerError, NotPermittedError
 from conformance.verdict.evidence import RefutedError
 from conformance.verdict.finding import Finding
 from conformance.verdict.run import Run
@@ -20,7 +20,7 @@ def record_exception(
     """
     if isinstance(error, RefutedError):
         return
-    if isinstance(error, NotPossibleError):
+    if isinstance(error, NotPossibleError | NotPermittedError):
         for id_ in ids:
             run.judge.skip(id_, str(error))
         return

@@ -3,7 +3,7 @@
 import statistics
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,8 +11,10 @@ from typing import TextIO
 
 from conformance.api.device import Device, device_of
 from conformance.api.interfaces import Interfaces
+from conformance.api.permission import Permission
 from conformance.api.rest.interface import RestInterface, plain_path
 from conformance.api.soap.callable_services import SoapServices
+from conformance.api.soap.service import SoapService
 from conformance.contract.interfaces import Interface
 from conformance.engine.resending import Recorder
 from conformance.transport.client import Connection, HttpClient
@@ -39,13 +41,19 @@ class RobotUnderTest:
         run: the data of the run.
         connection: the settings that all clients share.
         rest: client of its REST interface, or None; ``connect`` sets it.
+        permission: what may be sent; every request passes it.
     """
 
     run: Run
     connection: Connection = field(default_factory=Connection)
     rest: RestInterface | None = None
+    permission: Permission = field(init=False)
     _services: SoapServices | None = None
     _progress: TextIO | None = None
+
+    def __post_init__(self) -> None:
+        self.permission = Permission(self.run)
+        self.connection.permit = self.permission.refusal
 
     @property
     def soap(self) -> SoapServices:
@@ -106,7 +114,15 @@ class RobotUnderTest:
                 with self._told(name, url):
                     services[name] = open_service(name, wsdl, endpoint, self.connection, path, self.device.messages)
                     self._look(name, services[name].client, services[name].path)
+        self._permit_reading(services)
         self._services = SoapServices(self.run, services.get(Interface.PUBLISHERS), services.get(Interface.SUBSCRIBERS))
+
+    def _permit_reading(self, services: Mapping[Interface, SoapService]) -> None:
+        """Permit messages to the service that only reads, unless the one that acts has the same address."""
+        if Interface.SUBSCRIBERS in services:
+            self.permission.may_post_to(services[Interface.SUBSCRIBERS].endpoint)
+        if Interface.PUBLISHERS in services:
+            self.permission.forbid_post_to(services[Interface.PUBLISHERS].endpoint)
 
     @contextmanager
     def _told(self, name: Interface, url: str) -> Iterator[None]:

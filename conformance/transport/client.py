@@ -4,7 +4,7 @@ import math
 import ssl
 import time
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 import h11
 
 from conformance.transport.connections import ClosedError, Connections, NoConnectionError, tls_context
+from conformance.transport.credentials import Credentials, bearer
 from conformance.transport.deadline import Deadline
 from conformance.transport.exchange import (
     SAFE_METHODS,
@@ -19,6 +20,7 @@ from conformance.transport.exchange import (
     Listener,
     NoAnswer,
     NoAnswerError,
+    NotPermittedError,
     Request,
     Response,
     Unanswered,
@@ -26,6 +28,8 @@ from conformance.transport.exchange import (
 from conformance.transport.pace import Pace, time_to_arrive
 
 Headers = tuple[tuple[str, str], ...]
+# Called with method and URL; returns an empty text if the request may be sent, else why not.
+Permit = Callable[[str, str], str]
 # An endpoint that has let this many deadlines pass within this time, s, is not asked until that is over: a hang costs
 # its deadline twice in that time at most, and a link that was gone twice in a long run is none.
 _HANGS = 2
@@ -41,13 +45,17 @@ class Connection:
     Attributes:
         timeout_s: deadline of one request with its response, s.
         ca_file: certificate authorities to trust instead of the system's, or None.
-        token: bearer token, or None.
+        token: bearer token, or None; it is one of the credentials.
+        credentials: what every request carries.
+        certificate: client certificate and key (PEM) for TLS, or None; the key may be in the certificate's file.
         request_rate: maximum requests per second, or None.
         listeners: are called with every response and every failed request.
         sent: number of requests sent.
         resent: number of requests sent again because the server had closed the kept connection (RFC 9112 9.3.1).
         acted_at: when a request with an unsafe method was last sent or answered, s of the monotonic clock.
         pace: how fast the robot responds.
+        permit: is called with method and absolute URL before each request; returns an empty text if the request may be
+            sent, else why not. By default everything may be sent.
     """
 
     timeout_s: float = 10.0
@@ -59,21 +67,39 @@ class Connection:
     resent: int = 0
     acted_at: float = -math.inf
     pace: Pace = field(default_factory=Pace)
+    permit: Permit = lambda _method, _url: ""
+    credentials: Credentials = field(default_factory=Credentials)
+    certificate: tuple[Path, Path | None] | None = None
     _next_slot: float = 0.0
 
-    def tls(self) -> ssl.SSLContext:
-        """The TLS context that trusts ``ca_file``, or the system's authorities."""
-        return tls_context(self.ca_file)
+    def __post_init__(self) -> None:
+        if self.token and bearer(self.token) not in self.credentials.items:
+            self.credentials = Credentials((*self.credentials.items, bearer(self.token)))
 
-    def take_slot(self, method: str) -> None:
-        """Count a request, after waiting until ``request_rate`` allows it."""
+    def tls(self) -> ssl.SSLContext:
+        """The TLS context that trusts ``ca_file``, or the system's authorities, with the client certificate if any."""
+        return tls_context(self.ca_file, self.certificate)
+
+    def take_slot(self, *requests: tuple[str, str]) -> None:
+        """Count one message, after waiting until ``request_rate`` allows it. Everything that sends calls this before.
+
+        Args:
+            requests: method and URL of each request in the message; raw bytes may hold several, or none.
+
+        Raises:
+            NotPermittedError: one of the requests may not be sent in this run.
+        """
+        for method, url in requests:
+            if reason := self.permit(method, url):
+                raise NotPermittedError(reason)
         self.sent += 1
         if self.request_rate:
             now = time.monotonic()
             if self._next_slot > now:
                 time.sleep(self._next_slot - now)
             self._next_slot = max(now, self._next_slot) + 1 / self.request_rate
-        self.note(method)
+        for method, _ in requests:
+            self.note(method)
 
     def note(self, method: str) -> None:
         """Update ``acted_at`` if the method is unsafe: called when a request is sent, answered or given up."""
@@ -110,6 +136,10 @@ class HttpClient:
         """Return the URL of a path below the base URL, as requests have it."""
         return f"{self.scheme}://{self.authority}{self.prefix}{path}"
 
+    def refusal(self, method: str, path: str) -> str:
+        """Return why this run may not send a request, or an empty text. Checks ask before they send."""
+        return self.connection.permit(method, self.url(path))
+
     def send(
         self,
         method: str,
@@ -129,19 +159,22 @@ class HttpClient:
             headers: headers after Host. ``Accept: */*`` is added by default; ("Accept", "") leaves it out.
             body: request body; Content-Length is added for it, and for every PUT, POST and PATCH.
             fresh: use a new connection and close it afterwards, so that the request is never sent twice.
-            authorized: whether to send the token, if there is one.
+            authorized: whether to send the credentials, if there are any.
             timeout_s: deadline instead of the run's, s; large bodies extend it.
 
         Raises:
             NoAnswerError: no HTTP response was received.
+            NotPermittedError: the request may not be sent in this run.
         """
         fields = self._fields(method, tuple(headers), body, close=fresh)
         shown = tuple((name, value) for name, value in fields if name != "Connection")
-        sent = list(fields)
-        if authorized and self.connection.token and not any(name.lower() == "authorization" for name, _ in fields):
-            sent.append(("Authorization", f"Bearer {self.connection.token}"))
-            shown += (("Authorization", "Bearer $ROAAS_TOKEN"),)
-        request = Request(method, self.url(path), shown, body)
+        sent, target, query = list(fields), path, ""
+        if authorized:
+            credentials, names = self.connection.credentials, [name for name, _ in fields]
+            sent += credentials.fields(names)
+            shown += tuple(credentials.fields(names, shown=True))
+            target, query = credentials.target(path), credentials.target(path, shown=True)[len(path) :]
+        request = Request(method, self.url(path), shown, body, query=query)
         endpoint = request.endpoint
         if sum(time.monotonic() - at < _HANGS_WITHIN_S for at in self._hangs[endpoint]) >= _HANGS:
             hung = endpoint.replace(f"{self.scheme}://{self.authority}", "", 1)
@@ -150,7 +183,7 @@ class HttpClient:
         deadline = timeout_s or self.connection.timeout_s
         started = time.monotonic()
         try:
-            response = self._exchange(method, path, sent, body, deadline, fresh=fresh)
+            response = self._exchange(method, target, sent, body, deadline, fresh=fresh)
             self.connection.note(method)
         except _SilenceError as none:
             self.connection.note(method)
@@ -189,7 +222,7 @@ class HttpClient:
         request = h11.Request(method=method, target=target, headers=headers)
         before = ""
         for attempt in range(1, _ATTEMPTS + 1):
-            self.connection.take_slot(method)
+            self.connection.take_slot((method, self.url(path)))
             deadline = Deadline(seconds, len(body))
             keep = not fresh and attempt == 1
             connection = self._connections.take() if keep else self._connections.new()

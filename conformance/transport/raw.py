@@ -21,6 +21,11 @@ from conformance.transport.pace import time_for
 
 # What a recipient may forgive in a header section, and a server must not send (RFC 9112 2.2, 5.2).
 _FORGIVEN = re.compile(rb"(?<!\r)\n|\r(?!\n)|\n[ \t]")
+# A request line, wherever it stands (a body may end without a line end), and one that writes without a version.
+_REQUEST_LINE = re.compile(
+    rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+)[ \t]+([^ \t\r\n]+)[ \t]+HTTP/"
+    rb"|(?:\A|[\r\n])[ \t]*(PUT|POST|DELETE|PATCH)[ \t]+([^ \t\r\n]+)"
+)
 _MOST = 4 * 1024 * 1024
 # The least that a connection is waited for, s.
 _TO_CONNECT_S = 0.05
@@ -50,20 +55,20 @@ class RawAnswer:
 
 
 def head(client: HttpClient, method: str, path: str, *fields: str, host: bool = True) -> bytes:
-    """Return the head of a request: request line, Host, the run's token if any, and the given headers.
+    """Return the head of a request: request line, Host, the run's credentials if any, and the given headers.
 
     Args:
-        client: supplies authority, path prefix and token.
+        client: supplies authority, path prefix and credentials.
         method: HTTP method.
         path: request target below the base URL.
         fields: whole header lines, without line ends.
         host: whether to send Host.
     """
-    lines = [f"{method} {client.prefix}{path} HTTP/1.1"]
+    credentials = client.connection.credentials
+    lines = [f"{method} {client.prefix}{credentials.target(path)} HTTP/1.1"]
     if host:
         lines.append(f"Host: {client.authority}")
-    if client.connection.token:
-        lines.append(f"Authorization: Bearer {client.connection.token}")
+    lines += [f"{name}: {value}" for name, value in credentials.fields()]
     return ("\r\n".join([*lines, *fields]) + "\r\n\r\n").encode("latin-1")
 
 
@@ -75,10 +80,8 @@ def chunked(body: bytes, size: int, extension: bytes = b"", trailers: bytes = b"
 
 
 def refuses_chunks(attempt: Attempt) -> bool:
-    """Return whether an HTTP/1.0 server, which cannot read chunks, responded 411 (RFC 9112 6.1)."""
-    if isinstance(attempt, Unanswered):
-        return False
-    return attempt.response.http_version == "HTTP/1.0" and attempt.response.status == HTTPStatus.LENGTH_REQUIRED
+    """Return whether a server asked for a Content-Length by 411, as it may for any content (RFC 9112 6.3)."""
+    return isinstance(attempt, Exchange) and attempt.response.status == HTTPStatus.LENGTH_REQUIRED
 
 
 def talk(
@@ -102,10 +105,11 @@ def talk(
 
     Raises:
         NoAnswerError: the connection cannot be opened.
+        NotPermittedError: one of the requests in the bytes may not be sent in this run.
     """
     deadline = time.monotonic() + (timeout_s or client.connection.timeout_s) + time_for(len(octets))
     request = shown(client, octets)
-    client.connection.take_slot(request.method)
+    client.connection.take_slot(*((method, _url(client, target)) for method, target in requests_in(octets)))
     started = time.perf_counter()
     try:
         left = max(_TO_CONNECT_S, deadline - time.monotonic())
@@ -171,11 +175,23 @@ def answers_in(octets: bytes, most: int) -> int:
 
 
 def shown(client: HttpClient, octets: bytes) -> Request:
-    """Return the request as findings show it, without the token."""
-    if client.connection.token:
-        octets = octets.replace(client.connection.token.encode("latin-1", "replace"), b"$ROAAS_TOKEN")
+    """Return the request as findings show it, without the credentials."""
+    octets = client.connection.credentials.hidden_bytes(octets)
     line = octets.split(b"\r\n", 1)[0].decode("latin-1")
     return Request(line.split(" ", 1)[0][:40], _address(client), (), b"", raw=octets)
+
+
+def requests_in(octets: bytes) -> list[tuple[str, str]]:
+    """Return method and target of every line in the bytes that a server may take for a request line, bodies included.
+
+    Servers differ in where they see one request end and the next one begin (RFC 9112 11.2).
+    """
+    found = (match.groups() for match in _REQUEST_LINE.finditer(octets))
+    return [((one or three).decode(), (two or four).decode("latin-1")) for one, two, three, four in found]
+
+
+def _url(client: HttpClient, target: str) -> str:
+    return target if "://" in target else f"{client.scheme}://{client.authority}{target}"
 
 
 def _address(client: HttpClient) -> str:

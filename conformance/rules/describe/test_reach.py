@@ -49,6 +49,9 @@ def _look(interfaces: Interfaces, name: Interface) -> tuple[str, Attempt | None]
         service = interfaces.soap.there.get(name)
         if service is None:
             return f"no address of the {name} interface", None
+        if service.client.refusal("POST", service.path):
+            # Whatever GET is answered, something is there; more than GET is not permitted.
+            return "", service.client.send("GET", service.path)
         exchange = service.post(EMPTY)
     except NoAnswerError as none:
         return f"{name}: {none}", none.unanswered

@@ -67,7 +67,7 @@ def test_a_full_statement(tmp_path):
     [
         ("[robto]\nname = 'x'", "unknown key 'robto'; known are claims, endpoints, limits, load, motion, robot, ros"),
         ("[limts]\nhold_s = 1", "unknown key 'limts'"),
-        ("[endpoints]\nrset = 'x'", "[endpoints] unknown key 'rset'; known are ca_file, publishers_endpoint,"),
+        ("[endpoints]\nrset = 'x'", "[endpoints] unknown key 'rset'; known are api_key,"),
         ("[endpoints]\nrest = 7003", "[endpoints] rest = 7003 must be a string"),
         ("[endpoints]\ntimeout_s = -1", "[endpoints] timeout_s = -1 must be a positive number"),
         ("[claims]\nprofile = 'half'", "[claims] profile = 'half' must be one of paper, full"),

@@ -47,6 +47,11 @@ def _typed_as_json(request: Request) -> None:
         request.put("Content-Type", JSON)
 
 
+def _unavailable(response: Response) -> None:
+    page(503, b'{"status": 503, "detail": "not now"}', "application/problem+json")(response)
+    response.put("Retry-After", "1")
+
+
 def _charset(request: Request) -> bool:
     return _INPUT(request) and "charset" in (request.field("Content-Type") or "").lower()
 
@@ -122,6 +127,9 @@ _mutant("http-crash-on-input", "no-server-error", "Invalid request bodies return
 )
 _mutant("http-crash-on-query", "no-server-error", "Invalid queries return 500.").altered(
     rest("GET", "/robot/navigation/service/plan"), becomes(500), refusal
+)
+_mutant("http-every-second-read", "available", "Every second GET returns 503 with Retry-After.").altered(
+    _GET, _unavailable, anything, nth=2
 )
 _mutant("http-crash-sometimes", "declared-status", "One GET in 50 returns 502.").altered(
     _GET, becomes(502), anything, nth=50

@@ -1,0 +1,86 @@
+"""Which requests a run may send to a device: everything with --allow-motion, without it only what cannot act.
+
+This is the only place of that rule. ``Connection.permit`` holds it, and every request passes it, raw bytes included.
+"""
+
+from collections.abc import Iterable
+from urllib.parse import urlsplit
+
+from conformance.contract.classes import Prerequisite
+from conformance.documents.openapi import is_normal, matching
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import SAFE_METHODS
+from conformance.verdict.run import Run
+
+NO_MOTION = "it may move the robot, and --allow-motion was not given"
+
+
+class Permission:
+    """What one run may send.
+
+    Args:
+        run: says whether the robot may be moved.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._reading: set[str] = set()
+
+    def may_post_to(self, url: str) -> None:
+        """Allow POST to a URL: that of a SOAP service whose operations only read."""
+        self._reading.add(_place(url))
+
+    def forbid_post_to(self, url: str) -> None:
+        """Withdraw may_post_to(): a service whose operations act has the same URL."""
+        self._reading.discard(_place(url))
+
+    def refusal(self, method: str, url: str) -> str:
+        """Return an empty text if a request may be sent, else why not.
+
+        Args:
+            method: HTTP method.
+            url: absolute URL with the request target as sent.
+        """
+        if self._run.allow_motion:
+            return ""
+        moves = self._moves(method, url)
+        if moves is False or (moves is None and method in SAFE_METHODS):
+            return ""
+        if method == "POST" and _place(url) in self._reading:
+            return ""
+        return f"{method} {urlsplit(url).path[:200]} was not sent: {NO_MOTION}"
+
+    def _moves(self, method: str, url: str) -> bool | None:
+        """Return what the contract pack says of a request's operation (x-roaas-motion); None: it says nothing."""
+        base = (self._run.statement.endpoints.rest or "").rstrip("/")
+        path = _place(url).removeprefix(base)
+        if not base or not _place(url).startswith(f"{base}/") or not is_normal(path):
+            return None
+        operation = matching(self._run.contract, method, path)
+        return None if operation is None else operation.motion
+
+
+def permitted(run: Run, client: HttpClient, methods: Iterable[str], path: str, *ids: str) -> list[str]:
+    """Return the methods that this run may send to a path.
+
+    If there are others, the requirements that need motion are not tested: they do not pass on half of the evidence.
+
+    Args:
+        run: the data of the run.
+        client: of the interface.
+        methods: the methods that a check would send.
+        path: request target below the base URL.
+        ids: the requirements that the check judges.
+    """
+    refusals = {method: client.refusal(method, path) for method in methods}
+    reason = next(filter(None, refusals.values()), "")
+    for id_ in ids if reason else ():
+        requirement = run.contract.ledger.get(id_)
+        if requirement is not None and Prerequisite.MOTION in requirement.needs:
+            run.judge.skip(id_, reason)
+    return [method for method, refused in refusals.items() if not refused]
+
+
+def _place(url: str) -> str:
+    """Return a URL without its query."""
+    return url.partition("?")[0]
