@@ -99,7 +99,7 @@ def _delete_conflict(request: Request, forward: Forward) -> Response:
 
 
 def _driven_to(sent: Callable[[Any], Any], shown: Callable[[Any], Any]) -> Make:
-    """Return a change that drives to another goal: ``sent`` edits a goal's PUT, and ``shown`` undoes that in responses."""
+    """Return a change that drives to another goal: ``sent`` edits a PUT, and ``shown`` undoes that in responses."""
 
     def change(request: Request, forward: Forward) -> Response:
         if not _AT(request):

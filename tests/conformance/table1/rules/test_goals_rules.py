@@ -31,11 +31,11 @@ def test_a_special_goal_is_refused_or_accepted(status, refused, accepted):
         (422, None, True, "status 422"),
         (500, None, False, "status 500"),
         (202, 404, True, "status 202"),
-        (202, 200, False, "a goal that is active 10 s later"),
+        (202, 200, False, "a goal that is active 60 s later"),
     ],
 )
 def test_a_goal_outside_every_map_is_refused_or_ends(status, read, holds, observed):
-    far = FarGoal(exchange(status), None if read is None else exchange(read), 10.0)
+    far = FarGoal(exchange(status), None if read is None else exchange(read), 60.0)
     (case,) = rules.goal_unreachable.outcomes(RefusedGoals(far=(far,)), {}.__getitem__)
     assert (case.holds, case.observed) == (holds, observed)
 

@@ -19,16 +19,18 @@ def goal_put(trace: GoalReached) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-drives", on=(goal_reached,))
 def goal_drives(trace: GoalReached) -> Iterator[Outcome]:
-    """Judge that the robot drove, and to the target."""
+    """Judge that the robot drove, and to the target's position and heading."""
     if trace.there is None or trace.read is None or trace.undecided:
         return  # refused, or slow but on its way: nothing to be said against it
-    far = trace.way_m > trace.has_to_m
+    far, there = trace.way_m > trace.has_to_m, trace.left_m < trace.reached_m
+    heading = "" if trace.reached_rad is None else f", with a heading within {trace.reached_rad:.2f} rad of its heading"
+    turned = "" if trace.reached_rad is None else f" and {abs(trace.off_rad):.2f} rad off its heading"
     yield Case(
-        trace.left_m < trace.reached_m and far,
+        trace.arrived and far,
         trace.read,
-        f"the robot at ({trace.there.x:.2f}, {trace.there.y:.2f}), where its goal was",
-        f"the robot {trace.left_m:.2f} m away from it, having moved {trace.way_m:.2f} m",
-        "not reached" if far else "not driven",
+        f"the robot within {trace.reached_m:.2f} m of its goal at ({trace.there.x:.2f}, {trace.there.y:.2f}){heading}",
+        f"the robot {trace.left_m:.2f} m away from it{turned}, having moved {trace.way_m:.2f} m",
+        "not driven" if not far else "another heading" if there else "not reached",
     )
 
 
