@@ -142,6 +142,12 @@ _mutant(
     "goal-drives",
     "The robot arrives with a heading 0.6 rad beside the goal's, and GET returns the goal that the client sent.",
 ).made(_driven_to(_turned(0.6), _turned(-0.6)))
+_mutant("goal-outcome-untold", "goal-outcome", "The 404 after a goal does not say how the goal ended.").json(
+    _GET, lambda told: told.pop("last_goal", None), status(404)
+)
+_mutant("goal-outcome-always-success", "goal-outcome", "A cancelled goal is reported as succeeded.").json(
+    _GET, lambda told: told.get("last_goal", {"status": {}})["status"].update(code=4), status(404)
+)
 _mutant("goal-get-swapped", "goal-get", "GET returns the goal with x and y swapped.").json(_GET, swapped(_X, _Y))
 _mutant("goal-none-empty", "goal-none", "Without a goal, GET returns 200 with null.").altered(
     _GET, page(200, b"null", JSON), status(404)

@@ -4,10 +4,10 @@ import math
 from http import HTTPStatus
 from typing import Any, Final
 
-from conformance.documents.json_text import shown
+from conformance.documents.json_text import read_json, shown
 from conformance.observe.polling import poll
 from conformance.packs.table1.robot.geometry import Pose, quaternion_of
-from conformance.packs.table1.robot.message_shapes import STATUS
+from conformance.packs.table1.robot.message_shapes import LAST_GOAL, STATUS
 from conformance.packs.table1.robot.robot import GOAL_PATH, Robot
 from conformance.transport.exchange import Exchange
 
@@ -17,6 +17,8 @@ REPEATED: Final = frozenset({200, 202, 204})
 CANCELLED: Final = frozenset({200, 202, 204})
 # A media type that a client prefers: whatever that is, a goal is cancelled.
 RATHER_XML: Final = ("Accept", "application/xml, */*;q=0.1")
+SUCCEEDED: Final = 4
+CANCELED: Final = 5
 ACTIVE: Final = frozenset({1, 2, 3})
 _STEP_S: Final = 0.02
 _CLOSE: Final = 1e-6
@@ -78,6 +80,24 @@ def status_fault(goal: Any) -> str:
         return problem
     code = goal["status"]["code"]
     return "" if code in ACTIVE else f"status.code {code:g}"
+
+
+def outcome_fault(exchange: Exchange, code: int, id_: str | None = None) -> str:
+    """Return what is wrong with the last goal in a problem document, or an empty text.
+
+    Args:
+        exchange: a GET of the goal that was answered 404.
+        code: the status with which the goal ended (action_msgs/GoalStatus).
+        id_: the goal's id; None: any.
+    """
+    problem = read_json(exchange.response.body).value
+    last: Any = problem.get("last_goal") if isinstance(problem, dict) else None
+    wrong = "no member last_goal" if last is None else LAST_GOAL.problem(last, "last_goal")
+    if wrong:
+        return wrong
+    if id_ not in {None, last["goal_id"]["id"]}:
+        return f"last_goal.goal_id.id {shown(last['goal_id']['id'])}"
+    return "" if last["status"]["code"] == code else f"last_goal.status.code {last['status']['code']:g}"
 
 
 def await_goal(robot: Robot, *put: dict[str, Any]) -> tuple[Any, str, Exchange]:

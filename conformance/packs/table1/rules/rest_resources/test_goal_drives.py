@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from conformance.packs.table1.robot.drive_rules import outcomes
-from conformance.packs.table1.robot.goal import NEW
+from conformance.packs.table1.robot.goal import NEW, SUCCEEDED, outcome_fault
 from conformance.packs.table1.robot.goal_trace import GoalReached
 from conformance.packs.table1.scenarios.goal_reached import goal_reached
 from conformance.packs.table1.statement import said_of
@@ -41,6 +41,14 @@ def goal_ended(trace: GoalReached) -> Iterator[Outcome]:
         holds = trace.ended and trace.read.response.status == 404
         observed = "" if trace.ended else "a goal that is still active"
         yield Case(holds, trace.read, "404 when the goal has been reached", observed)
+
+
+@rule("rest-resources/goal-outcome", on=(goal_reached,))
+def goal_outcome(trace: GoalReached) -> Iterator[Outcome]:
+    """Judge that the 404 after the goal says that the goal was reached."""
+    if trace.read is not None and trace.ended and trace.arrived:
+        wrong = outcome_fault(trace.read, SUCCEEDED, "reached")
+        yield Case(not wrong, trace.read, "a 404 with last_goal {goal_id, status}, which succeeded (code 4)", wrong)
 
 
 @rule("rest-resources/goal-id-again", on=(goal_reached,))
