@@ -111,10 +111,10 @@ class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     odometry_hz: Positive | None = None
     time_scale: Positive | None = None
     clock_offset_s: Finite | None = None
-    goal_m: Annotated[float, Meta(gt=0, le=0.5)] | None = None
-    goal_rad: Annotated[float, Meta(gt=0, le=0.5)] | None = None
-    goal_s: Annotated[float, Meta(gt=0, le=120)] | None = None
-    plan_step_m: Annotated[float, Meta(gt=0, le=10)] | None = None
+    goal_m: Annotated[float, Meta(ge=0.01, le=0.5)] | None = None
+    goal_rad: Annotated[float, Meta(ge=0.01, le=0.5)] | None = None
+    goal_s: Annotated[float, Meta(ge=1, le=120)] | None = None
+    plan_step_m: Annotated[float, Meta(ge=0.01, le=10)] | None = None
 
     def resolved(self) -> Limits:
         """What the robot is judged by."""
