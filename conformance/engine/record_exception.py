@@ -3,7 +3,7 @@
 import traceback
 from collections.abc import Callable
 
-from conformance.scenarios.scenario import NotPossibleError
+from conformance.scenarios.scenario import NoOccasionError, NotPossibleError
 from conformance.transport.exchange import NoAnswerError, NotPermittedError
 from conformance.verdict.evidence import RefutedError
 from conformance.verdict.finding import Finding
@@ -21,8 +21,10 @@ def record_exception(
     if isinstance(error, RefutedError):
         return
     if isinstance(error, NotPossibleError | NotPermittedError):
+        # A note is the reason of a skip where nothing was judged, and changes nothing where other checks have judged.
+        tell = run.judge.note if isinstance(error, NoOccasionError) else run.judge.skip
         for id_ in ids:
-            run.judge.skip(id_, str(error))
+            tell(id_, str(error))
         return
     known = [id_ for id_ in ids if run.judge.of(id_) is not None]
     now = run.judge.counts(known)

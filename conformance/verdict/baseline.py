@@ -23,11 +23,13 @@ class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         requirement: id of the failing requirement.
         reason: why the failure is accepted.
         expires: last day on which it is accepted.
+        intermittent: whether the requirement may also pass, because the failure does not occur in every run.
     """
 
     requirement: Text
     reason: Text
     expires: dt.date
+    intermittent: bool = False
 
 
 class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -37,7 +39,7 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def load_baseline(
     path: Path, known: Iterable[str], renamed: Mapping[str, str] = MappingProxyType({})
 ) -> tuple[Expectation, ...]:
-    """Read a baseline file: ``[[expected]]`` tables with requirement, reason and expires.
+    """Read a baseline file: ``[[expected]]`` tables with requirement, reason, expires and intermittent.
 
     Args:
         path: the file.
@@ -66,7 +68,10 @@ def _renewed(entry: Expectation, renamed: Mapping[str, str]) -> Expectation:
 
 
 def apply_baseline(verdicts: Iterable[Verdict], baseline: Iterable[Expectation], today: dt.date) -> list[Verdict]:
-    """Turn expected failures into warnings. An entry that has expired or whose requirement passes becomes an error."""
+    """Turn expected failures into warnings.
+
+    An entry becomes an error when it has expired, or when its requirement passes and it is not intermittent.
+    """
     expected = {entry.requirement: entry for entry in baseline}
     return [
         _applied(verdict, expected[verdict.requirement.id], today) if verdict.requirement.id in expected else verdict
@@ -87,6 +92,9 @@ def _applied(verdict: Verdict, entry: Expectation, today: dt.date) -> Verdict:
             return replace(verdict, reason=f"its baseline entry expired on {day}: {verdict.reason}")
         told = f"expected until {day} ({entry.reason}): {verdict.reason}"
         return replace(verdict, value=Value.WARN, reason=told, expected_failure=(entry.reason, day))
+    if verdict.value is Value.PASS and entry.intermittent and entry.expires >= today:
+        told = f"not seen in this run; as an intermittent failure, expected until {day} ({entry.reason})"
+        return replace(verdict, reason="; ".join(filter(None, (told, verdict.reason))))
     if verdict.value is Value.PASS:
         told = f"the baseline expects it to fail ({entry.reason}), and it passes: take the entry out"
         return replace(verdict, value=Value.ERROR, reason=told)

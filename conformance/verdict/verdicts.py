@@ -158,7 +158,8 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
     unjudged = [
         item
         for item in verdicts
-        if item.value is Value.ERROR or (item.value is Value.SKIP and _holds_back(item.requirement))
+        if (item.value is Value.ERROR and item.requirement.level is not Level.MAY)
+        or (item.value is Value.SKIP and _holds_back(item.requirement))
     ]
     if unjudged:
         first = unjudged[0]

@@ -10,7 +10,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from conformance.contract.toml_file import NotNegative, Positive
+from conformance.contract.toml_file import Finite, NotNegative, Positive
 
 
 class Noise(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -39,6 +39,10 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
         noise: of the odometry.
         odometry_hz: how often there is a new odometry, Hz; None: not declared, and seen by its stamps.
         time_scale: by how much the robot's clock is faster than the one on the wall.
+        clock_offset_s: by how much the robot's clock is ahead of its ``Date`` header, s.
+        goal_m: how far from a goal's position the robot may end the goal, m; goal_rad: from its heading, rad.
+        goal_s: how long a hindered robot may make no progress towards a goal, s.
+        plan_step_m: the greatest distance between two successive poses of a plan, m.
         linear_declared: whether ``linear_m_s`` is the robot's, so that what lies beyond it can be judged;
             likewise angular_declared.
     """
@@ -53,8 +57,22 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
     noise: Noise = Noise()
     odometry_hz: float | None = None
     time_scale: float = 1.0
+    clock_offset_s: float = 0.0
+    goal_m: float = 0.25  # Nav2's own defaults
+    goal_rad: float = 0.25
+    goal_s: float = 30.0
+    plan_step_m: float = 1.0
     linear_declared: bool
     angular_declared: bool
+
+    @property
+    def arrival(self) -> tuple[float, float]:
+        """How far from a goal the odometry may show a robot that has arrived: m, and rad.
+
+        The declared tolerances, a twentieth and 0.01 for rounding, and what the noise leaves of a median of samples.
+        """
+        noise = self.noise
+        return 1.05 * self.goal_m + 0.01 + 2 * noise.position_m, 1.05 * self.goal_rad + 0.01 + 2 * noise.heading_rad
 
     @property
     def figures(self) -> dict[str, float]:
@@ -69,7 +87,8 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
         linear, angular = self.tolerance_linear_m_s, self.tolerance_angular_rad_s
         absolute = {"tolerance_linear_m_s": linear, "tolerance_angular_rad_s": angular}
         same = {"tolerance_abs": linear} if linear == angular else {}
-        return {"tolerance": self.tolerance, **same, **absolute, **noise}
+        goal = {"goal_m": self.goal_m, "goal_rad": self.goal_rad}
+        return {"tolerance": self.tolerance, **same, **absolute, **goal, **noise}
 
 
 class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -91,6 +110,11 @@ class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     noise: Noise | None = None
     odometry_hz: Positive | None = None
     time_scale: Positive | None = None
+    clock_offset_s: Finite | None = None
+    goal_m: Annotated[float, Meta(ge=0.01, le=0.5)] | None = None
+    goal_rad: Annotated[float, Meta(ge=0.01, le=0.5)] | None = None
+    goal_s: Annotated[float, Meta(ge=1, le=120)] | None = None
+    plan_step_m: Annotated[float, Meta(ge=0.01, le=10)] | None = None
 
     def resolved(self) -> Limits:
         """What the robot is judged by."""

@@ -23,6 +23,11 @@ _TEMPLATE = """
 # tolerance = 0.05           # of a reached velocity, relative
 # tolerance_linear_m_s = 0.02     # and absolute
 # tolerance_angular_rad_s = 0.02
+# goal_m = 0.25              # a goal ends within this of its position
+# goal_rad = 0.25            # and of its heading
+# goal_s = 30.0              # a hindered robot may make no progress for
+# plan_step_m = 1.0          # longest step of a plan
+# clock_offset_s = 0.0       # the odometry's stamps are ahead of Date by
 
 [motion]
 # Where the robot may be driven. Without an arena, goals stay within radius_m of where it is.

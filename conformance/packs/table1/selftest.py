@@ -10,12 +10,14 @@ from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 
-from conformance.mutation.changes import soap
+from conformance.mutation.changes import inputs, parsed, plain, rest, soap
+from conformance.mutation.fields import without
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.programs import built, check_installed, program
 from conformance.mutation.self_test import GoodDevice, HarmlessChange, OpenPlace, SelfTest, Start
 from conformance.mutation.wire import IncompleteMessageError
 from conformance.packs.table1.mutants import MUTANTS
+from conformance.packs.table1.mutants.paths import GOAL, POSE
 
 _HERE = Path(__file__).parent
 _ROBOTS = _HERE / "independent_robots"
@@ -107,6 +109,26 @@ class _Behind:
         del self._known[request.body]
 
 
+_OWN = rest("POST", POSE)
+_GOAL_PUT = rest("PUT", GOAL)
+_AT_POSE = rest("", POSE)
+
+
+def _extended(request: Request, forward: Forward) -> Response:
+    """Add a method of the vendor's own at the pose, and ignore the status in a goal that is put back."""
+    if _OWN(request):
+        return plain(204)(request)
+    goal = parsed(request.body) if _GOAL_PUT(request) else None
+    if isinstance(goal, dict) and "status" in goal:
+        request = request.copy()
+        inputs(without("status"))(request)
+    response = forward(request)
+    allow = response.field("Allow")
+    if _AT_POSE(request) and allow is not None:
+        response.put("Allow", f"{allow}, POST")
+    return response
+
+
 _OPEN_PLACES = (
     OpenPlace(
         r"(freeze|delay|scale|ulp|swap):[gG]etPlan:answer(\.return)?\.plan(\.poses\[\])?\.header\.stamp(\.\w+)?:\w+"
@@ -180,7 +202,12 @@ SELFTEST = SelfTest(
         "nginx-http10": "plain",
     },
     wsdls=lambda publishers: (publishers, publishers.replace("publisher", "subscriber")),
-    variants=(HarmlessChange("behind", "SOAP is a message or two behind REST", _Behind),),
+    variants=(
+        HarmlessChange("behind", "SOAP is a message or two behind REST", _Behind),
+        HarmlessChange(
+            "extended", "POST at the pose is the vendor's own; a goal's status may be sent", lambda: _extended
+        ),
+    ),
     classes={
         r"(get|put|delete)\w*Deliver(y|ies)": ("rest-delivery", "equivalence"),
         r"(get|put|delete)\w*(Velocity|Goal)": ("rest-resources", "equivalence", "safety"),

@@ -87,6 +87,10 @@ def test_a_full_statement(tmp_path):
                 ("tolerance_abs = 0.11", "from 0 to 0.1"),
                 ("tolerance_linear_m_s = 0.11", "from 0 to 0.1"),
                 ("tolerance_angular_rad_s = 0.21", "from 0 to 0.2"),
+                ("goal_m = 0.6", "from 0.01 to 0.5"),
+                ("goal_rad = 0.6", "from 0.01 to 0.5"),
+                ("goal_s = 121", "from 1 to 120"),
+                ("plan_step_m = 11", "from 0.01 to 10"),
             )
         ),
         ("[limits]\nodometry_hz = 0", "[limits] odometry_hz = 0 must be a positive number"),
@@ -134,7 +138,13 @@ def test_noise_rate_and_clock_are_declared_among_the_limits(tmp_path):
     assert (limits.odometry_hz, limits.time_scale) == (10, 2)
     assert limits.noise == Noise(position_m=0.01, linear_m_s=0.02)
     declared = dict.fromkeys(("tolerance_abs", "tolerance_linear_m_s", "tolerance_angular_rad_s"), 0.02)
-    declared |= {"tolerance": 0.05, "noise_position_m": 0.01, "noise_linear_m_s": 0.02}
+    declared |= {
+        "tolerance": 0.05,
+        "goal_m": 0.25,
+        "goal_rad": 0.25,
+        "noise_position_m": 0.01,
+        "noise_linear_m_s": 0.02,
+    }
     assert limits.tolerances == declared
     assert Statement().limits.odometry_hz is None
 

@@ -92,6 +92,12 @@ def test_what_need_not_be_judged_does_not_hold_a_class_back(requirement):
     assert _class((_requirement(), _evidence(cases=1)), (requirement, _evidence()))[0] == "pass"
 
 
+@pytest.mark.parametrize(("level", "expected"), [("MAY", "pass"), ("SHOULD", "inconclusive"), ("MUST", "inconclusive")])
+def test_an_error_in_what_is_optional_does_not_hold_a_class_back(level, expected):
+    broken = (_requirement(level), _evidence(errors=["the suite could not judge this"]))
+    assert _class((_requirement(), _evidence(cases=1)), broken)[0] == expected
+
+
 def test_a_warning_leaves_the_class_passed():
     assert _class((_requirement(), _evidence(cases=1)), (_requirement("SHOULD"), _evidence(failing=True)))[0] == "pass"
 

@@ -164,8 +164,8 @@ _mutant("http-options-mute", "options", "Responses to OPTIONS have no Allow head
 _mutant("http-allow-get-only", "allow-agrees", "Allow lists only GET, HEAD and OPTIONS.").altered(
     _ANY, _allow(lambda _: ["GET", "HEAD", "OPTIONS"]), anything
 )
-_mutant("http-allow-too-much", "allow-agrees", "Allow lists DELETE and PATCH everywhere.").altered(
-    _ANY, _allow(lambda methods: sorted({*methods, "DELETE", "PATCH"})), anything
+_mutant("http-allow-too-much", "allow-agrees", "Allow in a 405 response lists all standard methods.").altered(
+    _ANY, _allow(lambda methods: sorted({*methods, "PUT", "POST", "DELETE", "PATCH"})), status(405)
 )
 _mutant("http-unknown-path-page", "not-found", "An unknown path returns 200 with a page.").altered(
     lambda request: _ANY(request) and request.path not in RESOURCES,

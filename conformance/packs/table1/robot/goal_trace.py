@@ -113,10 +113,12 @@ class GoalReached:
         here: the robot's last pose.
         way_m: distance driven, m; has_to_m: least distance that counts as driving, m.
         left_m: distance left to the target, m; reached_m: distance that counts as reached, m.
+        off_rad: difference left to the target's heading, rad; reached_rad: difference that counts as reached, rad, or
+            None if the robot cannot turn.
         drive: all readings on the way.
         read: the last GET of the goal.
         ended: whether the robot had no goal any more.
-        undecided: whether the robot was still driving when the time was over.
+        undecided: whether the robot still made progress when the time was over.
         turned: a drive after the goal that shows whether the robot resumes a velocity from before it; or None.
         start: where a plan begins after the goal; or None.
         again: the PUT of the same goal after it had ended; or None.
@@ -129,6 +131,8 @@ class GoalReached:
     has_to_m: float = 0.0
     left_m: float = 0.0
     reached_m: float = 0.0
+    off_rad: float = 0.0
+    reached_rad: float | None = None
     drive: Trace | None = None
     read: Exchange | None = None
     ended: bool = False
@@ -136,6 +140,11 @@ class GoalReached:
     turned: Trace | None = None
     start: Start | None = None
     again: Exchange | None = None
+
+    @property
+    def arrived(self) -> bool:
+        """Return whether the robot's last pose is within the tolerances of the target."""
+        return self.left_m < self.reached_m and (self.reached_rad is None or abs(self.off_rad) < self.reached_rad)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import await_none, goal_body, put_goal
 from conformance.packs.table1.robot.plan import EXACT, ask, reachable
 from conformance.packs.table1.robot.robot import Robot
-from conformance.scenarios.scenario import NotPossibleError
+from conformance.scenarios.scenario import NoOccasionError
 
 # How far velocities may take a robot: aside, and straight ahead, m.
 _NEAR_M: Final = 0.4
@@ -38,7 +38,7 @@ def choose_goals(robot: Robot, distance: float, count: int) -> list[Pose]:
         goals = [here.ahead(reach)]
         _, _, exchange = ask(robot, goals[0])
         if HTTPStatus.BAD_REQUEST <= exchange.response.status < HTTPStatus.INTERNAL_SERVER_ERROR:
-            raise NotPossibleError("the robot has no plan to any pose around it")
+            raise NoOccasionError("the robot has no plan to any pose around it")
     for part in range(1, count):
         if len(goals) < count:
             goals.append(_on_the_way(robot, here, goals[0], 1 - part / (count + 1)) or _turned(goals[0], part))
@@ -75,7 +75,7 @@ def meanwhile(robot: Robot, id_: str, act: Callable[[dict[str, Any], Pose, dict[
     for number in range(_ATTEMPTS):
         try:
             pose, other = choose_goals(robot, _FARTHEST_M, 2)
-        except NotPossibleError:
+        except NoOccasionError:
             return False  # what was judged before stays judged
         body, against = (goal_body(one, frame, f"{id_} {number}") for one in (pose, other))
         if not put_goal(robot, body).response.ok:

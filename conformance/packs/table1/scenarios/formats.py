@@ -20,7 +20,7 @@ from conformance.packs.table1.robot.goal import await_goal, await_none, goal_bod
 from conformance.packs.table1.robot.goals import choose_goals, make_room
 from conformance.packs.table1.robot.plan import reachable
 from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, PLAN, POSE, STILL, VELOCITY, Robot, Velocity
-from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
@@ -127,7 +127,7 @@ def goal_as_text(api: RestInterface, robot: Robot) -> tuple[Exchange, ...]:
             robot.delete_goal()
             await_none(robot)
             return (exchange,)
-    raise NotPossibleError(f"a goal with the id {DIGITS} was never there when it was read")
+    raise NoOccasionError(f"a goal with the id {DIGITS} was never there when it was read")
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.RESTING)
