@@ -19,6 +19,8 @@ _PACE_S: Final = 0.02
 _LONGER_S: Final = 1.0
 # So many requests are a look.
 _LOOK: Final = 3
+# How often a stop is tried whose response is late.
+_STOPS: Final = 3
 # How often it is begun anew to reach a velocity that was renewed too late, so that it may have ended before.
 _LAPSES: Final = 2
 
@@ -124,12 +126,21 @@ class Drive:
         self.trace = self.trace.looked(Turn(None, at, velocity, exchange, None, exchange))
 
     def stop(self, moving: Velocity) -> bool:
-        """Renew a velocity, then command zero; return whether the command stops the robot, and not its watchdog."""
-        if not self.command(moving) or not self.command(STILL):
-            return False
+        """Renew a velocity, then command zero; return whether the command stops the robot, and not its watchdog.
+
+        The time counts from sending. Where the response is late, the request may have been late on its way as well: so
+        again.
+        """
         hold_s, settle_s = self.robot.limits.hold_s, self.robot.limits.settle_s
         within = max(1.1 * settle_s, 0.9 * hold_s) if hold_s is not None else self.robot.settle_s
-        return self.reach(STILL, "safety/stop", within=within)
+        for _ in range(_STOPS):
+            if not self.command(moving) or not self.command(STILL):
+                return False
+            last = self.trace.commands[-1]
+            if not self.robot.is_late(last.exchange):
+                break
+        since = self.robot.arrived_by(last.exchange, last.answered)
+        return self.reach(STILL, "safety/stop", within=within, since=since)
 
     def reach(
         self, wanted: Velocity, *ids: str, part: slice = ALL, within: float | None = None, since: float | None = None
@@ -178,7 +189,11 @@ class Drive:
             if there or (now > until and decided) or now > until + _LONGER_S:
                 break
         counted = settled if not there and windows.newest(late) else begun
-        outlasted = not there and wanted != STILL and self._outlasts_hold
+        if wanted == STILL:
+            # By the time of such a response the watchdog may have stopped the robot, and the command did not.
+            outlasted = bool(there) and within is not None and self.trace.answered > begun + patience
+        else:
+            outlasted = not there and self._outlasts_hold
         reach = Reach(ids, wanted, part, counted, len(self.trace.turns), bool(there), outlasted)
         self.trace = replace(self.trace, reaches=(*self.trace.reaches, reach))
         return bool(there)

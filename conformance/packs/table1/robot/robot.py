@@ -146,6 +146,19 @@ class Robot:
         """Return the longest time between odometry samples, by which two interfaces may differ, s."""
         return 1 / (self.limits.odometry_hz or _SELDOM_HZ)
 
+    def is_late(self, exchange: Exchange) -> bool:
+        """Return whether a response took so much longer than usual that the request may have been late as well."""
+        return self.rest.connection.pace.is_late(exchange.response.elapsed_ms / 1000)
+
+    def arrived_by(self, exchange: Exchange, answered: float) -> float:
+        """Return when a request must have arrived: a usual response time after it was sent, s of the run's clock.
+
+        Args:
+            exchange: the request and its response.
+            answered: when the response came, s of the run's clock. The request did not arrive later than that.
+        """
+        return answered - max(0.0, exchange.response.elapsed_ms / 1000 - self.usual_s)
+
     def patience(self, seconds: float) -> Patience:
         """Return a wait of ``seconds``, not counting the time that the robot's responses take."""
         return Patience(self.rest.connection.pace, seconds, self.clock)
