@@ -154,7 +154,10 @@ class _Turning:
             if not let_go.rests(limits):
                 self.robot.put_velocity(STILL)
                 break
-            if not let_go.is_void(limits) or (let_go.early(limits) is None and let_go.late(limits) is None):
+            if let_go.early(limits) or let_go.late(limits):
+                if not let_go.is_void(limits):
+                    break
+            elif limits.hold_s is None or let_go.was_held(limits):
                 break
         if tries:
             self.tries.append(tuple(tries))
@@ -183,7 +186,7 @@ class _Turning:
         ends = answered + self._ends_s
         silent_from = math.inf if limits.hold_s is None else full + 0.95 * limits.hold_s
         while True:
-            drive.look()
+            drive.glance() if drive.paces and resumed is None else drive.look()
             let_go = LetGo(turning, full, answered, drive.trace.turns[first:], resumed, due, by_linear)
             if let_go.is_decided(limits, ends):
                 return let_go

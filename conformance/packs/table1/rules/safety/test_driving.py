@@ -66,7 +66,10 @@ def hold(trace: Driven, run: Run) -> Iterator[Outcome]:
         if last.is_void(limits) and (early is not None or last.late(limits) is not None):
             yield _LATE
         elif early is None and limits.hold_s is not None and not last.was_held(limits):
-            yield NotTested("responses came too late to see a velocity in its hold time")
+            late = "responses came too late to see a velocity in its hold time"
+            seen_after = any(tries[-1].was_held(limits) for tries in trace.let_go)
+            # The linear part is commanded after the whole velocity, and read one response later.
+            yield Note(f"{late} after {last.command}") if last.by_linear and seen_after else NotTested(late)
         else:
             seen = early or last.turns[0]
             yield Case(
