@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from conformance.packs.table1.robot.drive_rules import outcomes
-from conformance.packs.table1.robot.goal_trace import GoalLife, GoalReached
+from conformance.packs.table1.robot.goal_trace import Cancelled, GoalLife, GoalReached
 from conformance.packs.table1.robot.robot import STILL
 from conformance.packs.table1.robot.standstill_trace import Standing, stays
 from conformance.packs.table1.scenarios.goal_life import goal_life
@@ -120,12 +120,17 @@ def watchdog(trace: Driven, run: Run) -> Iterator[Outcome]:
 
 @rule("safety/cancel", on=(goal_life,))
 def cancel(trace: GoalLife, run: Run) -> Iterator[Outcome]:
-    """Judge that the robot stands still after its goal was cancelled.
+    """Judge that the robot stands still after its goal was cancelled."""
+    for one in judged(trace):
+        yield from outcomes("safety/cancel", one.drive, said_of(run).limits)
+
+
+def judged(trace: GoalLife) -> tuple[Cancelled, ...]:
+    """Return the cancels that are judged.
 
     Where a response was late, the DELETE may have been late on its way to the robot as well: another one is judged.
     """
-    for one in [one for one in trace.cancelled if not one.late] or trace.cancelled[-1:]:
-        yield from outcomes("safety/cancel", one.drive, said_of(run).limits)
+    return tuple(one for one in trace.cancelled if not one.late) or trace.cancelled[-1:]
 
 
 @rule("safety/stop-answered", on=(straight,))
