@@ -69,6 +69,10 @@ REALISTIC = GoodDevice("realistic", _realistic, _REFERENCE_ROBOT / "realistic.to
 PLAIN = _independent("plain")
 BAROQUE = _independent("baroque", shows_effects=True)
 LEGACY = _independent("legacy")
+# A velocity holds so short a time that over a slow link the next reading finds it ended.
+DEADMAN = GoodDevice(
+    "deadman", _in_python("baroque", options=("--hold-s", "0.3")), _ROBOTS / "baroque" / "deadman.toml", once=True
+)
 ON_SERVERS = (
     _on_server("node", _in_javascript),
     _on_server("golang", _in_go),
@@ -172,7 +176,7 @@ _OPEN_PLACES = (
 )
 
 SELFTEST = SelfTest(
-    devices=(REFERENCE, PLAIN, BAROQUE, LEGACY, REALISTIC, *ON_SERVERS),
+    devices=(REFERENCE, PLAIN, BAROQUE, LEGACY, REALISTIC, DEADMAN, *ON_SERVERS),
     mutants=MUTANTS,
     short=(
         "safety-unactuated-ignored",

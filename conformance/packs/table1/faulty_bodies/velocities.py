@@ -26,6 +26,23 @@ def _holding(factor: Callable[[float, float | None], float]) -> type[Body]:
     return Holding
 
 
+class _WatchdogSometimes(Body):
+    """A body whose watchdog stops every second velocity that is not renewed; the others go on for a minute."""
+
+    _MINUTE = round(60 / TICK_S)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._ended = 0
+
+    def _aim(self) -> tuple[float, float]:
+        if self.goal is None and self._tick == self._until and any(self._command):
+            self._ended += 1
+            if self._ended % 2:
+                self._until += self._MINUTE
+        return super()._aim()
+
+
 class _RenewedByChange(Body):
     """A body in which repeating the same velocity does not renew it."""
 
@@ -76,6 +93,11 @@ VELOCITIES: dict[str, type[Body]] = {
     "hold-forever-linear": _holding(lambda v, w: 40.0 if v and w is None else 1.0),
     "hold-long-slow": _holding(lambda v, w: 2.0 if w and abs(w) < _SLOW_TURN and abs(v) < _SLOW else 1.0),
     "hold-short-fast": _holding(lambda v, _w: 0.5 if abs(v) > _LINEAR else 1.0),
+    "hold-forever-full-ahead": _holding(lambda v, w: 40.0 if v > 0 and w is not None else 1.0),
+    "hold-forever-full-back": _holding(lambda v, w: 40.0 if v < 0 and w is not None else 1.0),
+    "hold-forever-linear-ahead": _holding(lambda v, w: 40.0 if v > 0 and w is None else 1.0),
+    "hold-forever-left": _holding(lambda _v, w: 40.0 if w and w > 0 else 1.0),
+    "watchdog-sometimes": _WatchdogSometimes,
     "renewed-by-change": _RenewedByChange,
     "back-capped": _driving(lambda v, w: (max(v, -_MOST_BACK), w)),
     "left-capped": _driving(lambda v, w: (v, min(w, _MOST_TURN))),

@@ -66,12 +66,14 @@ class Cancelled:
         read: the last GET of the goal.
         gone: whether the robot had no goal in the end.
         drive: the readings while the suite waited for the robot to stand still.
+        late: whether the response to the DELETE took longer than usual.
     """
 
     exchange: Exchange
     read: Exchange
     gone: bool
     drive: Trace
+    late: bool = False
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,7 @@ class GoalLife:
         second: the PUT of another goal without an id.
         renamed: whether the robot accepted the second goal only with an id; None: it accepted it without one.
         cancelled: DELETEs of the active goal; empty: the goal had ended before.
+        cancels: all DELETEs that were sent while a goal was active, also where the goal had ended when they arrived.
     """
 
     none: tuple[NoGoal, ...] = ()
@@ -101,6 +104,7 @@ class GoalLife:
     second: Put | None = None
     renamed: bool | None = None
     cancelled: tuple[Cancelled, ...] = ()
+    cancels: tuple[Exchange, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
 from conformance.api.rest.calls import JSON
@@ -18,6 +19,7 @@ from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, body_of, read_as
 from conformance.packs.table1.statement import said_of
+from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
 
 POSE: Final = "/robot/pose/"
@@ -128,6 +130,13 @@ class Robot:
         # How long what must not happen is watched for, in relation to standard effort.
         self.watchfulness = 0.5 if api.run.effort.name == "quick" else 1.0
 
+    def apart(self) -> Robot:
+        """Return the robot for another thread, with connections of its own and without listeners; to be closed."""
+        other = copy(self)
+        settings = replace(self.rest.connection, listeners=[], request_rate=None, resent=0)
+        other.rest = HttpClient(self.rest.base_url, settings)
+        return other
+
     @property
     def limits_declared(self) -> bool:
         """Return whether the statement declares all velocity limits, so that requests beyond them can be made."""
@@ -145,6 +154,19 @@ class Robot:
     def sample_s(self) -> float:
         """Return the longest time between odometry samples, by which two interfaces may differ, s."""
         return 1 / (self.limits.odometry_hz or _SELDOM_HZ)
+
+    def is_late(self, exchange: Exchange) -> bool:
+        """Return whether a response took so much longer than usual that the request may have been late as well."""
+        return self.rest.connection.pace.is_late(exchange.response.elapsed_ms / 1000)
+
+    def arrived_by(self, exchange: Exchange, answered: float) -> float:
+        """Return when a request must have arrived: a usual response time after it was sent, s of the run's clock.
+
+        Args:
+            exchange: the request and its response.
+            answered: when the response came, s of the run's clock. The request did not arrive later than that.
+        """
+        return answered - max(0.0, exchange.response.elapsed_ms / 1000 - self.usual_s)
 
     def patience(self, seconds: float) -> Patience:
         """Return a wait of ``seconds``, not counting the time that the robot's responses take."""

@@ -20,8 +20,10 @@ from conformance.verdict.run import Run
 
 # Of the hold time: so long after a command it is given again, and holds from then on.
 _AGAIN: Final = 0.25
-# How often it is tried to see how long a velocity holds.
+# How often a measurement of how long a velocity holds is tried that a stall of the suite or a late response spoilt.
 _ATTEMPTS: Final = 3
+# Of the limit: the linear part of the velocities that are not renewed.
+_LINEAR_SHARE: Final = 0.3
 # The only whole number of rad/s below the limits of most robots.
 _WHOLE: Final = 1.0
 # In this time several samples come, from any robot, s.
@@ -102,11 +104,23 @@ class _Turning:
         bent = Velocity(angular_z=-left.angular_z)
         if robot.actuated(0):
             # A small circle: either part has to end. The linear part is commanded last, and ends as well.
-            bent = bent._replace(linear_x=-0.3 * robot.limits.linear_m_s)
+            bent = bent._replace(linear_x=-_LINEAR_SHARE * robot.limits.linear_m_s)
             arc(robot, drive, bent)
-        self.let_go(bent)
+        for velocity, by_linear in self._ways(bent):
+            self.let_go(velocity, by_linear=by_linear)
         if robot.actuated(0):
             self._ahead_from_rest()
+
+    def _ways(self, bent: Velocity) -> list[tuple[Velocity, bool]]:
+        """Return velocities that are not renewed, and whether a PUT of the linear part commands them last.
+
+        A robot may keep a watchdog for each path, and one for each sign. Without a declared hold time one is enough.
+        """
+        if self.robot.limits.hold_s is None:
+            return [(bent, False)]
+        ahead = Velocity(*(-one for one in bent))
+        ways = [(bent, bool(bent.linear_x)), (ahead, False), (bent, False)]
+        return [*ways, (ahead, True)] if ahead.linear_x else ways[1:]
 
     def _fast(self) -> Velocity | None:
         """Turn left, and right on the spot, both at the highest speed; return the second velocity if it is reached."""
@@ -115,7 +129,7 @@ class _Turning:
 
     def _ahead_from_rest(self) -> None:
         """Command a linear part after the angular part has ended by itself: the angular part must stay zero."""
-        drive, ahead = self.drive, Velocity(linear_x=0.3 * self.robot.limits.linear_m_s)
+        drive, ahead = self.drive, Velocity(linear_x=_LINEAR_SHARE * self.robot.limits.linear_m_s)
         if not drive.command_linear(ahead):
             return
         drive.reach(ahead, "rest-resources/linear-put", part=LINEAR_PART)
@@ -124,26 +138,31 @@ class _Turning:
         expected = f"no angular part beside {ahead}: the one before it had ended"
         drive.saw("rest-resources/linear-keeps-angular", expected, seen, "came back", holds=keeps)
 
-    def let_go(self, turning: Velocity) -> None:
-        """Stop renewing a velocity, and watch how it ends.
+    def let_go(self, turning: Velocity, *, by_linear: bool = False) -> None:
+        """Stop renewing a velocity, and watch how it ends; ``by_linear``: a PUT of the linear part commands it last.
 
-        An apparent failure is measured again: a late response, or a busy machine, is no failure of the robot.
+        A measurement that a stall of the suite or a late response spoilt is made again. One that shows a robot that
+        does
+        not come to rest is never made again: a watchdog that stops most velocities is none.
         """
         limits, tries = self.robot.limits, []
         for _ in range(_ATTEMPTS if limits.hold_s else 1):
-            let_go = self._watch(turning)
+            let_go = self._watch(turning, by_linear=by_linear)
             if let_go is None:
                 break
             tries.append(let_go)
-            rests = let_go.rests(limits)
-            if not rests:
+            if not let_go.rests(limits):
                 self.robot.put_velocity(STILL)
-            if rests and let_go.early(limits) is None and let_go.late(limits) is None:
+                break
+            if let_go.early(limits) or let_go.late(limits):
+                if not let_go.is_void(limits):
+                    break
+            elif limits.hold_s is None or let_go.was_held(limits):
                 break
         if tries:
             self.tries.append(tuple(tries))
 
-    def _watch(self, turning: Velocity) -> LetGo | None:
+    def _watch(self, turning: Velocity, *, by_linear: bool) -> LetGo | None:
         """Command a velocity, and look until the robot rests or its time is over; return None if it is rejected.
 
         With a declared hold time, the suite does not read the robot around the end of that time, because a velocity
@@ -160,19 +179,20 @@ class _Turning:
         if not drive.command(turning):
             return None
         full = drive.trace.sent
-        if turning.linear_x and limits.hold_s is not None:
+        if by_linear:
             drive.command_linear(turning)
         answered = drive.trace.answered
-        first, resumed = len(drive.trace.turns), None
+        first, resumed, due = len(drive.trace.turns), None, None
         ends = answered + self._ends_s
         silent_from = math.inf if limits.hold_s is None else full + 0.95 * limits.hold_s
         while True:
-            drive.look()
-            let_go = LetGo(turning, full, answered, drive.trace.turns[first:], resumed)
-            if let_go.rests(limits) or drive.trace.turns[-1].at > ends:
+            drive.glance() if drive.paces and resumed is None else drive.look()
+            let_go = LetGo(turning, full, answered, drive.trace.turns[first:], resumed, due, by_linear)
+            if let_go.is_decided(limits, ends):
                 return let_go
             if resumed is None and clock.now() > silent_from:
                 robot.put_velocity(Velocity(angular_z=1e4))
-                clock.sleep(answered + let_go.longest(limits) - clock.now())
+                due = max(clock.now(), answered + let_go.longest(limits))
+                clock.sleep(due - clock.now())
                 resumed = len(let_go.turns)
                 ends = max(ends, clock.now() + _SAMPLES_S)
