@@ -1,9 +1,10 @@
 """The implementation conformance statement: what a vendor declares about a device, and what it is judged by."""
 
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import msgspec
+from msgspec import Meta
 
 from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
@@ -23,7 +24,7 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         publishers_endpoint: URL of the service if it differs from the WSDL's; likewise subscribers_endpoint.
         ca_file: certificate authorities to trust.
         token_file: file with the bearer token.
-        request_rate: maximum requests per second.
+        request_rate: maximum requests per second; slower than one a second, no run would end.
         timeout_s: deadline of one request, s.
     """
 
@@ -34,7 +35,7 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     subscribers_endpoint: Text | None = None
     ca_file: Text | None = None
     token_file: Text | None = None
-    request_rate: Positive | None = None
+    request_rate: Annotated[float, Meta(ge=1, le=100_000)] | None = None
     timeout_s: Positive = 10.0
 
     @property

@@ -8,7 +8,7 @@ from conformance.packs.table1.scenarios.trace import Driven
 from conformance.packs.table1.scenarios.turn import turn
 from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
-from conformance.scenarios.rule import Outcome, Rule, rule
+from conformance.scenarios.rule import NotClaimed, Outcome, Rule, rule
 from conformance.scenarios.scenario import Scenario
 from conformance.verdict.run import Run
 
@@ -27,6 +27,17 @@ velocity_put = _shown("velocity-put", straight, velocity_walk)
 velocity_integers = _shown("velocity-integers", turn)
 velocity_converges = _shown("velocity-converges", straight, turn, velocity_walk)
 velocity_range = _shown("velocity-range", straight, turn)
+
+
+@rule("rest-resources/velocity-both", on=(turn,))
+def velocity_both(trace: Driven, run: Run) -> Iterator[Outcome]:
+    """Judge that the robot reaches both limits at once, where its statement does not say that it cannot."""
+    statement = said_of(run)
+    if statement.motion.wheel_separation_m is not None:
+        yield NotClaimed("does not apply: the statement declares wheel_separation_m, which velocity-range is judged by")
+    yield from outcomes("rest-resources/velocity-both", trace.drive, statement.limits)
+
+
 velocity_odometry = _shown("velocity-odometry", straight, turn, velocity_walk)
 linear_put = _shown("linear-put", turn, velocity_walk)
 linear_keeps_angular = _shown("linear-keeps-angular", turn, velocity_walk)

@@ -19,7 +19,7 @@ from conformance.verdict.run import Run
 _LATE = NotTested("responses came too late to measure how long a velocity holds")
 
 
-@rule("safety/stop", on=(straight,))
+@rule("safety/stop", on=(straight, turn))
 def stop(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that zero velocity stops the robot before its watchdog would."""
     return outcomes("safety/stop", trace.drive, said_of(run).limits)
