@@ -50,7 +50,7 @@ KINEMATICS: Final = {
         accelerations=Accelerations(linear=0.6, angular=2.0),
         cruise=0.4,
         turn=0.8,
-        web={"max_linear": 0.2, "max_angular": 0.5, "lag": 0.04},
+        web={"max_linear": 0.2, "max_angular": 0.5, "lag": 0.02},
         patrols=True,
     ),
 }
