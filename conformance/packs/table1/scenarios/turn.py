@@ -48,6 +48,21 @@ def turn(robot: Robot, run: Run) -> Driven:
     return turning.recorded
 
 
+@scenario(needs={Need.REST, Need.MOTION})
+def further_axes(robot: Robot) -> Driven:
+    """Drive along each axis that the robot has beside those of a robot on two wheels; without any, do nothing."""
+    further = [axis for axis in range(len(STILL)) if axis not in {AHEAD, ABOUT} and robot.actuated(axis)]
+    driving = _Turning(robot, Drive(robot))
+    if further:
+        make_room(robot)
+    try:
+        for axis in further:
+            driving.along(axis)
+    except Exception as error:
+        raise PartialTraceError(driving.recorded) from error
+    return driving.recorded
+
+
 def _further(turning: "_Turning", run: Run) -> list[Velocity]:
     """Return velocities at the limits, which must hold as long as others: one chosen by the seed, or both."""
     robot, limits = turning.robot, turning.robot.limits
@@ -80,7 +95,7 @@ class _Turning:
         return Driven(self.drive.whole, tuple(self.tries), tuple(self.not_tested), self._ends_s)
 
     def play(self) -> None:
-        """Turn left by whole numbers, as fast as the robot can, renewed, along an arc, straight on, and aside."""
+        """Turn left by whole numbers, as fast as the robot can, renewed, along an arc, and straight on."""
         robot, drive = self.robot, self.drive
         drive.look()
         left = robot.only(ABOUT, _WHOLE if fastest(robot, ABOUT) > 1.1 * _WHOLE else 0.0)
@@ -106,11 +121,8 @@ class _Turning:
         self.let_go(bent)
         if robot.actuated(AHEAD) and robot.actuated(ABOUT):
             self._ahead_from_rest()
-        for component in set(range(len(STILL))) - {AHEAD, ABOUT}:
-            if robot.actuated(component):
-                self._along(component)
 
-    def _along(self, component: int) -> None:
+    def along(self, component: int) -> None:
         """Drive along one more axis, slowly and as fast as the robot can, there and back, and let it go."""
         robot, drive = self.robot, self.drive
         ends = [robot.only(component, fastest(robot, component, sign)) for sign in (1, -1)]

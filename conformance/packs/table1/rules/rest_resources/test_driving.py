@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from conformance.packs.table1.robot.drive_rules import outcomes
 from conformance.packs.table1.scenarios.straight import straight
 from conformance.packs.table1.scenarios.trace import Driven
-from conformance.packs.table1.scenarios.turn import turn
+from conformance.packs.table1.scenarios.turn import further_axes, turn
 from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import NotClaimed, Outcome, Rule, rule
@@ -25,8 +25,8 @@ def _shown(name: str, *scenarios: Scenario) -> Rule:
 
 velocity_put = _shown("velocity-put", straight, velocity_walk)
 velocity_integers = _shown("velocity-integers", turn)
-velocity_converges = _shown("velocity-converges", straight, turn, velocity_walk)
-velocity_range = _shown("velocity-range", straight, turn)
+velocity_converges = _shown("velocity-converges", straight, turn, further_axes, velocity_walk)
+velocity_range = _shown("velocity-range", straight, turn, further_axes)
 
 
 @rule("rest-resources/velocity-both", on=(turn,))
@@ -44,5 +44,5 @@ velocity_odometry = _shown("velocity-odometry", straight, turn, velocity_walk)
 linear_put = _shown("linear-put", turn, velocity_walk)
 linear_keeps_angular = _shown("linear-keeps-angular", turn, velocity_walk)
 linear_agrees = _shown("linear-agrees", straight, turn, velocity_walk)
-pose_motion = _shown("pose-motion", straight, turn, velocity_walk)
+pose_motion = _shown("pose-motion", straight, turn, further_axes, velocity_walk)
 pose_rotation = _shown("pose-rotation", turn, velocity_walk)
