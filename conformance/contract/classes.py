@@ -64,6 +64,7 @@ class Prerequisite(StrEnum):
     OBSERVER = "observer"  # a ROS probe, or another way to see the effects of a request
     LIMITS = "limits"  # the statement declares them
     HOLD = "hold"  # the statement declares the hold time
+    RESOLVED = "resolved"  # the declared tolerances are small beside the limits, so that rest and motion differ
     SEEN = "seen"  # the device must show it by itself; a device that did not is not judged, and its class not held back
     PROBE = "probe"  # a ROS probe; without one the requirement is skipped and does not hold its class back
 

@@ -1,9 +1,10 @@
 """The implementation conformance statement: what a vendor declares about a device, and what it is judged by."""
 
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import msgspec
+from msgspec import Meta
 
 from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
@@ -29,7 +30,7 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         headers_file: file with fixed headers, ``Name: value`` in each line; their values are secrets.
         client_cert_file: client certificate for TLS (PEM).
         client_key_file: its key, if it is not in the same file.
-        request_rate: maximum requests per second.
+        request_rate: maximum requests per second; slower than one a second, no run would end.
         timeout_s: deadline of one request, s.
     """
 
@@ -46,7 +47,7 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     headers_file: Text | None = None
     client_cert_file: Text | None = None
     client_key_file: Text | None = None
-    request_rate: Positive | None = None
+    request_rate: Annotated[float, Meta(ge=1, le=100_000)] | None = None
     timeout_s: Positive = 10.0
 
     @property

@@ -16,6 +16,7 @@ from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.programs import built, check_installed, program
 from conformance.mutation.self_test import GoodDevice, HarmlessChange, OpenPlace, SelfTest, Start
 from conformance.mutation.wire import IncompleteMessageError
+from conformance.packs.table1.faulty_bodies import STATEMENTS
 from conformance.packs.table1.mutants import MUTANTS
 from conformance.packs.table1.mutants.paths import GOAL, POSE
 
@@ -33,6 +34,12 @@ def _on_ros(start: Start, *options: str) -> list[str]:
 def _realistic(start: Start) -> list[str]:
     """Return a reference robot with odometry, wheels and delays like real ones; each seed is another robot."""
     return _on_ros(start, "--realistic", "--seed", str(start.seed))
+
+
+def _with_body(name: str) -> GoodDevice:
+    """Return a reference robot with another body (``roaas robot --kinematics``)."""
+    statement = _REFERENCE_ROBOT / f"{name}.toml"
+    return GoodDevice(name, lambda start: _on_ros(start, "--kinematics", name), statement, on_ros=True, once=True)
 
 
 def _in_python(name: str, *modules: str, options: tuple[str, ...] = ()) -> Callable[[Start], list[str]]:
@@ -66,6 +73,7 @@ def _on_server(name: str, command: Callable[[Start], list[str]]) -> GoodDevice:
 
 REFERENCE = GoodDevice("reference", _on_ros, _REFERENCE_ROBOT / "reference.toml", on_ros=True)
 REALISTIC = GoodDevice("realistic", _realistic, _REFERENCE_ROBOT / "realistic.toml", on_ros=True)
+BODIES = tuple(_with_body(name) for name in ("ackermann", "no-reverse", "holonomic", "slow-and-busy"))
 PLAIN = _independent("plain")
 BAROQUE = _independent("baroque", shows_effects=True)
 LEGACY = _independent("legacy")
@@ -84,7 +92,8 @@ ON_SERVERS = (
 
 def with_fault(name: str) -> GoodDevice:
     """Return the robot ``baroque`` with a fault in its body; of an empty name, without one."""
-    return replace(BAROQUE, command=_in_python("baroque", options=("--fault", name) if name else ()))
+    command = _in_python("baroque", options=("--fault", name) if name else ())
+    return replace(BAROQUE, command=command, statement=STATEMENTS.get(name, BAROQUE.statement))
 
 
 class _Behind:
@@ -176,7 +185,7 @@ _OPEN_PLACES = (
 )
 
 SELFTEST = SelfTest(
-    devices=(REFERENCE, PLAIN, BAROQUE, LEGACY, REALISTIC, DEADMAN, *ON_SERVERS),
+    devices=(REFERENCE, PLAIN, BAROQUE, LEGACY, REALISTIC, DEADMAN, *BODIES, *ON_SERVERS),
     mutants=MUTANTS,
     short=(
         "safety-unactuated-ignored",

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from conformance.packs.table1.independent_robots.body import TICK_S, Body
 
@@ -80,6 +81,31 @@ class _SlowReversal(Body):
         return v, w
 
 
+class _DeadBase(Body):
+    """A body that ignores velocities, and whose statement has limits so low that rest is "near" each of them."""
+
+    def __post_init__(self) -> None:
+        """Lower the limits of the build to those of the statement."""
+        self.build = replace(self.build, linear_m_s=0.12, angular_rad_s=0.25, cruise_m_s=0.24, turn_rad_s=0.5)
+        super().__post_init__()
+
+    def _aim(self) -> tuple[float, float]:
+        commanded = self.goal is None
+        aim = super()._aim()
+        return (0.0, 0.0) if commanded else aim
+
+
+class _AxesIgnored(Body):
+    """A body that accepts a velocity along each of six axes, as its statement says, and moves along two of them."""
+
+    further_axes = 0.3
+
+    def __post_init__(self) -> None:
+        """Lower the limit of turning to that of the further axes, as the statement has one figure for all of them."""
+        self.build = replace(self.build, angular_rad_s=self.further_axes, turn_rad_s=0.29)
+        super().__post_init__()
+
+
 _LINEAR, _ANGULAR = 0.25, 1.2  # what is fast for the robot, m/s and rad/s
 _SLOW, _SLOW_TURN = 0.1, 0.6
 _DEAD, _DEAD_TURN = 0.06, 0.25  # what is too slow for its motors
@@ -109,4 +135,6 @@ VELOCITIES: dict[str, type[Body]] = {
     "mirrored-back": _driving(lambda v, w: (v, -w if v < 0 else w)),
     "drift": _driving(lambda v, w: (v, 0.12 if v and not w else w)),
     "slow-reversal": _SlowReversal,
+    "dead-base": _DeadBase,
+    "axes-ignored": _AxesIgnored,
 }

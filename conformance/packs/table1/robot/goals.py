@@ -14,6 +14,9 @@ from conformance.scenarios.scenario import NoOccasionError
 # How far velocities may take a robot: aside, and straight ahead, m.
 _NEAR_M: Final = 0.4
 _FAR_M: Final = 0.7
+# Who cannot drive back needs so many times the room ahead; in a circle, so many radii aside.
+_ONE_WAY: Final = 2.0
+_CIRCLE: Final = 2.2
 _PLACES: Final = 8
 # How far away open places are looked for: the nearest first, for the way there takes time.
 _DISTANCES_M: Final = (0.3, 0.5, 0.8, 1.5, 2.5)
@@ -97,11 +100,12 @@ def make_room(robot: Robot, ahead_m: float = _FAR_M) -> None:
         ahead_m: how far checks will drive it ahead or back, m; sideways they need only a few decimetres.
     """
     here = robot.map_pose()
-    if here is None or _is_open(robot, here, min(max(ahead_m, _NEAR_M), _FAR_M)):
+    far = _FAR_M if robot.reverses else _ONE_WAY * _FAR_M
+    if here is None or _is_open(robot, here, min(max(ahead_m, _NEAR_M), _FAR_M) if robot.reverses else far):
         return
     for distance in _DISTANCES_M:
         for pose in reachable(robot, here, distance, _PLACES):
-            if _is_open(robot, pose, _FAR_M):
+            if _is_open(robot, pose, far):
                 exchange = put_goal(robot, goal_body(pose, robot.statement.motion.frame))
                 if exchange.response.ok:
                     await_none(robot, _ARRIVES_S)
@@ -112,7 +116,9 @@ def make_room(robot: Robot, ahead_m: float = _FAR_M) -> None:
 
 def _is_open(robot: Robot, pose: Pose, ahead_m: float) -> bool:
     """Return whether the robot has straight plans from a pose in all directions, ``ahead_m`` long ahead and back."""
-    around = [pose.ahead(_NEAR_M, math.radians(angle)) for angle in range(60, 360, 60)]
+    # In a circle a robot comes twice its radius aside.
+    aside = max(_NEAR_M, _CIRCLE * (robot.statement.motion.min_radius_m or 0.0))
+    around = [pose.ahead(aside, math.radians(angle)) for angle in range(60, 360, 60)]
     for there in (pose.ahead(ahead_m), pose.ahead(-ahead_m), *around):
         _, plan, _ = ask(robot, there, pose)
         if plan is None or plan.length > 1.2 * pose.distance(there) + 0.1 or not robot.in_arena(there):

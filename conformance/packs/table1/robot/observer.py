@@ -185,8 +185,8 @@ class Observer(Listener):
         samples.add(twist, self._last_stamp)
         linear, angular = limits.tolerance_linear_m_s, limits.tolerance_angular_rad_s
         for part, limit, absolute, noise in (
-            ("linear", limits.linear_m_s, linear, limits.noise.linear_m_s),
-            ("angular", limits.angular_rad_s, angular, limits.noise.angular_rad_s),
+            ("linear", limits.navigation_m_s, linear, limits.noise.linear_m_s),
+            ("angular", limits.navigation_rad_s, angular, limits.noise.angular_rad_s),
         ):
             declared = limits.linear_declared if part == "linear" else limits.angular_declared
             if part not in twist or not declared:

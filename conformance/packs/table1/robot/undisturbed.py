@@ -158,17 +158,18 @@ def _refused(robot: Robot, drive: Drive, turning: Velocity) -> None:
     drive.saw("safety/refused-keeps", expected, found, "changed", holds=keeps)
 
 
-def arc(robot: Robot, drive: Drive, bent: Velocity) -> None:
-    """PUT the linear part, ahead and then back, and record whether the angular part stays.
+def arc(robot: Robot, drive: Drive, bent: Velocity, before: Velocity) -> None:
+    """PUT two linear parts, one after the other, and record whether the angular part stays.
 
     Args:
         robot: the robot.
         drive: a drive of that robot.
         bent: the velocity at the end.
+        before: the first linear part.
     """
     back = bent._replace(angular_z=0.0)
     drive.refresh(bent)
-    if not drive.command_linear(Velocity(linear_x=-back.linear_x)):
+    if not drive.command_linear(before):
         return
     for attempt in range(_TRIES):
         if attempt or robot.usual_s > _QUICK_S:

@@ -71,7 +71,7 @@ def formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> tuple
     suspects: dict[tuple[str, bool], Found] = {}
     for change in range(_CHANGES):
         # There and back, which needs no more room.
-        moving = Velocity(*(-part if change % 2 else part for part in arc))
+        moving = robot.drivable(Velocity(*(-part if change % 2 else part for part in arc)))
         for wanted in (moving, STILL):
             drive.command(wanted)
             drive.reach(wanted)

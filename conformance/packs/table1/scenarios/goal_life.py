@@ -182,7 +182,7 @@ def cancel(robot: Robot) -> Cancelled:
         read = await_none(robot)
         gone = read.response.status == HTTPStatus.NOT_FOUND
     drive.reach(STILL, "safety/cancel", since=robot.arrived_by(exchange, answered))
-    rests = [turn.velocity is None or robot.near(turn.velocity, STILL, 2) for turn in drive.trace.turns]
+    rests = [turn.velocity is None or robot.near(turn.velocity, STILL) for turn in drive.trace.turns]
     if all(rests) or not rests[-1]:
         # It may yet begin what the goal had commanded, or be about to turn the other way: until it has had its time.
         robot.clock.sleep(answered + robot.settle_s - robot.clock.now())
@@ -200,7 +200,7 @@ def _cancel_again(robot: Robot, body: dict[str, Any]) -> Rest:
 
 def slow_turn(robot: Robot) -> Velocity:
     """Return a slow turn; zero where the robot cannot turn."""
-    return Velocity(angular_z=0.1 * robot.limits.angular_rad_s if robot.actuated(5) else 0.0)
+    return robot.share_of_limits(0.0, 0.1)
 
 
 def await_motion(robot: Robot) -> None:

@@ -13,7 +13,7 @@ from conformance.packs.table1.robot.goal_trace import GoalReached
 from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.message_shapes import ODOMETRY
 from conformance.packs.table1.robot.plan import ask, start_of
-from conformance.packs.table1.robot.robot import FARTHEST, POSE, Robot, Velocity
+from conformance.packs.table1.robot.robot import FARTHEST, POSE, Robot
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
@@ -71,9 +71,9 @@ def _turned(robot: Robot, here: Pose, there: Pose) -> Pose:
 def _turning_before(robot: Robot, effort: Effort) -> Command | None:
     """Command a velocity just before the goal; return None if that shows nothing or takes too much time."""
     limits = robot.limits
-    turning = Velocity(angular_z=0.4 * limits.angular_rad_s)
+    turning = robot.share_of_limits(0.0, 0.4)
     seen_from_rest = limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s
-    if effort.name == "quick" or limits.hold_s is None or not robot.actuated(5):
+    if effort.name == "quick" or limits.hold_s is None:
         return None
     if turning.angular_z < 4 * seen_from_rest:
         return None
