@@ -10,7 +10,7 @@ from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.robot.standstill import Standstill, watch_rest
 from conformance.packs.table1.robot.standstill_trace import Rest, stays
 
-_CANCEL, _REFUSED = "safety/cancel-stays", "safety/refused-keeps"
+_CANCEL, _REFUSED = "safety/cancel", "safety/refused-keeps"
 _WATCH_S = 0.3
 _LATER_S = 0.15
 
