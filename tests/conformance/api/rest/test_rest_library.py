@@ -58,4 +58,4 @@ def test_nothing_is_taken_out_without_permission(certified):
     _, found, _ = certified(library, "--class", "http", "--class", "strict-input")
     assert not [asked for asked in library.log if asked[0] == "DELETE" and re.fullmatch(r"/books/\d+", asked[1])]
     assert library.books
-    assert (found["http/put-idempotent"][0], found["strict-input/json-unknown"][0]) == ("skip", "pass")
+    assert (found["http/delete-idempotent"][0], found["strict-input/json-unknown"][0]) == ("skip", "pass")

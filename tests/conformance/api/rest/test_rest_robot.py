@@ -99,9 +99,9 @@ def test_a_slow_robot_is_asked_less(api):
 
 
 def test_what_moves_needs_permission(api):
-    ids = ["http/put-idempotent"]
+    ids = ["http/delete-idempotent"]
     assert applicable_operations(api, ids, lambda item: item.method == "DELETE", "deletes") == []
-    assert "allow-motion" in api.run.judge.evidence["http/put-idempotent"].skips[0]
+    assert "allow-motion" in api.run.judge.evidence["http/delete-idempotent"].skips[0]
     assert applicable_operations(api, ["http/safe"], lambda item: item.method == "PATCH", "patches") == []
     assert "no operation that patches" in api.run.judge.evidence["http/safe"].unclaimed
     wanted = GeneratedRequest("DELETE", "/books/5", "", b"")
