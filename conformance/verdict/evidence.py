@@ -269,9 +269,8 @@ class Judge:
             where(evidence).append(text)
 
     def refuted(self) -> dict[str, int]:
-        """Return the number of failures so far, by requirement and alias."""
-        failed = {id_: evidence.failures for id_, evidence in self.evidence.items() if evidence.findings}
-        return failed | {old: failed[new] for old, new in self._renamed.items() if new in failed}
+        """Return the number of failures so far, by requirement."""
+        return {id_: evidence.failures for id_, evidence in self.evidence.items() if evidence.findings}
 
     def counts(self, ids: Iterable[str]) -> dict[str, int]:
         """Return the number of cases by id, each for the part of its requirement that the id names."""

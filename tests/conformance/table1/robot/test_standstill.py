@@ -11,7 +11,7 @@ from conformance.packs.table1.robot.standstill import Standstill, watch_rest
 from conformance.packs.table1.robot.standstill_trace import Rest, stays
 from conformance.scenarios.rule import Case, NotTested, Outcome
 
-_CANCEL, _REFUSED = "safety/cancel-stays", "safety/refused-keeps"
+_CANCEL, _REFUSED = "safety/cancel", "safety/refused-keeps"
 _WATCH_S = 0.3
 _LATER_S = 0.15
 
