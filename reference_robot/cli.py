@@ -8,6 +8,7 @@ from typing import Final
 import click
 
 from conformance.commandline.exit_codes import ExitCode
+from reference_robot.kinematics import DIFFERENTIAL, KINEMATICS
 from reference_robot.ros_arguments import RosCommand
 
 _HIGHEST_DOMAIN_ID: Final = 101
@@ -48,6 +49,12 @@ _NEEDED: Final = {
     help="Simulate imperfections: slow odometry with noise and drift, wheels that slip, commands that arrive late.",
 )
 @click.option("--seed", type=int, default=0, help="With --realistic: which imperfections.")
+@click.option(
+    "--kinematics",
+    type=click.Choice(list(KINEMATICS)),
+    default=DIFFERENTIAL,
+    help="Body of the simulated robot; reference_robot/NAME.toml is its statement.",
+)
 @click.option("--token-file", type=_FILE, help="Require a bearer token from this file; scopes limit its use.")
 @click.option("--tls-cert", type=_FILE, help="Serve HTTPS with this certificate or chain (PEM).")
 @click.option("--tls-key", type=_FILE, help="Private key of the certificate (PEM).")

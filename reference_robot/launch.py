@@ -16,17 +16,19 @@ from types import FrameType
 from typing import Final
 
 import click
+import msgspec
 from rclpy.logging import get_logging_directory
 
 from conformance.commandline.exit_codes import ExitCode
 from conformance.contract.toml_file import TomlFileError
 from reference_robot.ending import Ending
+from reference_robot.kinematics import DIFFERENTIAL, KINEMATICS
 from reference_robot.ros import RosArgumentsError, RosRuntime
 from reference_robot.simulated import SimulatedRobot, SimulationError
 from reference_robot.simulation.delivery import Delivery
 from reference_robot.simulation.requests import DeliveryRequests
 from reference_robot.webservices.assembly import Endpoints
-from reference_robot.webservices.configuration import load_configuration
+from reference_robot.webservices.configuration import Configuration, load_configuration
 from reference_robot.webservices.endpoint import PortInUseError
 from reference_robot.webservices.http.authorization import Authorization, TokenFileError, read_tokens
 from reference_robot.webservices.http.hosts import is_loopback
@@ -78,6 +80,7 @@ class Options:
     attach: bool
     realistic: bool
     seed: int
+    kinematics: str
     delivery_only: bool
     ros_arguments: tuple[str, ...]
 
@@ -101,7 +104,7 @@ def run(options: Options) -> None:
         sys.stdout.flush()
 
     try:
-        configuration = load_configuration(options.config)
+        configuration = _configuration(options)
         listening = _listening(options)
         RosRuntime(options.domain_id, options.ros_arguments).close()  # raises if the arguments are bad
         runner = RobotWebServiceNodesRunner(configuration, listening, options.domain_id, options.ros_arguments)
@@ -111,6 +114,20 @@ def run(options: Options) -> None:
         raise UnusableError(str(error)) from error
     except (SimulationError, RobotNotFoundError) as error:
         raise RobotLostError(str(error)) from error
+
+
+def _configuration(options: Options) -> Configuration:
+    """Return the configuration from the file, with the limits of the simulated robot's body.
+
+    Raises:
+        TomlFileError: The file cannot be used.
+        UnusableError: A body is selected where it would have no effect.
+    """
+    configuration = load_configuration(options.config)
+    if options.kinematics != DIFFERENTIAL and (options.attach or options.realistic):
+        raise UnusableError("--kinematics selects a simulated body: it excludes --attach and --realistic")
+    web = msgspec.structs.replace(configuration.web, **KINEMATICS[options.kinematics].web)
+    return msgspec.structs.replace(configuration, web=web)
 
 
 def _listening(options: Options) -> Listening:
@@ -180,5 +197,5 @@ def _simulation(options: Options) -> contextlib.AbstractContextManager[None]:
     log = get_logging_directory() / f"robot-{os.getpid()}.log"
     click.echo(f"The simulated robot's log is {log}", err=True)
     return SimulatedRobot(
-        options.domain_id, options.time_scale, options.config, seed, log, options.ros_arguments
+        options.domain_id, options.time_scale, options.config, seed, log, options.ros_arguments, options.kinematics
     ).running()

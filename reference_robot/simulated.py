@@ -12,6 +12,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO, Final
 
+from reference_robot.kinematics import DIFFERENTIAL
+
 _START: Final = 60.0  # seconds
 _STOP: Final = 5.0  # seconds
 
@@ -30,6 +32,7 @@ class SimulatedRobot:
         realistic_seed: Seed of a robot with imperfect wheels and odometry; None for a perfect robot.
         log: The file for the simulation's log.
         ros_arguments: ROS arguments for the simulation's nodes.
+        kinematics: The name of the robot's body.
     """
 
     def __init__(
@@ -40,6 +43,7 @@ class SimulatedRobot:
         realistic_seed: int | None,
         log: Path,
         ros_arguments: Sequence[str] = (),
+        kinematics: str = DIFFERENTIAL,
     ) -> None:
         self._log = log
         self._command = [
@@ -48,6 +52,7 @@ class SimulatedRobot:
             "reference_robot.simulation",
             f"--domain-id={domain_id}",
             f"--time-scale={time_scale}",
+            f"--kinematics={kinematics}",
             *([f"--names={config}"] if config else []),
             *([] if realistic_seed is None else ["--realistic", f"--seed={realistic_seed}"]),
             *ros_arguments,

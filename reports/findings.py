@@ -40,6 +40,11 @@ class Finding:
         return number
 
     @property
+    def topic(self) -> str:
+        """Return the key of the requirement's topic; empty before contract 1.2."""
+        return str(self.requirement.get("topic", ""))
+
+    @property
     def cause(self) -> str:
         """Return the key of the kind of cause in `CAUSES`, such as "server-error"; "rule" by default."""
         return str(self.failure.get("cause", "rule"))

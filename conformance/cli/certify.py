@@ -100,6 +100,14 @@ _OBJECTS = 20_000
     "--baseline", type=click.Path(path_type=Path), help="Accepted failures, each with reason and expiry date (TOML)."
 )
 @click.option("--token-file", type=_FILE, help="File with the bearer token to send.")
+@click.option("--basic-file", type=_FILE, help="File with user:password for basic authentication.")
+@click.option(
+    "--api-key", metavar="'PLACE NAME'", help="Where the API key goes: header, query or cookie, and its name."
+)
+@click.option("--api-key-file", type=_FILE, help="File with the API key.")
+@click.option("--headers-file", type=_FILE, help="File with headers to send, 'Name: value' in each line.")
+@click.option("--client-cert-file", type=_FILE, help="Client certificate (PEM) for HTTPS.")
+@click.option("--client-key-file", type=_FILE, help="Its key, if it is not in the same file.")
 @click.option(
     "--out", type=click.Path(file_okay=False, path_type=Path), default=Path("out"), help="Folder for the results."
 )
@@ -215,7 +223,7 @@ def _certify(chosen: Statement, options: dict[str, Any], contract: Contract, sta
         if chosen.endpoints.ca_file:
             connection.tls()
         requirements = judged_by(contract, options["requirements"])
-        baseline = load_baseline(options["baseline"], contract.ledger) if options["baseline"] else ()
+        baseline = load_baseline(options["baseline"], contract.ledger, contract.renamed) if options["baseline"] else ()
         given = Given(
             statement=file_digest(statement) if statement else None,
             baseline=file_digest(options["baseline"]) if options["baseline"] else None,
@@ -236,7 +244,7 @@ def _run(chosen: Statement, options: dict[str, Any], contract: Contract) -> Run:
     """Return the run that the options describe."""
     from conformance.verdict.run import Run, seed_of_nonce  # noqa: PLC0415 - see _certify
 
-    known = {item.class_ for item in contract.ledger.values()}
+    known = {name for item in contract.ledger.values() for name in item.classes}
     return Run(
         statement=chosen,
         contract=contract,

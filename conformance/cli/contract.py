@@ -48,7 +48,9 @@ def list_(pack: str, class_: str | None, level: str | None, *, as_json: bool) ->
     contract = loaded(pack)
     if class_ not in {None, *contract.classes}:
         raise click.UsageError(f"--class {class_!r}: {contract.name} has {', '.join(contract.classes)}")
-    found = [item for item in contract.ledger.values() if class_ in {None, item.class_} and level in {None, item.level}]
+    found = [
+        item for item in contract.ledger.values() if class_ in {None, *item.classes} and level in {None, item.level}
+    ]
     if as_json:
         click.echo(json.dumps([_as_json(item) for item in found], indent=2))
         return

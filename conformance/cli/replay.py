@@ -183,7 +183,8 @@ def _judge_recorded(
         judged = judge_recorded(RobotUnderTest(run), folder)
     except (StatementError, TracesError) as error:
         raise click.UsageError(str(error)) from error
-    chosen = [one for one in judged if requirement in {None, one.requirement}]
+    wanted = contract.renamed.get(requirement, requirement) if requirement else None
+    chosen = [one for one in judged if wanted in {None, one.requirement}]
     for one in chosen:
         word = f"fails: {inert('; '.join(one.failures))}" if one.failures else "passes"
         click.echo(f"{one.requirement} {word} ({one.cases} cases)")

@@ -9,6 +9,7 @@ import click
 
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.terminal import inert
+from conformance.contract.classes import QUESTIONS
 
 if TYPE_CHECKING:
     from conformance.engine.certification import Certification
@@ -31,11 +32,16 @@ def print_summary(outcome: Certification) -> None:
     click.echo()
     for name, value in document["classes"].items():
         reason = document["class_reasons"].get(name, "")
-        click.echo(f"  {name:<20} {_MARKS[value]:<13}{inert(reason[:300])}".rstrip())
+        view = " (black box)" if document["class_views"].get(name) == "black box" else ""
+        click.echo(f"  {name + view:<30} {_MARKS[value]:<13}{inert(reason[:300])}".rstrip())
     by_id = {requirement["id"]: requirement for requirement in document["requirements"]}
-    for cause in document["causes"]:
-        requirement = by_id[cause["requirement"]]
-        if requirement["verdict"] in {"fail", "warn"}:
+    for topic, question in QUESTIONS.items():
+        found = [(cause, by_id[cause["requirement"]]) for cause in document["causes"]]
+        found = [(cause, item) for cause, item in found if item["topic"] == topic]
+        found = [(cause, item) for cause, item in found if item["verdict"] in {"fail", "warn"}]
+        if found:
+            click.echo(f"\n{question}")
+        for cause, requirement in found:
             _print_cause(cause, requirement)
     counts = Counter(requirement["verdict"] for requirement in document["requirements"])
     told = ", ".join(f"{count} {value}" for value, count in sorted(counts.items()))
@@ -56,6 +62,8 @@ def _print_cause(cause: dict[str, Any], requirement: dict[str, Any]) -> None:
     """Print a finding and the requirements that are not tested because of it."""
     head = f"{requirement['verdict'].upper()} {requirement['id']} ({requirement['level']}, {requirement['source']})"
     click.echo(f"\n{cause['number']}. {head}\n  {requirement['text']}\n  {inert(cause['text'])}")
+    if "breaks" in requirement:
+        click.echo(f"  what breaks in practice: {requirement['breaks']}")
     blocks = cause["blocks"]
     if blocks:
         shown = ", ".join(blocks[:_SHOWN_BLOCKED])

@@ -27,6 +27,26 @@ class Origin(StrEnum):
     CONTRACT = "contract"  # a pack's contract.md: devices that claim it
 
 
+class Topic(StrEnum):
+    """What a requirement is about, for readers: pages, terminal and docs list the topics in this order."""
+
+    HURT = "hurt"  # whether somebody can be hurt, or something moves that should not
+    SERVICE = "service"  # whether the device does what the contract says of its resources and operations
+    CLIENTS = "clients"  # whether stock clients, libraries and tools work with it
+    HOSTILE = "hostile"  # what attacks and invalid input do to it
+    HYGIENE = "hygiene"  # what is good form, and seldom met; pages fold it
+
+
+#: The topics as questions that a reader has.
+QUESTIONS = {
+    Topic.HURT: "Can it hurt?",
+    Topic.SERVICE: "Does it do what it says?",
+    Topic.CLIENTS: "Do stock clients work?",
+    Topic.HOSTILE: "Does it withstand hostile input?",
+    Topic.HYGIENE: "Hygiene",
+}
+
+
 class CauseKind(StrEnum):
     """The kinds of causes for failures, in the order in which a vendor should look at them."""
 
@@ -44,6 +64,7 @@ class Prerequisite(StrEnum):
     OBSERVER = "observer"  # a ROS probe, or another way to see the effects of a request
     LIMITS = "limits"  # the statement declares them
     HOLD = "hold"  # the statement declares the hold time
+    RESOLVED = "resolved"  # the declared tolerances are small beside the limits, so that rest and motion differ
     SEEN = "seen"  # the device must show it by itself; a device that did not is not judged, and its class not held back
     PROBE = "probe"  # a ROS probe; without one the requirement is skipped and does not hold its class back
 
@@ -57,12 +78,14 @@ class ConformanceClass:
         title: a description.
         interfaces: the interfaces that it judges.
         one_is_enough: whether one of these interfaces suffices; otherwise all that the contract describes must respond.
+        topic: of its requirements that name none.
     """
 
     name: str
     title: str
     interfaces: tuple[Interface, ...]
     one_is_enough: bool = False
+    topic: Topic = Topic.SERVICE
 
     def missing(self, there: Collection[Interface], described: Collection[Interface] = EVERY) -> tuple[Interface, ...]:
         """Return the interfaces that the class needs and the contract describes, but that have no address."""

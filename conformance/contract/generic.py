@@ -4,7 +4,7 @@ from functools import cache
 
 import msgspec
 
-from conformance.contract.classes import ConformanceClass
+from conformance.contract.classes import ConformanceClass, Topic
 from conformance.contract.interfaces import Interface
 from conformance.contract.ledger import Requirement, load_ledger
 from conformance.contract.locating import GENERIC_RULES, ContractError
@@ -20,6 +20,8 @@ class ClassEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     title: Text | None = None
     interfaces: tuple[Interface, ...] | None = None
     one_is_enough: bool = False
+    topic: Topic | None = None
+    acts: bool = False
 
 
 class _Classes(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -33,7 +35,9 @@ def generic_classes() -> dict[str, ConformanceClass]:
     """Return the conformance classes that apply to any web API, by name."""
     entries = read_toml(GENERIC_RULES / "classes.toml", _Classes, ContractError).class_
     return {
-        item.name: ConformanceClass(item.name, item.title or "", item.interfaces or (), item.one_is_enough)
+        item.name: ConformanceClass(
+            item.name, item.title or "", item.interfaces or (), item.one_is_enough, item.topic or Topic.SERVICE
+        )
         for item in entries
     }
 

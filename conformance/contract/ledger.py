@@ -1,12 +1,12 @@
 """The requirement ledger: each requirement with its class, level, text, source and origin."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Container, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
 
-from conformance.contract.classes import CauseKind, Level, Origin, Prerequisite
+from conformance.contract.classes import CauseKind, Level, Origin, Prerequisite, Topic
 from conformance.contract.toml_file import Text, TomlFileError, fit, read_tables
 
 
@@ -29,6 +29,11 @@ class Requirement:
         needs: what a run must have to judge it, beside the interface.
         untestable: why no check can judge it, or None.
         forbids: the kinds of causes that the requirement is about; it keeps the finding that other requirements share.
+        aliases: ids that it had before, and ids of requirements that were merged into it. Checks and mutants may still
+            name a part of it by such an id, and baselines and old results are read by them.
+        also: further classes that it binds: it is judged when one of them is claimed, and all of them fail with it.
+        topic: what it is about, for readers; None: its class's topic.
+        breaks: what breaks in practice when a device does not meet it, or None.
     """
 
     id: str
@@ -40,6 +45,19 @@ class Requirement:
     needs: tuple[Prerequisite, ...] = ()
     untestable: str | None = None
     forbids: tuple[CauseKind, ...] = ()
+    aliases: tuple[str, ...] = ()
+    also: tuple[str, ...] = ()
+    topic: Topic | None = None
+    breaks: str | None = None
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """Return the classes that the requirement binds, its own first."""
+        return self.class_, *self.also
+
+    def binds(self, claims: Container[str]) -> bool:
+        """Return whether the requirement binds a device that claims some classes."""
+        return any(name in claims for name in self.classes)
 
 
 class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -52,6 +70,10 @@ class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     needs: tuple[Prerequisite, ...] = ()
     untestable: Text | None = None
     forbids: tuple[CauseKind, ...] = ()
+    aliases: tuple[Text, ...] = ()
+    also: tuple[Text, ...] = ()
+    topic: Topic | None = None
+    breaks: Text | None = None
 
 
 def expanded(ids: Iterable[str], ledger: Iterable[str]) -> tuple[str, ...]:
@@ -62,6 +84,11 @@ def expanded(ids: Iterable[str], ledger: Iterable[str]) -> tuple[str, ...]:
         for one in ids
         for id_ in ([id_ for id_ in there if id_.endswith(one[1:])] if one.startswith("*/") else [one])
     )
+
+
+def renamed(ledger: Mapping[str, Requirement]) -> dict[str, str]:
+    """Return the id that a requirement has now by each of its aliases."""
+    return {alias: item.id for item in ledger.values() for alias in item.aliases}
 
 
 def load_ledger(path: Path, classes: Collection[str]) -> dict[str, Requirement]:

@@ -8,7 +8,7 @@ that apply to any web API.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
@@ -18,11 +18,11 @@ from typing import Any
 import msgspec
 import yaml
 
-from conformance.contract.classes import FULL, ConformanceClass
+from conformance.contract.classes import FULL, ConformanceClass, Topic
 from conformance.contract.described import ORIGINAL_NAME, UNRESOLVED_NAME
 from conformance.contract.generic import LEDGER, ClassEntry, generic_classes, generic_ledger
 from conformance.contract.interfaces import Interface
-from conformance.contract.ledger import LedgerError, Requirement, load_ledger
+from conformance.contract.ledger import LedgerError, Requirement, load_ledger, renamed
 from conformance.contract.locating import GENERIC_RULES, MANIFEST, ContractError, folder_of, module_of
 from conformance.contract.sections import TEXT_NAME, Section, cited_in, sections_of
 from conformance.contract.toml_file import Text, read_toml
@@ -150,8 +150,14 @@ class Contract:
                 )
             interfaces = entry.interfaces or (known.interfaces if known else ())
             enough = known.one_is_enough if known else entry.one_is_enough
-            found[entry.name] = ConformanceClass(entry.name, entry.title or known.title, interfaces, enough)  # type: ignore[union-attr] # checked above
+            topic = entry.topic or (known.topic if known else Topic.SERVICE)
+            found[entry.name] = ConformanceClass(entry.name, entry.title or known.title, interfaces, enough, topic)  # type: ignore[union-attr] # checked above
         return found
+
+    @property
+    def acting(self) -> frozenset[str]:
+        """The classes whose requests have effects that only ROS, or a class about ROS, shows."""
+        return frozenset(entry.name for entry in self.manifest.class_ if entry.acts) if self.manifest else frozenset()
 
     @cached_property
     def profiles(self) -> dict[str, tuple[str, ...]]:
@@ -222,9 +228,29 @@ class Contract:
         Raises:
             ContractError: a ledger cannot be read, an id occurs twice, or one of ``only`` is unknown.
         """
+        return {id_: item for id_, item in self._whole_ledger.items() if not self.only or id_ in self._chosen}
+
+    @cached_property
+    def renamed(self) -> dict[str, str]:
+        """The present id of a requirement by each of its aliases."""
+        return renamed(self._whole_ledger)
+
+    def requirement(self, id_: str) -> Requirement | None:
+        """Return the requirement with an id or an alias, or None."""
+        return self.ledger.get(self.renamed.get(id_, id_))
+
+    @property
+    def _chosen(self) -> frozenset[str]:
+        chosen = frozenset(self.renamed.get(id_, id_) for id_ in self.only)
+        if unknown := chosen - set(self._whole_ledger):
+            raise ContractError(f"{self.name} has no requirement {min(unknown)!r}")
+        return chosen
+
+    @cached_property
+    def _whole_ledger(self) -> dict[str, Requirement]:
         dropped = self.manifest.without if self.manifest else ()
         generic = {
-            id_: item for id_, item in generic_ledger().items() if item.class_ in self.classes and id_ not in dropped
+            id_: item for id_, item in generic_ledger().items() if item.binds(self.classes) and id_ not in dropped
         }
         own: dict[str, Requirement] = {}
         path = self.directory / LEDGER
@@ -235,11 +261,16 @@ class Contract:
                 raise ContractError(str(error)) from error
         if twice := sorted(set(own) & set(generic)):
             raise ContractError(f"{path}: {twice[0]} is a requirement of the generic suite already")
-        both = {**generic, **own}
-        if unknown := set(self.only) - set(both):
-            raise ContractError(f"{self.name} has no requirement {min(unknown)!r}")
-        ranked = sorted(both.values(), key=lambda item: list(self.classes).index(item.class_))
-        return {item.id: item for item in ranked if not self.only or item.id in self.only}
+        both = [self._placed(item) for item in {**generic, **own}.values()]
+        names = [name for item in both for name in (item.id, *item.aliases)]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ContractError(f"{path}: {twice[0]} names two requirements")
+        return {item.id: item for item in sorted(both, key=lambda item: list(self.classes).index(item.class_))}
+
+    def _placed(self, item: Requirement) -> Requirement:
+        """Return a requirement in those of its classes that the pack has, with its topic."""
+        own, *also = (name for name in item.classes if name in self.classes)
+        return replace(item, class_=own, also=tuple(also), topic=item.topic or self.classes[own].topic)
 
     @cached_property
     def cited_sections(self) -> dict[str, Section]:

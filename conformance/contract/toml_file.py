@@ -92,7 +92,7 @@ def _explained(table: dict[str, Any], shape: type, said: str) -> str:
             heading = f"[[{dotted}]] number {int(index.rstrip(']')) + 1}: " if index else f"[{dotted}] "
             keys = ""
     if isinstance(value, dict) and isinstance(kind, inspect.StructType):
-        return _wrong_keys(heading, value, kind) or said
+        return _wrong_keys(heading, value, kind) or heading + _PLACE.sub("", said)
     whole = f"{dotted}.{keys}" if dotted else keys
     return f"{heading}{keys} = {value!r} must be {_wanted(kind, whole)}"
 

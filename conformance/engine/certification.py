@@ -90,12 +90,14 @@ def certify(
         remarks.append("The run was interrupted; what follows is what was judged until then.")
     remarks += run.remarks
     seen, causes = draw_verdicts(run)
-    if run.requirement_set is not None:
-        seen = score(seen, run.requirement_set.requirements, f"requirement set {run.requirement_set.name}")
+    if run.requirement_set is not None and run.scored is not None:
+        seen = score(seen, run.scored, f"requirement set {run.requirement_set.name}")
     verdicts = apply_baseline(seen, baseline, dt.datetime.now(dt.UTC).date())
     # A baseline makes a run green, not a robot conformant: the classes fail all the same.
     classes, accepted = class_verdicts(seen, run.claims), class_verdicts(verdicts, run.claims)
     failed = overall(classes) is Overall.NOT_CONFORMANT
+    if not run.enough:
+        remarks.append(f"Nothing can be said of a robot {run.less}: the verdict is inconclusive unless it failed.")
     document = result_document(
         robot,
         verdicts,
@@ -108,11 +110,13 @@ def certify(
         notes=remarks,
         interrupted=run.interrupted,
     )
+    document = robot.connection.credentials.hidden_in(document)
     path = write_result(document, out)
     write_traces(recordings, out)
     if run.interrupted:
         return Certification(ExitCode.INTERRUPTED, document, path)
-    return Certification(OF_VERDICT[overall(accepted)] if reached else ExitCode.UNREACHABLE, document, path)
+    code = OF_VERDICT[overall(accepted, enough=run.enough)] if reached else ExitCode.UNREACHABLE
+    return Certification(code, document, path)
 
 
 def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
@@ -122,8 +126,7 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
         evidence = judge.evidence[requirement.id]
         if run.aborted and not (evidence.cases or evidence.skips or evidence.errors):
             judge.stopped(requirement.id, run.aborted)
-    scored = run.requirement_set.requirements if run.requirement_set else None
-    seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, scored)
+    seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, run.scored)
     if run.contract.described:
         _leave_out(seen)
     verdicts = [

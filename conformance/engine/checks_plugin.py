@@ -72,6 +72,11 @@ class ChecksPlugin:
 
     def ids_of(self, item: pytest.Item) -> tuple[str, ...]:
         """Return the ids of the requirements that a check judges."""
+        renamed = self._robot().run.contract.renamed
+        return tuple(dict.fromkeys(renamed.get(id_, id_) for id_ in self.parts_of(item)))
+
+    def parts_of(self, item: pytest.Item) -> tuple[str, ...]:
+        """Return the ids by which a check names what it judges; an alias is a part of a requirement."""
         marked = (id_ for mark in item.iter_markers("requirement") for id_ in mark.args)
         return expanded(marked, self._robot().run.contract.ledger)
 
@@ -114,10 +119,12 @@ class ChecksPlugin:
             return
         run = self._robot().run
         ledger = run.contract.ledger
-        claimed = {id_ for id_, requirement in ledger.items() if requirement.class_ in run.claims}
+        claimed = {id_ for id_, requirement in ledger.items() if requirement.binds(run.claims)}
         kept = [item for item in items if not is_check(item) or not claimed.isdisjoint(self.ids_of(item))]
         dropped = [item for item in items if item not in kept]
         config.hook.pytest_deselected(items=dropped)
+        for item in kept:
+            run.judge.announce(self.parts_of(item))
         steps = [(self.step_of(item), item) for item in kept]
         turns = {id(step): number for number, step in enumerate(ordered([step for step, _ in steps], ledger))}
         items[:] = [item for _, item in sorted(steps, key=lambda pair: turns[id(pair[0])])]
@@ -156,7 +163,7 @@ class ChecksPlugin:
         """Run a check, and turn exceptions into evidence."""
         if not is_check(item):
             return (yield)
-        ids = self.ids_of(item)
+        ids = self.parts_of(item)
         # Imported late: the plugin is loaded in every pytest run where the suite is installed.
         from conformance.engine.record_exception import record_exception  # noqa: PLC0415
 
@@ -269,4 +276,4 @@ class ChecksPlugin:
         """Return the Hypothesis runner, seeded by the run's seed and the check's name."""
         from conformance.verdict.explorer import Explorer  # noqa: PLC0415 - as above
 
-        return Explorer(run.seed, request.node.nodeid.rsplit("/", 1)[-1], run.effort, run.cut_short)
+        return Explorer(run.seed, request.node.nodeid.rsplit("/", 1)[-1], run.effort, run.tally)

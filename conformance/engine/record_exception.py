@@ -3,7 +3,7 @@
 import traceback
 from collections.abc import Callable
 
-from conformance.scenarios.scenario import NotPossibleError
+from conformance.scenarios.scenario import NoOccasionError, NotPossibleError
 from conformance.transport.exchange import NoAnswerError, NotPermittedError
 from conformance.verdict.evidence import HarnessError, RefutedError
 from conformance.verdict.finding import Finding
@@ -23,10 +23,12 @@ def record_exception(
     # A description may be such that no valid request can be made from it.
     unmade = isinstance(error, HarnessError) and run.contract.described
     if isinstance(error, NotPossibleError | NotPermittedError) or unmade:
+        # A note is the reason of a skip where nothing was judged, and changes nothing where other checks have judged.
+        tell = run.judge.note if isinstance(error, NoOccasionError) else run.judge.skip
         for id_ in ids:
-            run.judge.skip(id_, str(error))
+            tell(id_, str(error))
         return
-    known = [id_ for id_ in ids if id_ in run.judge.evidence]
+    known = [id_ for id_ in ids if run.judge.of(id_) is not None]
     now = run.judge.counts(known)
     # Those that the check had not come to; when it had come to all, all: each might have had a further case.
     open_ids = [id_ for id_ in known if now[id_] == judged[id_]] or known
@@ -44,7 +46,7 @@ def _no_answer(
     run: Run, alive: Callable[[], bool], known: list[str], open_ids: list[str], error: NoAnswerError
 ) -> None:
     if alive():
-        for id_ in open_ids:
+        for id_ in dict.fromkeys(run.contract.renamed.get(id_, id_) for id_ in open_ids):
             run.judge.check(id_, False, error.unanswered, "a response")  # noqa: FBT003 - the condition of check()
         for finding in run.judge.met:
             # One that was there before may be of a check that judged this requirement by itself.
@@ -61,7 +63,8 @@ def _no_answer(
             "a robot that still responds after this request",
             found=f"{error.unanswered.problem}, and no response to any request since",
         )
-    ended = [finding for finding in run.judge.met if finding.requirement in risked and _ends_with(finding, error)]
+    risks = {run.contract.renamed.get(id_, id_) for id_ in risked}
+    ended = [finding for finding in run.judge.met if finding.requirement in risks and _ends_with(finding, error)]
     for finding in ended:
         finding.alone = True
     run.judge.ended_by = next((finding for finding in ended if _is_claimed(run, finding)), None)
@@ -72,7 +75,7 @@ def _no_answer(
 
 
 def _is_claimed(run: Run, finding: Finding) -> bool:
-    return finding.requirement in run.contract.ledger and run.contract.ledger[finding.requirement].class_ in run.claims
+    return finding.requirement in run.contract.ledger and run.contract.ledger[finding.requirement].binds(run.claims)
 
 
 def _ends_with(finding: Finding, error: NoAnswerError) -> bool:

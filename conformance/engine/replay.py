@@ -59,9 +59,9 @@ class Replayed:
 
 
 def findings(result: Mapping[str, Any], requirement: str | None) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield (requirement id, finding) for all findings of a result, or for those of one requirement."""
+    """Yield (requirement id, finding) for all findings of a result, or for those of one requirement (id or alias)."""
     for item in result["requirements"]:
-        if requirement in {None, item["id"]}:
+        if requirement in {None, item["id"], *item.get("aliases", ())}:
             yield from ((item["id"], failure) for failure in item["failures"])
 
 
@@ -131,7 +131,7 @@ def judged_by_checks(
         OSError: a file that the statement names cannot be read.
     """
     contract = Contract.load(contract.directory, only=tuple(sorted(requirements)))
-    classes = {item.class_ for item in contract.ledger.values()}
+    classes = {name for item in contract.ledger.values() for name in item.classes}
     run = Run(
         statement=statement,
         contract=contract,
@@ -183,5 +183,5 @@ def _observed_to_fail(contract: Contract, base_url: str, requirement: str, excha
         api = RestInterface(run, client)
         for observer in (Observer(api), *api.device.observers(api)):
             observer.answered(exchange)
-    evidence = run.judge.evidence.get(requirement)
+    evidence = run.judge.of(requirement)
     return bool(evidence and evidence.failures)

@@ -14,6 +14,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.documents.readable import unreadable
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
+from conformance.transport.credentials import is_shown
 from conformance.transport.exchange import (
     SAFE_METHODS,
     Attempt,
@@ -37,7 +38,6 @@ _TARGET = re.compile(r"https?://[\x21-\x7e]+")
 _VALUE = re.compile(r"[^\x00\r\n]*")
 # Fields that the client writes itself.
 _OF_THE_CLIENT = frozenset({"host", "content-length", "connection"})
-_TOKEN_FIELD = ("Authorization", "Bearer $ROAAS_TOKEN")
 # How often a finding's request is sent again, and for how long in all: the first of each requirement before others, s.
 _TIMES = 5
 _LONGEST_S = 8.0
@@ -103,11 +103,11 @@ def send_again(request: Request, connection: Connection) -> Attempt:
     with closing(HttpClient(f"{where.scheme}://{where.netloc}", connection)) as client:
         try:
             if request.raw is not None:
-                octets = request.raw.replace(b"$ROAAS_TOKEN", (connection.token or "").encode("latin-1"))
+                octets = connection.credentials.revealed(request.raw)
                 return raw.read_one(client, octets, raw.talk(client, octets, answers=1), request.method)[0]
             fields = [pair for pair in request.headers if pair[0].lower() not in _OF_THE_CLIENT]
-            own = [pair for pair in fields if pair != _TOKEN_FIELD]
-            authorized = len(own) < len(fields)
+            own = [(name, value) for name, value in fields if not is_shown(value)]
+            authorized = len(own) < len(fields) or not connection.credentials.fields()
             if not any(name.lower() == "accept" for name, _ in own):
                 own.append(("Accept", ""))
             target = where.path + (f"?{where.query}" if where.query else "")
@@ -142,7 +142,7 @@ def look_again(run: Run, connection: Connection, rest: RestInterface | None = No
     findings = [
         (number, finding, finding.exchange)
         for id_, evidence in run.judge.evidence.items()
-        if run.contract.ledger[id_].class_ in run.claims
+        if run.contract.ledger[id_].binds(run.claims)
         for number, finding in enumerate(evidence.findings.values())
         if isinstance(finding.exchange, Exchange) and _may_be_sent(run, finding.exchange)
     ]

@@ -17,6 +17,7 @@ from conformance.engine.suite import contract_digests, installed, suite_digest, 
 from conformance.transport.exchange import Attempt, Unanswered
 from conformance.verdict.causes import Cause
 from conformance.verdict.finding import Finding
+from conformance.verdict.scope import verdict_line
 from conformance.verdict.verdicts import ClassValue, Verdict, overall, views
 
 RESULT_FORMAT = "roaas-result/1"
@@ -41,9 +42,11 @@ def result_document(
 ) -> dict[str, Any]:
     """Return the content of result.json for a run."""
     run, statement = robot.run, robot.run.statement
+    value = overall(classes, enough=run.enough)
     return {
         "format": RESULT_FORMAT,
-        "verdict": overall(classes),
+        "verdict": value,
+        "verdict_line": verdict_line(run, value, verdicts),
         **({"accepted_until": accepted_until} if accepted_until else {}),
         "interrupted": interrupted,
         "suite": {"version": suite_version(), "contract": run.contract.label, "digest": suite_digest(run.contract)},
@@ -67,6 +70,7 @@ def result_document(
             "class": run.effort.speed.name,
             "usual_ms": round(run.effort.usual_ms, 3),
             "share_of_cases": run.effort.speed.share,
+            "share_tried": round(run.share, 4),
         },
         "command": command,
         "started": rfc3339(started),
@@ -81,7 +85,7 @@ def result_document(
         },
         "classes": {name: value for name, (value, _) in classes.items()},
         "class_titles": {name: run.contract.classes[name].title for name in classes},
-        "class_views": dict(views(verdicts)),
+        "class_views": dict(views(verdicts, run.contract.acting)),
         "class_reasons": {name: reason for name, (_, reason) in classes.items() if reason},
         "requirements": [_requirement(verdict) for verdict in verdicts],
         "causes": [_cause(cause) for cause in causes],
@@ -115,6 +119,10 @@ def _requirement(verdict: Verdict) -> dict[str, Any]:
     return {
         "id": requirement.id,
         "class": requirement.class_,
+        **({"also": list(requirement.also)} if requirement.also else {}),
+        **({"aliases": list(requirement.aliases)} if requirement.aliases else {}),
+        "topic": requirement.topic,
+        **({"breaks": requirement.breaks} if requirement.breaks else {}),
         "level": requirement.level,
         "source": requirement.source,
         "origin": requirement.origin,

@@ -171,7 +171,7 @@ class RobotUnderTest:
                 self._tell(f"{name}: {method} {target}: {none}")
         if times:
             run.unreachable.pop(name, None)
-            run.effort = run.effort.seen(statistics.median(times))
+            run.effort = run.effort.seen(statistics.median(times), min(times))
             self.connection.pace.usual_s = run.effort.usual_ms / 1000
 
     def has(self, name: Interface) -> bool:

@@ -12,7 +12,7 @@ The suite then generates mutants from the pack's descriptions. Everything else h
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -170,4 +170,9 @@ def self_test_of(contract: Contract) -> SelfTest:
         raise ContractError(f"{contract.directory}: {named or MODULE} cannot be imported: {error}") from error
     if not isinstance(found, SelfTest):
         raise ContractError(f"{contract.directory}: {named or MODULE} has no SELFTEST, a SelfTest of {__name__}")
-    return found
+    return replace(found, mutants=tuple(_renewed(mutant, contract.renamed) for mutant in found.mutants))
+
+
+def _renewed(mutant: Mutant, renamed: Mapping[str, str]) -> Mutant:
+    """Return a mutant with the present ids of the requirements that must kill it."""
+    return replace(mutant, catches=tuple(dict.fromkeys(renamed.get(id_, id_) for id_ in mutant.catches)))

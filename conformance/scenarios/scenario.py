@@ -12,6 +12,10 @@ class NotPossibleError(Exception):
     """Raised when a scenario cannot be played on this device; the message says why. Its rules are then not tested."""
 
 
+class NoOccasionError(NotPossibleError):
+    """Raised when the device gave no occasion, such as a goal in reach. What other checks judged stays judged."""
+
+
 @dataclass(frozen=True)
 class Scenario:
     """One scenario.
@@ -71,12 +75,10 @@ class Recording:
 
     Attributes:
         trace: the trace, or None if there is nothing to judge.
-        reason: why the scenario could not be played, or empty.
-        error: why it was aborted, or None.
+        error: why it could not be played, or was aborted; or None.
     """
 
     trace: Any = None
-    reason: str = ""
     error: Exception | None = None
 
 
@@ -102,8 +104,6 @@ class Recordings:
 def _play(scenario: Scenario, fixture: Callable[[str], Any]) -> Recording:
     try:
         return Recording(scenario.play(**{name: fixture(name) for name in scenario.fixtures}))
-    except NotPossibleError as impossible:
-        return Recording(reason=str(impossible))
     except PartialTraceError as partial:
         cause = partial.__cause__
         return Recording(partial.trace, error=cause if isinstance(cause, Exception) else partial)

@@ -172,7 +172,7 @@ class _Surveyor:
 
     def cut_short(self, what: str) -> None:
         """Count a request that time did not allow."""
-        told = self.api.run.cut_short
+        told = self.api.run.tally.cut_short
         told[what] = told.get(what, 0) + 1
 
     def _note_working(self, operation: Operation, inputs: Inputs) -> None:

@@ -187,11 +187,12 @@ class _EnoughKnown(Judge):
     """A judge that starts no further check after one of the job's ``enough`` requirements has failed."""
 
     def __init__(self, run: Run, enough: frozenset[str]) -> None:
-        super().__init__(set(run.contract.ledger))
+        super().__init__(run.contract.ledger)
         self._run = run
         # What fails in a class that is not claimed is no verdict, and nothing is known by it.
         claimed = set(map(str, run.claims))
-        self._enough = frozenset(id_ for id_ in enough if id_.split("/")[0] in claimed)
+        ledger = run.contract.ledger
+        self._enough = frozenset(id_ for id_ in enough if id_ in ledger and ledger[id_].binds(claimed))
 
     def failed(self, requirement: str) -> None:
         """Note whether the run already knows enough."""

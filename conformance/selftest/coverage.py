@@ -7,7 +7,7 @@ from functools import cache
 
 import pytest
 
-from conformance.contract.classes import Level
+from conformance.contract.classes import QUESTIONS, Level
 from conformance.contract.generic import generic_ledger
 from conformance.contract.ledger import Requirement, expanded
 from conformance.contract.locating import GENERIC_RULES, ContractError
@@ -49,6 +49,7 @@ class _Checks:
 
     def __init__(self, contract: Contract) -> None:
         self._ledger, self._everywhere = contract.ledger, contract.name == DEFAULT_PACK
+        self._renamed = contract.renamed
         self.found: dict[str, dict[str, None]] = defaultdict(dict)
         self.broken = ""
 
@@ -57,7 +58,8 @@ class _Checks:
         marked = (id_ for mark in item.iter_markers("requirement") for id_ in mark.args)
         # What the generic suite judges by convention binds only packs whose ledger has it.
         own = self._everywhere or GENERIC_RULES not in item.path.parents
-        for id_ in expanded(marked, self._ledger):
+        for part in expanded(marked, self._ledger):
+            id_ = self._renamed.get(part, part)
             if own or id_ in self._ledger:
                 self.found[id_][f"{item.path.stem}::{item.name.partition('[')[0]}"] = None
 
@@ -143,22 +145,24 @@ def page(contract: Contract) -> str:
         option="" if default else " --contract PACK", page="docs/coverage.md" if default else "coverage.md"
     )
     lines = [_TITLE, about, figures]
-    for class_ in contract.classes:
-        lines += ["", f"## {class_}", "", "| requirement | level | origin | text | source | checks | mutants |"]
+    for topic, question in QUESTIONS.items():
+        own = [binding for binding in found if binding.requirement.topic is topic]
+        if not own:
+            continue
+        lines += ["", f"## {question}", "", "| requirement | level | origin | text | source | checks | mutants |"]
         lines += ["|---|---|---|---|---|---|---|"]
-        for binding in found:
+        for binding in own:
             item = binding.requirement
-            if item.class_ == class_:
-                cells = (
-                    f"`{item.id.split('/')[1]}`",
-                    item.level,
-                    item.origin,
-                    item.text,
-                    item.source,
-                    _listed(binding.checks) or (f"untestable: {item.untestable}" if item.untestable else ""),
-                    _listed(binding.mutants),
-                )
-                lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+            cells = (
+                f"`{item.id}`",
+                item.level,
+                item.origin,
+                f"{item.text} If not: {item.breaks}" if item.breaks else item.text,
+                item.source,
+                _listed(binding.checks) or (f"untestable: {item.untestable}" if item.untestable else ""),
+                _listed(binding.mutants),
+            )
+            lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
     return "\n".join([*lines, *page_part(contract)]) + "\n"
 
 

@@ -1,9 +1,10 @@
 """The implementation conformance statement: what a vendor declares about a device, and what it is judged by."""
 
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import msgspec
+from msgspec import Meta
 
 from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
@@ -23,7 +24,13 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         publishers_endpoint: URL of the service if it differs from the WSDL's; likewise subscribers_endpoint.
         ca_file: certificate authorities to trust.
         token_file: file with the bearer token.
-        request_rate: maximum requests per second.
+        basic_file: file with ``user:password`` for HTTP's basic authentication.
+        api_key: where the API key goes: ``header NAME``, ``query NAME`` or ``cookie NAME``.
+        api_key_file: file with the API key.
+        headers_file: file with fixed headers, ``Name: value`` in each line; their values are secrets.
+        client_cert_file: client certificate for TLS (PEM).
+        client_key_file: its key, if it is not in the same file.
+        request_rate: maximum requests per second; slower than one a second, no run would end.
         timeout_s: deadline of one request, s.
     """
 
@@ -34,7 +41,13 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     subscribers_endpoint: Text | None = None
     ca_file: Text | None = None
     token_file: Text | None = None
-    request_rate: Positive | None = None
+    basic_file: Text | None = None
+    api_key: Text | None = None
+    api_key_file: Text | None = None
+    headers_file: Text | None = None
+    client_cert_file: Text | None = None
+    client_key_file: Text | None = None
+    request_rate: Annotated[float, Meta(ge=1, le=100_000)] | None = None
     timeout_s: Positive = 10.0
 
     @property
@@ -273,6 +286,7 @@ def empty_statement(contract: Contract) -> Statement:
 
 def beside(folder: Path, where: Endpoints) -> Endpoints:
     """Return endpoints with file names relative to a folder; URLs stay unchanged."""
-    named = {key: getattr(where, key) for key in ("ca_file", "token_file", "publishers_wsdl", "subscribers_wsdl")}
-    files = {key: str(folder / name) for key, name in named.items() if name is not None and "://" not in name}
-    return msgspec.structs.replace(where, **files)
+    files = [key for key in where.__struct_fields__ if key.endswith(("_file", "_wsdl"))]
+    named = {key: getattr(where, key) for key in files}
+    beside_it = {key: str(folder / name) for key, name in named.items() if name is not None and "://" not in name}
+    return msgspec.structs.replace(where, **beside_it)

@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 import h11
 
 from conformance.transport.connections import ClosedError, Connections, NoConnectionError, tls_context
+from conformance.transport.credentials import Credentials, bearer
 from conformance.transport.deadline import Deadline
 from conformance.transport.exchange import (
     SAFE_METHODS,
@@ -44,7 +45,9 @@ class Connection:
     Attributes:
         timeout_s: deadline of one request with its response, s.
         ca_file: certificate authorities to trust instead of the system's, or None.
-        token: bearer token, or None.
+        token: bearer token, or None; it is one of the credentials.
+        credentials: what every request carries.
+        certificate: client certificate and key (PEM) for TLS, or None; the key may be in the certificate's file.
         request_rate: maximum requests per second, or None.
         listeners: are called with every response and every failed request.
         sent: number of requests sent.
@@ -67,11 +70,17 @@ class Connection:
     pace: Pace = field(default_factory=Pace)
     endless: bool = False
     permit: Permit = lambda _method, _url: ""
+    credentials: Credentials = field(default_factory=Credentials)
+    certificate: tuple[Path, Path | None] | None = None
     _next_slot: float = 0.0
 
+    def __post_init__(self) -> None:
+        if self.token and bearer(self.token) not in self.credentials.items:
+            self.credentials = Credentials((*self.credentials.items, bearer(self.token)))
+
     def tls(self) -> ssl.SSLContext:
-        """The TLS context that trusts ``ca_file``, or the system's authorities."""
-        return tls_context(self.ca_file)
+        """The TLS context that trusts ``ca_file``, or the system's authorities, with the client certificate if any."""
+        return tls_context(self.ca_file, self.certificate)
 
     def take_slot(self, *requests: tuple[str, str]) -> None:
         """Count one message, after waiting until ``request_rate`` allows it. Everything that sends calls this before.
@@ -152,7 +161,7 @@ class HttpClient:
             headers: headers after Host. ``Accept: */*`` is added by default; ("Accept", "") leaves it out.
             body: request body; Content-Length is added for it, and for every PUT, POST and PATCH.
             fresh: use a new connection and close it afterwards, so that the request is never sent twice.
-            authorized: whether to send the token, if there is one.
+            authorized: whether to send the credentials, if there are any.
             timeout_s: deadline instead of the run's, s; large bodies extend it.
 
         Raises:
@@ -161,11 +170,13 @@ class HttpClient:
         """
         fields = self._fields(method, tuple(headers), body, close=fresh)
         shown = tuple((name, value) for name, value in fields if name != "Connection")
-        sent = list(fields)
-        if authorized and self.connection.token and not any(name.lower() == "authorization" for name, _ in fields):
-            sent.append(("Authorization", f"Bearer {self.connection.token}"))
-            shown += (("Authorization", "Bearer $ROAAS_TOKEN"),)
-        request = Request(method, self.url(path), shown, body)
+        sent, target, query = list(fields), path, ""
+        if authorized:
+            credentials, names = self.connection.credentials, [name for name, _ in fields]
+            sent += credentials.fields(names)
+            shown += tuple(credentials.fields(names, shown=True))
+            target, query = credentials.target(path), credentials.target(path, shown=True)[len(path) :]
+        request = Request(method, self.url(path), shown, body, query=query)
         endpoint = request.endpoint
         if sum(time.monotonic() - at < _HANGS_WITHIN_S for at in self._hangs[endpoint]) >= _HANGS:
             hung = endpoint.replace(f"{self.scheme}://{self.authority}", "", 1)
@@ -174,7 +185,7 @@ class HttpClient:
         deadline = timeout_s or self.connection.timeout_s
         started = time.monotonic()
         try:
-            response = self._exchange(method, path, sent, body, deadline, fresh=fresh)
+            response = self._exchange(method, target, sent, body, deadline, fresh=fresh)
             self.connection.note(method)
         except _SilenceError as none:
             self.connection.note(method)

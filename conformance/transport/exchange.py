@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 
+from conformance.transport.credentials import quoted
+
 # By these nothing is done (RFC 9110 9.2.1), so they may be sent again without leave.
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 # Twice has the effect of once (RFC 9110 9.2.2), so a client may send them again on a new connection.
@@ -28,9 +30,10 @@ class Request:
     Attributes:
         method: HTTP method.
         url: absolute URL with the request target as sent.
-        headers: (name, value) pairs in sending order, without a bearer token.
+        headers: (name, value) pairs in sending order, with variables in place of credentials.
         body: request body.
         raw: the bytes on the socket if the request was written by hand and is not plain HTTP; otherwise empty.
+        query: what credentials add to the URL, with variables in their place.
     """
 
     method: str
@@ -38,6 +41,7 @@ class Request:
     headers: tuple[tuple[str, str], ...] = ()
     body: bytes = b""
     raw: bytes | None = None
+    query: str = ""
 
     @property
     def size(self) -> int:
@@ -90,14 +94,9 @@ class Request:
             else:
                 pipe = f"{_printed(self.body)} | "
                 words += ["--data-binary", "@-"]
-        words.append(self.url)
-        # $ROAAS_TOKEN has to be expanded by the shell, so its header is quoted by hand.
-        return pipe + " ".join(
-            '"Authorization: Bearer $ROAAS_TOKEN"'
-            if word == "Authorization: Bearer $ROAAS_TOKEN"
-            else shlex.quote(word)
-            for word in words
-        )
+        words.append(self.url + self.query)
+        # The shell has to expand the variables of credentials.
+        return pipe + " ".join(quoted(word) or shlex.quote(word) for word in words)
 
 
 def _is_plain(body: bytes) -> bool:

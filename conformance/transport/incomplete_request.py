@@ -37,13 +37,13 @@ class PartialRequest:
         promised: int | None = None,
         head_only: int | None = None,
     ) -> None:
-        head = [f"{method} {client.prefix}{path} HTTP/1.1", f"Host: {client.authority}"]
+        credentials = client.connection.credentials
+        head = [f"{method} {client.prefix}{credentials.target(path)} HTTP/1.1", f"Host: {client.authority}"]
         if sent or promised:
             head.append("Content-Type: application/json")
         head.append("Transfer-Encoding: chunked" if promised is None and sent else f"Content-Length: {promised or 0}")
-        shown = "\r\n".join(head)
-        if client.connection.token:
-            head.append(f"Authorization: Bearer {client.connection.token}")
+        shown = credentials.hidden("\r\n".join(head))
+        head += [f"{name}: {value}" for name, value in credentials.fields()]
         body = f"{len(sent):x}\r\n".encode() + sent + b"\r\n" if promised is None and sent else sent
         octets = "\r\n".join(head).encode() + b"\r\n\r\n" + body
         if head_only is not None:

@@ -55,20 +55,20 @@ class RawAnswer:
 
 
 def head(client: HttpClient, method: str, path: str, *fields: str, host: bool = True) -> bytes:
-    """Return the head of a request: request line, Host, the run's token if any, and the given headers.
+    """Return the head of a request: request line, Host, the run's credentials if any, and the given headers.
 
     Args:
-        client: supplies authority, path prefix and token.
+        client: supplies authority, path prefix and credentials.
         method: HTTP method.
         path: request target below the base URL.
         fields: whole header lines, without line ends.
         host: whether to send Host.
     """
-    lines = [f"{method} {client.prefix}{path} HTTP/1.1"]
+    credentials = client.connection.credentials
+    lines = [f"{method} {client.prefix}{credentials.target(path)} HTTP/1.1"]
     if host:
         lines.append(f"Host: {client.authority}")
-    if client.connection.token:
-        lines.append(f"Authorization: Bearer {client.connection.token}")
+    lines += [f"{name}: {value}" for name, value in credentials.fields()]
     return ("\r\n".join([*lines, *fields]) + "\r\n\r\n").encode("latin-1")
 
 
@@ -80,10 +80,8 @@ def chunked(body: bytes, size: int, extension: bytes = b"", trailers: bytes = b"
 
 
 def refuses_chunks(attempt: Attempt) -> bool:
-    """Return whether an HTTP/1.0 server, which cannot read chunks, responded 411 (RFC 9112 6.1)."""
-    if isinstance(attempt, Unanswered):
-        return False
-    return attempt.response.http_version == "HTTP/1.0" and attempt.response.status == HTTPStatus.LENGTH_REQUIRED
+    """Return whether a server asked for a Content-Length by 411, as it may for any content (RFC 9112 6.3)."""
+    return isinstance(attempt, Exchange) and attempt.response.status == HTTPStatus.LENGTH_REQUIRED
 
 
 def talk(
@@ -177,9 +175,8 @@ def answers_in(octets: bytes, most: int) -> int:
 
 
 def shown(client: HttpClient, octets: bytes) -> Request:
-    """Return the request as findings show it, without the token."""
-    if client.connection.token:
-        octets = octets.replace(client.connection.token.encode("latin-1", "replace"), b"$ROAAS_TOKEN")
+    """Return the request as findings show it, without the credentials."""
+    octets = client.connection.credentials.hidden_bytes(octets)
     line = octets.split(b"\r\n", 1)[0].decode("latin-1")
     return Request(line.split(" ", 1)[0][:40], _address(client), (), b"", raw=octets)
 

@@ -1,9 +1,10 @@
 """A baseline: a file of expected failures, each with a reason and an expiry date."""
 
 import datetime as dt
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 import msgspec
 
@@ -22,33 +23,55 @@ class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         requirement: id of the failing requirement.
         reason: why the failure is accepted.
         expires: last day on which it is accepted.
+        intermittent: whether the requirement may also pass, because the failure does not occur in every run.
     """
 
     requirement: Text
     reason: Text
     expires: dt.date
+    intermittent: bool = False
 
 
 class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     expected: tuple[Expectation, ...] = ()
 
 
-def load_baseline(path: Path, known: Iterable[str]) -> tuple[Expectation, ...]:
-    """Read a baseline file: ``[[expected]]`` tables with requirement, reason and expires.
+def load_baseline(
+    path: Path, known: Iterable[str], renamed: Mapping[str, str] = MappingProxyType({})
+) -> tuple[Expectation, ...]:
+    """Read a baseline file: ``[[expected]]`` tables with requirement, reason, expires and intermittent.
+
+    Args:
+        path: the file.
+        known: ids of the contract's requirements.
+        renamed: the present id by each older one; an entry with an older id names it in its reason.
 
     Raises:
         BaselineError: the file cannot be read, or an entry is incomplete or names an unknown requirement.
     """
     baseline = read_toml(path, _File, BaselineError).expected
     ids = set(known)
+    baseline = tuple(_renewed(entry, renamed) for entry in baseline)
     for entry in baseline:
         if entry.requirement not in ids:
             raise BaselineError(f"{path}: {entry.requirement!r} is no requirement; `roaas contract list` shows them")
     return baseline
 
 
+def _renewed(entry: Expectation, renamed: Mapping[str, str]) -> Expectation:
+    """Return an entry with its requirement's present id."""
+    new = renamed.get(entry.requirement)
+    if new is None:
+        return entry
+    reason = f"{entry.reason}; {entry.requirement} is {new} now"
+    return msgspec.structs.replace(entry, requirement=new, reason=reason)
+
+
 def apply_baseline(verdicts: Iterable[Verdict], baseline: Iterable[Expectation], today: dt.date) -> list[Verdict]:
-    """Turn expected failures into warnings. An entry that has expired or whose requirement passes becomes an error."""
+    """Turn expected failures into warnings.
+
+    An entry becomes an error when it has expired, or when its requirement passes and it is not intermittent.
+    """
     expected = {entry.requirement: entry for entry in baseline}
     return [
         _applied(verdict, expected[verdict.requirement.id], today) if verdict.requirement.id in expected else verdict
@@ -69,6 +92,9 @@ def _applied(verdict: Verdict, entry: Expectation, today: dt.date) -> Verdict:
             return replace(verdict, reason=f"its baseline entry expired on {day}: {verdict.reason}")
         told = f"expected until {day} ({entry.reason}): {verdict.reason}"
         return replace(verdict, value=Value.WARN, reason=told, expected_failure=(entry.reason, day))
+    if verdict.value is Value.PASS and entry.intermittent and entry.expires >= today:
+        told = f"not seen in this run; as an intermittent failure, expected until {day} ({entry.reason})"
+        return replace(verdict, reason="; ".join(filter(None, (told, verdict.reason))))
     if verdict.value is Value.PASS:
         told = f"the baseline expects it to fail ({entry.reason}), and it passes: take the entry out"
         return replace(verdict, value=Value.ERROR, reason=told)

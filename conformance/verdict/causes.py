@@ -64,7 +64,7 @@ def by_cause(
     Returns:
         The evidence with the remaining findings, and the causes in order.
     """
-    judged = {id_: one for id_, one in ledger.items() if one.class_ in claims}
+    judged = {id_: one for id_, one in ledger.items() if one.binds(claims)}
     places = {id_: place for place, id_ in enumerate(judged)}
 
     def weight(finding: Finding) -> tuple[bool, int]:

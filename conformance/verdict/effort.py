@@ -6,7 +6,7 @@ import math
 import random
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 _Item = TypeVar("_Item")
@@ -14,6 +14,8 @@ EFFORTS = ("quick", "standard", "deep")
 _FACTORS = {"quick": 0.1, "standard": 1.0}
 _BUDGETS_S = {"quick": 2.0, "standard": 10.0}
 _FEWEST = 3
+# A run beside others on a loaded machine takes twice its time; three times is more than load explains.
+_LONGEST = 3.0
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,25 @@ SPEEDS = (Speed("local", 40, 1.0), Speed("near", 130, 0.2), Speed("far", 800, 0.
 _CLEARLY = 1.25
 
 
+@dataclass
+class Tally:
+    """Counts of generated cases.
+
+    Attributes:
+        planned: number of cases of all explorations.
+        cut_short: number of cases that time did not allow, by check.
+    """
+
+    planned: int = 0
+    cut_short: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def share(self) -> float:
+        """The share of the planned cases for which there was time, 0 to 1."""
+        cut = sum(self.cut_short.values())
+        return 1 - cut / max(self.planned, cut, 1)
+
+
 @dataclass(frozen=True)
 class Effort:
     """How much a run tries.
@@ -74,11 +95,17 @@ class Effort:
     minutes: float = 10.0
     speed: Speed = SPEEDS[0]
 
-    def seen(self, usual_ms: float) -> Effort:
-        """Return the effort after an interface's usual response time was measured, ms; it never increases."""
-        usual_ms = max(self.usual_ms, usual_ms)
+    def seen(self, usual_ms: float, shortest_ms: float | None = None) -> Effort:
+        """Return the effort after an interface's response time was measured; it never increases.
+
+        Args:
+            usual_ms: the median response time, ms.
+            shortest_ms: the shortest one, ms, by which the class is chosen: a busy machine makes some responses late,
+                and a slow robot all; by default ``usual_ms``.
+        """
+        usual_ms, shortest_ms = max(self.usual_ms, usual_ms), usual_ms if shortest_ms is None else shortest_ms
         speeds = SPEEDS[SPEEDS.index(self.speed) :]
-        speed = next(one for one in speeds if usual_ms <= _CLEARLY * one.up_to_ms)
+        speed = next(one for one in speeds if shortest_ms <= _CLEARLY * one.up_to_ms)
         return replace(self, usual_ms=usual_ms, speed=speed)
 
     @property
@@ -92,8 +119,17 @@ class Effort:
 
     @property
     def budget_s(self) -> float:
-        """Time after which one exploration stops trying further cases, s."""
+        """Time that one exploration is planned to take, s: the number of cases follows from it, and no clock."""
         return _BUDGETS_S.get(self.name, 10.0 * max(1.0, self.minutes))
+
+    @property
+    def longest_s(self) -> float:
+        """Time after which one exploration stops trying further cases, s.
+
+        It is a bound for robots that take far longer than planned, so that the same seed gives the same cases on a busy
+        machine as well.
+        """
+        return _LONGEST * self.budget_s
 
     @property
     def slow(self) -> bool:

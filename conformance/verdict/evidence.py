@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from conformance.contract.classes import CauseKind
-from conformance.contract.ledger import Requirement
+from conformance.contract.ledger import Requirement, renamed
 from conformance.transport.exchange import Attempt, NoAnswer, Request, Unanswered
 from conformance.verdict.finding import Finding, Sent, causes_of, kind_of, observed_in, subject_of
 
@@ -47,9 +47,11 @@ class Evidence:
         unclaimed: why it does not apply to a robot for which no classes were named.
         unshown: number of failed cases that are not kept as findings.
         because: the finding of another requirement that prevented the test, or None.
+        parts: number of judged cases by the id that checks use, which may be an alias of the requirement.
     """
 
     cases: int = 0
+    parts: dict[str, int] = field(default_factory=dict)
     findings: dict[str, Finding] = field(default_factory=dict)
     skips: list[str] = field(default_factory=list)
     errors: list[str] = field(default_factory=list)
@@ -86,9 +88,21 @@ class Judge:
         self.met: list[Finding] = []
         self.ended_by: Finding | None = None
         self._ledger: Mapping[str, Requirement] = known if isinstance(known, Mapping) else {}
+        self._renamed = renamed(self._ledger)
         self._sent: deque[Sent] = deque(maxlen=MAX_SEQUENCE)
         self._findings = 0
         self._by_rule = threading.local()
+
+    def of(self, requirement: str) -> Evidence | None:
+        """Return the evidence of a requirement by its id or an alias, or None if the contract does not have it."""
+        return self.evidence.get(self._renamed.get(requirement, requirement))
+
+    def announce(self, ids: Iterable[str]) -> None:
+        """Record the ids that a check is going to judge: a requirement passes when each of its parts was judged."""
+        for id_ in ids:
+            evidence = self.of(id_)
+            if evidence is not None:
+                evidence.parts.setdefault(id_, 0)
 
     def begin(self, check_name: str) -> None:
         """Start a check: earlier requests do not belong to the sequence that led to its findings."""
@@ -133,7 +147,7 @@ class Judge:
         """Record whether one case meets a requirement.
 
         Args:
-            requirement: its id; ignored if the contract does not have it.
+            requirement: its id or an alias; ignored if the contract does not have it.
             holds: whether the case meets the requirement.
             exchange: the evidence.
             expected: what the requirement demands here, as a noun phrase.
@@ -145,10 +159,12 @@ class Judge:
         Returns:
             ``holds``.
         """
+        part, requirement = requirement, self._renamed.get(requirement, requirement)
         evidence = self.evidence.get(requirement)
         if evidence is None:
             return holds
         evidence.cases += 1
+        evidence.parts[part] = evidence.parts.get(part, 0) + 1
         evidence.checks.add(self.check_name)
         if not holds:
             self.failed(requirement)
@@ -248,11 +264,12 @@ class Judge:
 
     def unclaimed(self, requirement: str, reason: str) -> None:
         """Record why a requirement does not apply: no address was given for the interface that it needs."""
-        if requirement in self.evidence:
-            self.evidence[requirement].unclaimed = reason
+        evidence = self.of(requirement)
+        if evidence is not None:
+            evidence.unclaimed = reason
 
     def _say(self, requirement: str, text: str, where: Callable[[Evidence], list[str]]) -> None:
-        evidence = self.evidence.get(requirement)
+        evidence = self.of(requirement)
         if evidence is not None and text not in where(evidence):
             where(evidence).append(text)
 
@@ -265,16 +282,20 @@ class Judge:
         return requirement in self.evidence
 
     def counts(self, ids: Iterable[str]) -> dict[str, int]:
-        """Return the number of cases by requirement."""
-        return {id_: self.evidence[id_].cases for id_ in ids if id_ in self.evidence}
+        """Return the number of cases by id, each for the part of its requirement that the id names."""
+        found = {id_: self.of(id_) for id_ in ids}
+        return {id_: evidence.parts.get(id_, 0) for id_, evidence in found.items() if evidence is not None}
 
     def cases(self, requirement: str) -> int:
-        """Return the number of cases of a requirement; 0 if the contract does not have it."""
-        return self.evidence[requirement].cases if requirement in self.evidence else 0
+        """Return the number of cases of a requirement or a part of it; 0 if the contract does not have it."""
+        evidence = self.of(requirement)
+        if evidence is None:
+            return 0
+        return evidence.parts.get(requirement, 0) if requirement in self._renamed else evidence.cases
 
     def stopped(self, requirement: str, reason: str) -> None:
         """Record that a requirement was not tested because the run was aborted, and why."""
-        evidence = self.evidence.get(requirement)
+        evidence = self.of(requirement)
         if evidence is None:
             return
         if self.ended_by is None:

@@ -12,6 +12,7 @@ from hypothesis.errors import Flaky
 from hypothesis.stateful import RuleBasedStateMachine, run_state_machine_as_test
 
 from conformance.transport.exchange import NoAnswerError
+from conformance.verdict.effort import Tally
 from conformance.verdict.evidence import RefutedError
 
 if TYPE_CHECKING:
@@ -29,14 +30,14 @@ class Explorer:
         run_seed: seed of the run.
         name: name of the check.
         effort: how many cases, and how much time.
-        cut_short: the number of generated cases that time did not allow, by check; updated.
+        tally: counts of generated cases; updated.
     """
 
-    def __init__(self, run_seed: int, name: str, effort: Effort, cut_short: dict[str, int] | None = None) -> None:
+    def __init__(self, run_seed: int, name: str, effort: Effort, tally: Tally | None = None) -> None:
         self._run_seed = run_seed
         self._name = name
         self._effort = effort
-        self._cut_short = {} if cut_short is None else cut_short
+        self._tally = tally or Tally()
         self._count = 0
 
     def __call__(self, strategy: SearchStrategy[Any], try_case: Callable[[Any], None], *, cases: int) -> None:
@@ -50,7 +51,8 @@ class Explorer:
         Raises:
             NoAnswerError: the robot did not respond.
         """
-        until = time.monotonic() + self._effort.budget_s
+        until = time.monotonic() + self._effort.longest_s
+        self._tally.planned += self._effort.cases(cases)
         silence: list[NoAnswerError] = []
         refuted: list[bool] = []
 
@@ -83,6 +85,7 @@ class Explorer:
         """
         # Walks are not made smaller: with a robot that moves, each try would cost seconds.
         chosen = settings(self._settings(cases), stateful_step_count=steps, phases=(Phase.generate,))
+        self._tally.planned += self._effort.cases(cases) * steps
         # A factory that may be a class, which is not to carry this walk's seed to the next one.
         seeded: Any = seed(self._next_seed())(partial(factory))
         _swallow_refuted(lambda: run_state_machine_as_test(seeded, settings=chosen))
@@ -90,7 +93,7 @@ class Explorer:
     def left_out(self, cases: int) -> None:
         """Record how many generated cases were not tried because time ran out."""
         if cases:
-            self._cut_short[self._name] = self._cut_short.get(self._name, 0) + cases
+            self._tally.cut_short[self._name] = self._tally.cut_short.get(self._name, 0) + cases
 
     def _next_seed(self) -> int:
         self._count += 1

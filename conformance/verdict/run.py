@@ -8,8 +8,12 @@ from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
 from conformance.contract.requirement_sets import RequirementSet
 from conformance.statement.statement import Statement, empty_statement
-from conformance.verdict.effort import Effort
+from conformance.verdict.effort import Effort, Tally
 from conformance.verdict.evidence import Judge
+
+# Less than this much was left out for want of time: a verdict says so in the notes, and not in its first line.
+_NEXT_TO_ALL = 0.99
+_FEWEST_SHARE = 0.04
 
 
 def seed_of_nonce(nonce: str) -> int:
@@ -51,7 +55,7 @@ class Run:
         aborted: why the run was aborted, or empty.
         interrupted: whether the user interrupted the run.
         unreachable: why an interface was not reachable at the start.
-        cut_short: number of generated cases that time did not allow, by check.
+        tally: the generated cases of all explorations, and those that time did not allow.
     """
 
     statement: Statement = field(default_factory=lambda: empty_statement(Contract.load()))
@@ -66,19 +70,49 @@ class Run:
     aborted: str = ""
     interrupted: bool = False
     unreachable: dict[Interface, str] = field(default_factory=dict)
-    cut_short: dict[str, int] = field(default_factory=dict)
+    tally: Tally = field(default_factory=Tally)
 
     def __post_init__(self) -> None:
         self.judge = Judge(self.contract.ledger)
 
     @property
+    def scored(self) -> frozenset[str] | None:
+        """The requirements that count: those of the frozen set, some of them by an alias; None: all."""
+        if self.requirement_set is None:
+            return None
+        frozen, ledger = self.requirement_set.requirements.keys(), self.contract.ledger.values()
+        return frozenset(item.id for item in ledger if not frozen.isdisjoint({item.id, *item.aliases}))
+
+    @property
+    def share(self) -> float:
+        """The share of the cases that were tried, of those that a fast robot gets at this effort, 0 to 1."""
+        return self.effort.speed.share * self.tally.share
+
+    @property
+    def less(self) -> str:
+        """On how many of the cases the verdict rests, and why not on all; empty if next to all were tried."""
+        if self.share > _NEXT_TO_ALL:
+            return ""
+        why = f"{self.effort.usual_ms:.0f} ms an answer" if self.effort.slow else "time ran out"
+        return f"on {max(1, round(100 * self.share))} % of the cases: {why}"
+
+    @property
+    def enough(self) -> bool:
+        """Whether so many cases were tried that a verdict can rest on them.
+
+        An exploration has up to 100 cases, and at least three. A fault that every fifth value shows is missed by three
+        cases more often than not (0.8 ** 3 = 0.51), and found by four.
+        """
+        return self.share >= _FEWEST_SHARE
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """Remarks for the report about cases that were omitted because responses took long or time ran out."""
         found = [self.effort.speed.remark] if self.effort.speed.remark else []
-        if self.cut_short:
-            checks = ", ".join(f"{name} ({count} cases)" for name, count in sorted(self.cut_short.items()))
+        if self.tally.cut_short:
+            checks = ", ".join(f"{name} ({count} cases)" for name, count in sorted(self.tally.cut_short.items()))
             found.append(
-                f"For want of time ({self.effort.budget_s:g} s for each exploration at {self.effort.name} effort), "
+                f"For want of time ({self.effort.longest_s:g} s for each exploration at {self.effort.name} effort), "
                 f"cases that were made were not tried: {checks}."
             )
         return tuple(found)

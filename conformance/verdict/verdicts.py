@@ -97,7 +97,7 @@ def verdict_of(
     def verdict(value: Value, reason: str = "") -> Verdict:
         return Verdict(requirement, value, reason, evidence)
 
-    if requirement.class_ not in claims:
+    if not requirement.binds(frozenset(claims)):
         return verdict(Value.NOT_CLAIMED, f"class {requirement.class_} is not claimed")
     if evidence.unclaimed and not evidence.cases:
         return verdict(Value.NOT_CLAIMED, evidence.unclaimed)
@@ -110,6 +110,7 @@ def verdict_of(
         value = {Level.MUST: Value.FAIL, Level.SHOULD: Value.WARN}.get(requirement.level)
         return verdict(value, reason) if value else verdict(Value.PASS, f"The requirement is optional. {reason}")
     because = evidence.because
+    parts = evidence.parts.items()
     for value, reasons in (
         (Value.SKIP, [requirement.untestable] if requirement.untestable else []),
         (Value.ERROR, evidence.errors),
@@ -117,6 +118,7 @@ def verdict_of(
         (Value.SKIP, [undeclared[need] for need in requirement.needs if need in undeclared]),
         (Value.SKIP, evidence.skips),
         (Value.SKIP, [] if evidence.cases else evidence.notes or ["nothing was executed for it"]),
+        (Value.SKIP, [f"nothing was executed for {part}, a part of it" for part, cases in parts if not cases]),
     ):
         if reasons:
             return verdict(value, "; ".join(reasons))
@@ -140,7 +142,8 @@ def class_verdicts(verdicts: Iterable[Verdict], claims: Iterable[str]) -> dict[s
     """Return verdict and reason of each class that has requirements: pass, fail, inconclusive or not-claimed."""
     by_class: dict[str, list[Verdict]] = {}
     for verdict in verdicts:
-        by_class.setdefault(verdict.requirement.class_, []).append(verdict)
+        for name in verdict.requirement.classes:
+            by_class.setdefault(name, []).append(verdict)
     return {name: _class_verdict(items, name in claims) for name, items in by_class.items()}
 
 
@@ -155,7 +158,8 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
     unjudged = [
         item
         for item in verdicts
-        if item.value is Value.ERROR or (item.value is Value.SKIP and _holds_back(item.requirement))
+        if (item.value is Value.ERROR and item.requirement.level is not Level.MAY)
+        or (item.value is Value.SKIP and _holds_back(item.requirement))
     ]
     if unjudged:
         first = unjudged[0]
@@ -166,15 +170,25 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
     return ClassValue.PASS, ""
 
 
-def views(verdicts: Iterable[Verdict]) -> dict[str, View]:
-    """Return what observed each claimed class that a ROS probe could judge further."""
+def views(verdicts: Iterable[Verdict], acting: Container[str] = ()) -> dict[str, View]:
+    """Return what observed each claimed class that a ROS probe could judge further.
+
+    Args:
+        verdicts: of the run.
+        acting: classes whose requests have effects on ROS that requirements of another class are about: they were seen
+            there if what needs an observer was judged in a run with a probe.
+    """
+    verdicts = [one for one in verdicts if one.value is not Value.NOT_CLAIMED]
     seen: dict[str, View] = {}
     for verdict in verdicts:
-        if verdict.value is Value.NOT_CLAIMED or Prerequisite.PROBE not in verdict.requirement.needs:
-            continue
-        on_ros = verdict.evidence.cases > 0 and seen.get(verdict.requirement.class_) is not View.BLACK_BOX
-        seen[verdict.requirement.class_] = View.ON_ROS if on_ros else View.BLACK_BOX
-    return seen
+        for name in verdict.requirement.classes if Prerequisite.PROBE in verdict.requirement.needs else ():
+            on_ros = verdict.evidence.cases > 0 and seen.get(name) is not View.BLACK_BOX
+            seen[name] = View.ON_ROS if on_ros else View.BLACK_BOX
+    watched = View.ON_ROS in seen.values() and any(
+        Prerequisite.OBSERVER in one.requirement.needs and one.evidence.cases for one in verdicts
+    )
+    others = {name for one in verdicts for name in one.requirement.classes if name in acting}
+    return dict.fromkeys(sorted(others), View.ON_ROS if watched else View.BLACK_BOX) | seen
 
 
 def _holds_back(requirement: Requirement) -> bool:
@@ -189,11 +203,16 @@ def _holds_back(requirement: Requirement) -> bool:
     )
 
 
-def overall(classes: Mapping[str, tuple[ClassValue, str]]) -> Overall:
-    """Return the verdict on the robot: conformant, not-conformant or inconclusive."""
+def overall(classes: Mapping[str, tuple[ClassValue, str]], *, enough: bool = True) -> Overall:
+    """Return the verdict on the robot: conformant, not-conformant or inconclusive.
+
+    Args:
+        classes: verdict and reason of each class.
+        enough: whether so many cases were tried that a robot can be conformant by them.
+    """
     values = {value for value, _ in classes.values()} - {ClassValue.NOT_CLAIMED}
     if ClassValue.FAIL in values:
         return Overall.NOT_CONFORMANT
-    if ClassValue.INCONCLUSIVE in values or not values:
+    if ClassValue.INCONCLUSIVE in values or not values or not enough:
         return Overall.INCONCLUSIVE
     return Overall.CONFORMANT

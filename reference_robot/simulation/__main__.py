@@ -17,6 +17,7 @@ import click
 
 from conformance.contract.toml_file import TomlFileError
 from reference_robot.ending import Ending
+from reference_robot.kinematics import DIFFERENTIAL, KINEMATICS
 from reference_robot.names import load_names
 from reference_robot.ros import RosRuntime
 from reference_robot.ros_arguments import RosCommand
@@ -32,6 +33,7 @@ _NICENESS: Final = 5  # the web services run first: on a real robot they share n
 @click.option("--names", "names_file", type=click.Path(path_type=Path), help="TOML file of topic and action names.")
 @click.option("--realistic", is_flag=True, help="Simulate slipping wheels, noise and delays; --seed selects the robot.")
 @click.option("--seed", type=int, default=0)
+@click.option("--kinematics", type=click.Choice(list(KINEMATICS)), default=DIFFERENTIAL, help="The robot's body.")
 def main(
     domain_id: int | None,
     time_scale: float,
@@ -39,6 +41,7 @@ def main(
     *,
     realistic: bool,
     seed: int,
+    kinematics: str,
     ros_arguments: tuple[str, ...],
 ) -> None:
     """Run the simulated robot until SIGINT, SIGTERM or the end of standard input."""
@@ -53,7 +56,7 @@ def main(
     if _stdin_is_pipe():
         threading.Thread(target=_await_end_of_stdin, args=(ending,), daemon=True).start()
     with RosRuntime(domain_id, ros_arguments) as ros:
-        Simulation(ros, names, time_scale, Realism(seed) if realistic else None)
+        Simulation(ros, names, time_scale, Realism(seed) if realistic else None, kinematics)
         gc.freeze()  # excludes permanent objects from garbage collection
         ros.start()
         click.echo("ready")

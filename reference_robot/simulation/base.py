@@ -9,12 +9,13 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from reference_robot.kinematics import Kinematics
 from reference_robot.names import RosNames
 from reference_robot.simulation.frames import FramePublisher
-from reference_robot.simulation.kinematics import Accelerations, Motion, advance
+from reference_robot.simulation.kinematics import Motion, advance
 from reference_robot.simulation.odometry import SerializedOdometry
 from reference_robot.simulation.office import BODY_RADIUS, DEPOT, OFFICE
-from reference_robot.simulation.realism import Delayed, Realism
+from reference_robot.simulation.realism import IMPERFECT, Delayed, Realism
 
 HOLD_S: Final = 1.0  # how long a setpoint is valid, by the wall clock at every time scale
 _PERIOD_S: Final = 0.02  # 50 Hz of simulated time
@@ -31,7 +32,7 @@ for _axis, _variance in ((0, 1e-4), (7, 1e-4), (35, 1e-3)):
 
 
 class Base:
-    """A ROS node's differential-drive base that subscribes to velocity commands and publishes odometry.
+    """A ROS node's base that subscribes to velocity commands and publishes odometry.
 
     ``time_scale`` makes the base up to 25 times faster than real time. With ``realism`` the wheels slip, and the
     odometry is as inexact as a real robot's.
@@ -40,17 +41,24 @@ class Base:
         motion: The true pose and velocity of the body at present.
     """
 
-    def __init__(self, node: Node, names: RosNames, time_scale: float = 1.0, realism: Realism | None = None) -> None:
+    def __init__(
+        self,
+        node: Node,
+        names: RosNames,
+        time_scale: float = 1.0,
+        realism: Realism | None = None,
+        kinematics: Kinematics | None = None,
+    ) -> None:
         self.motion = Motion(*DEPOT, 0.0)
         self._realism = realism
         self._belief = self.motion
-        self._accelerations = realism.accelerations if realism else Accelerations()
+        self._kinematics = kinematics or (IMPERFECT if realism else Kinematics())
         self._node = node
         self._clock = node.get_clock()
         self._time_scale = time_scale
         self._solid = OFFICE.grown(BODY_RADIUS)
         self._commands = Delayed()
-        self._setpoint = (0.0, 0.0)
+        self._setpoint: tuple[float, ...] = (0.0, 0.0)
         self._commanded_at = -math.inf
         self._moved_at = self._reported_at = time.monotonic()
         odometry = Odometry(child_frame_id=names.frames.base)
@@ -71,7 +79,7 @@ class Base:
         self._receive(command.twist)
 
     def _receive(self, command: Twist) -> None:
-        setpoint = (command.linear.x, command.angular.z)
+        setpoint = (command.linear.x, command.angular.z, command.linear.y)
         if not all(map(math.isfinite, setpoint)):
             self._node.get_logger().warning(f"refused a velocity command of {setpoint}", throttle_duration_sec=1.0)
             return
@@ -88,7 +96,7 @@ class Base:
         if now - self._commanded_at > HOLD_S:
             self._setpoint = (0.0, 0.0)
         before = self.motion
-        after = advance(before, self._setpoint, seconds, self._solid.is_free, self._accelerations)
+        after = advance(before, self._setpoint, seconds, self._solid.is_free, self._kinematics)
         if self._realism is None:
             self.motion = after
             self._report(after)

@@ -1,4 +1,4 @@
-"""The motion of a differential-drive body: velocity limits, acceleration limits, exact integration of arcs.
+"""The motion of a body: velocity limits, acceleration limits, exact integration of arcs.
 
 All values are in SI units; angles in radians, counter-clockwise; poses in the map frame.
 """
@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+from reference_robot.kinematics import Kinematics
+
 _STRAIGHT: Final = 1e-6  # rad turned in a step; below it an arc's radius is numerically meaningless
 
 
@@ -16,27 +18,19 @@ _STRAIGHT: Final = 1e-6  # rad turned in a step; below it an arc's radius is num
 MAX_LINEAR: Final = 0.7  # m/s
 MAX_ANGULAR: Final = 2.5  # rad/s
 
-
-@dataclass(frozen=True)
-class Accelerations:
-    """The largest accelerations of a drive: linear in m/s², angular in rad/s²."""
-
-    linear: float = 4.0
-    angular: float = 12.0
-
-
-_USUAL: Final = Accelerations()
+_USUAL: Final = Kinematics()
 
 
 @dataclass(frozen=True)
 class Motion:
-    """The body's pose (x, y in m, yaw in rad, -π to π) and velocity (m/s forward, rad/s)."""
+    """The body's pose (x, y in m, yaw in rad, -π to π) and velocity (m/s forward, rad/s, m/s to the left)."""
 
     x: float
     y: float
     yaw: float
     linear: float = 0.0
     angular: float = 0.0
+    lateral: float = 0.0
 
 
 def wrap(angle: float) -> float:
@@ -51,28 +45,37 @@ def within(value: float, bound: float) -> float:
 
 def advance(
     motion: Motion,
-    setpoint: tuple[float, float],
+    setpoint: tuple[float, ...],
     seconds: float,
     is_free: Callable[[float, float], bool],
-    accelerations: Accelerations = _USUAL,
+    kinematics: Kinematics = _USUAL,
 ) -> Motion:
-    """Return the motion after ``seconds`` of approaching a velocity setpoint (m/s, rad/s) within the limits.
+    """Return the motion after ``seconds`` of approaching a velocity setpoint within the limits.
+
+    The setpoint is (m/s ahead, rad/s) or (m/s ahead, rad/s, m/s to the left).
 
     If a wall is in the way, the body keeps its position while the wheels go on turning: the velocity is what wheel
     encoders would measure.
     """
-    linear = _approach(motion.linear, within(setpoint[0], MAX_LINEAR), accelerations.linear * seconds)
+    accelerations = kinematics.accelerations
+    ahead = within(setpoint[0] if kinematics.reverses else max(0.0, setpoint[0]), MAX_LINEAR)
+    linear = _approach(motion.linear, ahead, accelerations.linear * seconds)
     angular = _approach(motion.angular, within(setpoint[1], MAX_ANGULAR), accelerations.angular * seconds)
+    if kinematics.min_radius:
+        angular = within(angular, abs(linear) / kinematics.min_radius)
+    aside = within(setpoint[2] if setpoint[2:] else 0.0, kinematics.max_lateral)
+    lateral = _approach(motion.lateral, aside, accelerations.linear * seconds)
     turned = angular * seconds
     distance = linear * seconds
     # The chord of the arc: its direction is the mean heading, its length distance · sin(a/2) / (a/2).
     half = turned / 2
-    chord = distance * (math.sin(half) / half if abs(turned) > _STRAIGHT else 1.0)
-    x = motion.x + chord * math.cos(motion.yaw + half)
-    y = motion.y + chord * math.sin(motion.yaw + half)
-    if chord and not is_free(x, y):
+    bow = math.sin(half) / half if abs(turned) > _STRAIGHT else 1.0
+    chord, across, heading = distance * bow, lateral * seconds * bow, motion.yaw + half
+    x = motion.x + chord * math.cos(heading) - across * math.sin(heading)
+    y = motion.y + chord * math.sin(heading) + across * math.cos(heading)
+    if (chord or across) and not is_free(x, y):
         x, y = motion.x, motion.y
-    return Motion(x, y, wrap(motion.yaw + turned), linear, angular)
+    return Motion(x, y, wrap(motion.yaw + turned), linear, angular, lateral)
 
 
 def _approach(value: float, target: float, step: float) -> float:

@@ -19,12 +19,13 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from std_msgs.msg import Header, String
 
+from reference_robot.kinematics import Kinematics
 from reference_robot.names import RosNames
 from reference_robot.simulation.localisation import Localisation
 from reference_robot.simulation.messages import LATCHED, RESULT_TIMEOUT_S, PoseError, plain, pose_of, stamped_pose
 from reference_robot.simulation.planner import PlanError, Planner, Pose
 from reference_robot.simulation.progress import PATIENCE_S, Progress
-from reference_robot.simulation.pursuit import CRUISE, EXACT, Command, Pursuit
+from reference_robot.simulation.pursuit import EXACT, Command, Pursuit
 
 _FEEDBACK_PERIOD_S: Final = 0.2
 _FAILED_TO_MAKE_PROGRESS: Final = 105  # code of nav2_msgs/FollowPath, which Nav2's navigator passes on
@@ -67,6 +68,7 @@ class Navigation:
         localisation: Localisation,
         time_scale: float = 1.0,
         tolerances: tuple[float, float] = EXACT,
+        kinematics: Kinematics | None = None,
     ) -> None:
         self._node = node
         self._names = names
@@ -74,6 +76,7 @@ class Navigation:
         self._localisation = localisation
         self._time_scale = time_scale
         self._tolerances = tolerances
+        self._kinematics = kinematics or Kinematics()
         self._drive: _Drive | None = None
         self._path: Any = None  # of the last accepted goal, until it begins
         self._stamped = names.velocity.message == "TwistStamped"
@@ -109,7 +112,9 @@ class Navigation:
     def _begin(self, handle: Any) -> None:
         displaced, path = self._drive, self._path
         now = time.monotonic()
-        self._drive = _Drive(handle, Pursuit(path, self._tolerances), now, Progress(now, self._time_scale))
+        self._drive = _Drive(
+            handle, Pursuit(path, self._tolerances, self._kinematics), now, Progress(now, self._time_scale)
+        )
         if displaced is not None:
             displaced.handle.abort()
             self._action.finish(displaced.handle, NavigateToPose.Result(error_msg="preempted by a newer goal"))
@@ -160,7 +165,9 @@ class Navigation:
         feedback = NavigateToPose.Feedback(
             current_pose=stamped_pose(pose, self._header(self._names.frames.map)),
             navigation_time=Duration(seconds=now - drive.began).to_msg(),
-            estimated_time_remaining=Duration(seconds=command.remaining / (CRUISE * self._time_scale)).to_msg(),
+            estimated_time_remaining=Duration(
+                seconds=command.remaining / (self._kinematics.cruise * self._time_scale)
+            ).to_msg(),
             distance_remaining=command.remaining,
         )
         drive.handle.publish_feedback(feedback)

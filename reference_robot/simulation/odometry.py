@@ -38,5 +38,5 @@ class SerializedOdometry:
         self._stamp.pack_into(data, _STAMP_AT, *stamp)
         turn = (0.0, 0.0, math.sin(half), math.cos(half))
         self._pose.pack_into(data, self._pose_at, motion.x, motion.y, 0.0, *turn)
-        self._twist.pack_into(data, self._twist_at, motion.linear, 0.0, 0.0, 0.0, 0.0, motion.angular)
+        self._twist.pack_into(data, self._twist_at, motion.linear, motion.lateral, 0.0, 0.0, 0.0, motion.angular)
         return bytes(data)

@@ -10,7 +10,8 @@ from collections import deque
 from dataclasses import dataclass, replace
 from typing import Final
 
-from reference_robot.simulation.kinematics import Accelerations, Motion, wrap
+from reference_robot.kinematics import Accelerations, Kinematics
+from reference_robot.simulation.kinematics import Motion, wrap
 
 # Shortest and longest delay of a command between the web services and the wheels, s.
 _EARLIEST_S: Final = 0.05
@@ -28,7 +29,8 @@ _AFTER_JUMP_M: Final = 0.03
 # The tolerances at a goal (m, rad) of a navigation whose odometry is this slow and late.
 NEAR_ENOUGH: Final = (0.08, 0.06)
 
-_ACCELERATIONS: Final = Accelerations(linear=2.0, angular=8.0)
+#: The drive of a robot with such imperfections.
+IMPERFECT: Final = Kinematics(accelerations=Accelerations(linear=2.0, angular=8.0))
 
 
 @dataclass(frozen=True)
@@ -51,14 +53,12 @@ class Realism:
 
     Attributes:
         character: The robot's constant imperfections.
-        accelerations: The accelerations of the robot's drive.
     """
 
     def __init__(self, seed: int) -> None:
         self._random = random.Random(seed)  # noqa: S311 - not for cryptography
         draw = self._random.uniform
         self.character = Character(odometry_hz=draw(5.0, 20.0), slip=draw(0.0, 0.03), drift=draw(-0.02, 0.02))
-        self.accelerations = _ACCELERATIONS
         self._next_jump_s = self._random.expovariate(1 / _SELDOM_S)
 
     def lateness(self) -> float:
@@ -108,15 +108,15 @@ class Delayed:
     """A queue of velocity commands, each of which arrives at a given time; the order is kept."""
 
     def __init__(self) -> None:
-        self._underway: deque[tuple[float, tuple[float, float]]] = deque()
+        self._underway: deque[tuple[float, tuple[float, ...]]] = deque()
 
-    def send(self, arrives: float, command: tuple[float, float]) -> None:
-        """Queue a command (m/s, rad/s) that arrives at a time in seconds, but not before the previous command."""
+    def send(self, arrives: float, command: tuple[float, ...]) -> None:
+        """Queue a command (a setpoint of ``advance``) that arrives at a time, s, but not before the previous one."""
         if self._underway:
             arrives = max(arrives, self._underway[-1][0])
         self._underway.append((arrives, command))
 
-    def arrived(self, now: float) -> tuple[float, tuple[float, float]] | None:
+    def arrived(self, now: float) -> tuple[float, tuple[float, ...]] | None:
         """Remove all commands that have arrived by ``now``; return the newest with its arrival time, or None."""
         newest = None
         while self._underway and self._underway[0][0] <= now:

@@ -82,8 +82,7 @@ def interfaces(
         PublishersWebService(deliveries),
         SubscribersWebService(subscribers, odometry, velocity, goals, planner),
     ]
-    return (
-        RestInterface(resources, Delivery(deliveries), admission),
-        SoapInterface(services, soap_address, admission),
-        velocity,
-    )
+    rest = RestInterface(resources, Delivery(deliveries), admission)
+    soap = SoapInterface(services, soap_address, admission)
+    rest.lag = soap.lag = configuration.web.lag
+    return rest, soap, velocity

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import msgspec
 
-from conformance.contract.toml_file import Positive, read_toml
+from conformance.contract.toml_file import NotNegative, Positive, read_toml
 from reference_robot.names import DEFAULT_NAMES_FILE, RosNames
 
 
@@ -14,18 +14,26 @@ class WebSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         max_linear: Largest magnitude of linear.x in a PUT request, m/s.
         max_angular: Largest magnitude of angular.z in a PUT request, rad/s.
+        max_reverse: Largest magnitude of a negative linear.x, m/s; None for ``max_linear``.
+        max_lateral: Largest magnitude of linear.y, m/s; 0 for a robot that cannot move aside.
+        min_radius: Narrowest circle that the robot can drive, m; 0 for a robot that turns on the spot.
         hold: How long the robot keeps a velocity that is not renewed, s (its own watchdog enforces it).
         settle: Within what time a new velocity is reached, s; declared, not enforced.
         deadline: How long to wait for a response from ROS, s.
         read_deadline: How long a client may take to send one request, s.
+        lag: How much later each request is answered, s, as by a robot that has other things to do.
     """
 
     max_linear: Positive = 0.7
     max_angular: Positive = 2.5
+    max_reverse: NotNegative | None = None
+    max_lateral: NotNegative = 0.0
+    min_radius: NotNegative = 0.0
     hold: Positive = 1.0
     settle: Positive = 0.6
     deadline: Positive = 5.0
     read_deadline: Positive = 10.0
+    lag: NotNegative = 0.0
 
 
 class Configuration(RosNames, frozen=True, forbid_unknown_fields=True):

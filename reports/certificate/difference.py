@@ -24,6 +24,7 @@ class Kind(StrEnum):
     FIRST_JUDGED = "judged for the first time"
     LEVEL = "changed levels"
     TEXT = "changed texts"
+    MERGED = "renamed or merged"
     ADDED = "added to the requirements"
     REMOVED = "removed from the requirements"
 
@@ -38,6 +39,7 @@ MEANINGS = {
     Kind.FIRST_JUDGED: "It was not judged before, so there is nothing to compare.",
     Kind.LEVEL: "The suite changed the level of the requirement. The robot did not change.",
     Kind.TEXT: "The suite changed the text of the requirement, so the two verdicts may mean different things.",
+    Kind.MERGED: "The suite has another id for it now, or one requirement where it had several. Verdicts are compared.",
     Kind.ADDED: "The older suite did not have it, so there is nothing to compare.",
     Kind.REMOVED: "The newer suite does not have it.",
 }
@@ -68,6 +70,8 @@ class Change:
     @property
     def reason(self) -> str:
         """Return the reason that the newer result gives for the requirement's verdict, or an empty string."""
+        if self.kind is Kind.MERGED:
+            return "It was " + ", ".join((self.old or {})["was"]) + "."
         return str((self.new or {}).get("reason") or "")
 
     @property
@@ -109,7 +113,7 @@ class Difference:
 
 def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> Difference:
     """Compare two valid `roaas-result/1` documents and return the changes."""
-    before = {item["id"]: item for item in old["requirements"]}
+    before = dict(_by_present_id(old, new))
     now = {item["id"]: item for item in new["requirements"]}
     changes = [
         Change(id_, kind, before.get(id_), now.get(id_))
@@ -122,11 +126,29 @@ def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> Difference:
     return Difference(old, new, tuple(changes), tuple(_circumstances(old, new)), still)
 
 
+_WORST_FIRST = ("fail", "warn", "error", "skip", "pass", "not-claimed")
+
+
+def _by_present_id(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[tuple[str, Requirement]]:
+    """Yield the old requirements by the ids that the new result has for them; of several with one id, the worst."""
+    renamed = {alias: item["id"] for item in new["requirements"] for alias in item.get("aliases", ())}
+    by_id: dict[str, list[Requirement]] = {}
+    for item in old["requirements"]:
+        by_id.setdefault(renamed.get(item["id"], item["id"]), []).append(item)
+    for id_, items in by_id.items():
+        worst = min(items, key=lambda item: _WORST_FIRST.index(item["verdict"]))
+        was = [item["id"] for item in items]
+        yield id_, worst if was == [id_] else {**worst, "was": was}
+
+
 def _kinds(old: Requirement | None, new: Requirement | None) -> Iterator[Kind]:
     if new is None:
         yield Kind.REMOVED
     elif old is None:
         yield Kind.ADDED
+    elif "was" in old:
+        yield Kind.MERGED
+        yield from _course(old, new)
     else:
         if old["level"] != new["level"]:
             yield Kind.LEVEL

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from reports.certificate.page import page_values
 from reports.findings import findings
 from reports.pages.page import markdown_page
+from reports.topics import QUESTIONS
 
 MOST_OCTETS = 512 * 1024
 """Limit for the details of single requirements; the number of verdicts, classes and reasons is limited as well."""
@@ -31,7 +32,7 @@ def certificate_markdown(result: Mapping[str, Any]) -> str:
     values = page_values(result)
     parts, left = [], MOST_OCTETS
     for verdict, heading in _HEADINGS.items():
-        found = sorted(values["certificate"].with_verdict(verdict), key=_urgency)
+        found = sorted(values["certificate"].with_verdict(verdict), key=lambda r: (_topic(r), _urgency(r)))
         in_full: list[str] = []
         for requirement in found[:_MOST_SHOWN]:
             block = markdown_page("requirement.md.j2", r=requirement, found=findings([requirement], result))
@@ -42,6 +43,11 @@ def certificate_markdown(result: Mapping[str, Any]) -> str:
         if found:
             parts.append(_Part(heading, in_full, found[len(in_full) :]))
     return markdown_page("certificate.md.j2", parts=parts, most_named=_MOST_NAMED, most_groups=_MOST_GROUPS, **values)
+
+
+def _topic(requirement: Mapping[str, Any]) -> int:
+    """Return the place of the requirement's topic among all topics; -1 before contract 1.2."""
+    return list(QUESTIONS).index(requirement["topic"]) if "topic" in requirement else -1
 
 
 def _urgency(requirement: Mapping[str, Any]) -> int:

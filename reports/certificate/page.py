@@ -12,6 +12,7 @@ from reports.certificate.described import WORDS, Described, described
 from reports.certificate.seal import Seal
 from reports.findings import Finding, by_cause, by_requirement, findings
 from reports.pages.page import html_page
+from reports.topics import FOLDED, QUESTIONS, by_topic
 
 SHOWN_FAILURES = 5
 """Findings shown for each requirement; the rest are counted."""
@@ -88,6 +89,15 @@ class Untested:
 
 
 @dataclass(frozen=True, slots=True)
+class Group:
+    """The requirements under one heading of the list of all requirements: a topic, or a class before contract 1.2."""
+
+    title: str
+    requirements: tuple[Mapping[str, Any], ...]
+    folded: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Certificate:
     """The content of a certificate, computed from a conformance result.
 
@@ -112,6 +122,20 @@ class Certificate:
     def passed(self) -> tuple[ClassSummary, ...]:
         """Return the classes that passed."""
         return tuple(c for c in self.classes if c.verdict == "pass")
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """Return all requirements by topic, the worst verdict first; by class if the result has no topics."""
+        items = sorted(self.result["requirements"], key=lambda r: _ORDER.index(r["verdict"]))
+        if not all("topic" in item for item in items):
+            return tuple(Group(c.name, c.requirements) for c in self.classes if c.requirements)
+        found = {topic: tuple(item for item in items if item["topic"] == topic) for topic in QUESTIONS}
+        return tuple(Group(QUESTIONS[topic], own, topic == FOLDED) for topic, own in found.items() if own)
+
+    @property
+    def verdict_line(self) -> str:
+        """Return the verdict and what it is about, such as "conformant to full (contract 1.2), seen on ROS"."""
+        return str(self.result.get("verdict_line") or VERDICT_WORDS[self.result["verdict"]])
 
     @property
     def title(self) -> str:
@@ -198,7 +222,8 @@ class Certificate:
 
     def with_verdict(self, verdict: str) -> tuple[Mapping[str, Any], ...]:
         """Return the requirements with that verdict, of all classes."""
-        return tuple(r for c in self.classes for r in c.requirements if r["verdict"] == verdict)
+        found = {r["id"]: r for c in self.classes for r in c.requirements if r["verdict"] == verdict}
+        return tuple(found.values())
 
     def counts(self) -> Iterator[tuple[str, int]]:
         """Yield each verdict that occurs with its number of requirements, the worst verdict first."""
@@ -217,7 +242,8 @@ def certificate(result: Mapping[str, Any]) -> Certificate:
 def _classes(result: Mapping[str, Any]) -> Iterator[ClassSummary]:
     by_class: dict[str, list[Mapping[str, Any]]] = {name: [] for name in result["classes"]}
     for requirement in result["requirements"]:
-        by_class.setdefault(requirement["class"], []).append(requirement)
+        for name in (requirement["class"], *requirement.get("also", ())):
+            by_class.setdefault(name, []).append(requirement)
     titles = result.get("class_titles", {})
     for name, requirements in by_class.items():
         yield ClassSummary(
@@ -232,11 +258,13 @@ def _classes(result: Mapping[str, Any]) -> Iterator[ClassSummary]:
 
 def _untested(classes: tuple[ClassSummary, ...]) -> Iterator[Untested]:
     groups: dict[tuple[str, int | None], list[Mapping[str, Any]]] = {}
+    told: set[str] = set()
     for summary in classes:
         if summary.verdict == "not-claimed":
             continue
         for requirement in summary.requirements:
-            if requirement["verdict"] in {"skip", "error"}:
+            if requirement["verdict"] in {"skip", "error"} and requirement["id"] not in told:
+                told.add(requirement["id"])
                 reason = requirement["untestable"] or requirement["reason"] or "No reason was recorded."
                 groups.setdefault((reason, requirement.get("because_of")), []).append(requirement)
     for (reason, because_of), requirements in groups.items():
@@ -268,6 +296,9 @@ def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
         "described": described(result),
         "views": VIEWS,
         "by_cause": by_cause,
+        "by_topic": by_topic,
+        "questions": QUESTIONS,
+        "folded": FOLDED,
         "by_requirement": by_requirement,
         "findings": findings,
         # The matrix of operations links to each finding.

@@ -13,7 +13,7 @@ def badge(result: Mapping[str, Any]) -> str:
     """Return the JSON of a shields.io badge with the verdict of a valid `roaas-result/1` document."""
     verdict, colour = verdict_words(result)[result["verdict"]].lower(), _COLOURS[result["verdict"]]
     values = list(result["classes"].values())
-    text = f"{verdict} ({values.count('pass')} of {len(values)} classes)"
+    text = result.get("verdict_line") or f"{verdict} ({values.count('pass')} of {len(values)} classes)"
     if result.get("accepted_until"):
         text, colour = f"{verdict}, known failures until {result['accepted_until']}", "orange"
     if result.get("interrupted"):

@@ -31,29 +31,45 @@ def settles_at(api: RestInterface, call: Call) -> str | None:
         None
         if the values cannot be compared.
     """
-    read = reader_of(api, call)
-    if read is None or not isinstance(call.value, dict):
-        return None
-    device = api.device
-    pace = api.client.connection.pace
-    patience = Patience(pace, 1.25 * device.settle_s + 0.5 + 4 * pace.usual_s)
-    wanted = flattened(call.value)
-    every_s = 0.4 * (device.hold_s or math.inf)
+    patience = _patience(api)
+    every_s = 0.4 * (api.device.hold_s or math.inf)
     renew_at = time.monotonic() + every_s
     while True:
-        shown = flatten(read.send(api, ("Accept", JSON)))
-        if shown["status"] == HTTPStatus.NOT_FOUND:  # what was put has ended since: a goal that was reached
-            return None
-        other = [
-            f"{shown.get(place, 'nothing')!r} as {place} instead of {value!r}"
-            for place, value in wanted.items()
-            if not place.endswith("[]") and not device.is_near(place, shown.get(place), value)
-        ]
-        if not other:
-            return ""
-        if patience.over:
-            return other[0]
+        other = differs_from(api, call)
+        if not other or patience.over:
+            return other
         if time.monotonic() > renew_at:
             call.send(api)
             renew_at = time.monotonic() + every_s
         time.sleep(_PAUSE_S)
+
+
+def differs_from(api: RestInterface, call: Call) -> str | None:
+    """Return what GET returns instead of the value of a PUT; empty: that value; None: they cannot be compared."""
+    read = reader_of(api, call)
+    if read is None or not isinstance(call.value, dict):
+        return None
+    shown = flatten(read.send(api, ("Accept", JSON)))
+    if shown["status"] == HTTPStatus.NOT_FOUND:  # what was put has ended since: a goal that was reached
+        return None
+    other = (
+        f"{shown.get(place, 'nothing')!r} as {place} instead of {value!r}"
+        for place, value in flattened(call.value).items()
+        if not place.endswith("[]") and not api.device.is_near(place, shown.get(place), value)
+    )
+    return next(other, "")
+
+
+def takes_effect(api: RestInterface, call: Call) -> bool:
+    """Return whether GET returns the value of a PUT at some time within the settle time; nothing is sent again."""
+    patience = _patience(api)
+    while differs_from(api, call) != "":
+        if patience.over:
+            return False
+        time.sleep(_PAUSE_S)
+    return True
+
+
+def _patience(api: RestInterface) -> Patience:
+    pace = api.client.connection.pace
+    return Patience(pace, 1.25 * api.device.settle_s + 0.5 + 4 * pace.usual_s)

@@ -21,7 +21,6 @@ def judge_refusal(
     field: str = "",
     shown: str = "",
     malformed: bool | None = None,
-    closing: bool = False,
     json: bool = True,
 ) -> bool:
     """Send one invalid request, judge the response, and return whether the request was refused.
@@ -34,7 +33,6 @@ def judge_refusal(
         field: name of the wrong field, where a problem can name it.
         shown: text of the wrong value, where a problem can name it.
         malformed: whether 400 (no JSON) or 422 (JSON of a wrong shape or value) fits better; None: either.
-        closing: whether closing the connection refuses it as well.
         json: whether its body is JSON (or meant to be).
 
     Raises:
@@ -45,7 +43,7 @@ def judge_refusal(
     try:
         exchange = send()
     except NoAnswerError as none:
-        refused = (closing and none.kind is NoAnswer.CLOSED) or is_cut_off(none.unanswered)
+        refused = is_cut_off(none.unanswered)
         if not refused and (none.kind not in {NoAnswer.CLOSED, NoAnswer.MALFORMED} or not api.alive()):
             raise
         return expect(judge, requirement, none.unanswered).that(refused, expected, cause=f"{kind} {none.kind}")

@@ -2,7 +2,7 @@
 
 from http import HTTPStatus
 
-from conformance.contract.sizes import TAKEN_OCTETS
+from conformance.contract.sizes import LIMIT_OCTETS
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Unanswered
 
 # Statuses that refuse a request for another reason than its content.
@@ -21,11 +21,12 @@ def is_taken(exchange: Exchange) -> bool:
 
 
 def is_cut_off(attempt: Attempt) -> bool:
-    """Return whether the robot closed the connection on content that it need not take (contract, fine print).
+    """Return whether the robot closed the connection on content over the limit (contract.md, sizes).
 
-    A gateway in front of it then responds 502 in its place (RFC 9110 15.6.3).
+    A gateway in front of it then responds 502 in its place (RFC 9110 15.6.3). Smaller content has to be answered: a
+    closed connection cannot be told from a crash.
     """
-    if len(attempt.request.body) <= TAKEN_OCTETS:
+    if len(attempt.request.body) <= LIMIT_OCTETS:
         return False
     if isinstance(attempt, Unanswered):
         return attempt.kind is NoAnswer.CLOSED

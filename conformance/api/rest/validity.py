@@ -60,6 +60,8 @@ def validity(contract: Contract, method: str, target: str, media_type: str, body
     if operation is None or method != operation.method or not is_normal(path):
         return Validity(UNCLEAR)
     found = [*_of_path(operation, path), *_of_query(operation, query), _of_body(operation, media_type, body)]
+    if found[-1][1] == "json-unknown" and _is_shown(contract, path, operation.bodies[media_type].schema, body):
+        found[-1] = (UNCLEAR, "", "")
     for wanted in (UNCLEAR, INVALID):
         for verdict, requirement, why in found:
             if verdict == wanted:
@@ -160,6 +162,16 @@ def json_fault(body: bytes, schema: Schema) -> _Said:
     rule, whole = shape_of(schema).broken_rule(text.value)
     requirement = "json-root" if whole and rule == "type" else _RULES.get(rule, "json-bounds")
     return INVALID, requirement, problem
+
+
+def _is_shown(contract: Contract, path: str, schema: Schema, body: bytes) -> bool:
+    """Return whether a JSON body is valid but for members that the resource's own GET shows: it may be put back."""
+    reading, value = matching(contract, "GET", path), read_json(body).value
+    shown = (reading.shape or {}).get("properties", {}) if reading else {}
+    if not isinstance(value, dict):
+        return False
+    kept = {name: part for name, part in value.items() if name in schema.get("properties", {}) or name not in shown}
+    return not shape_of(schema).problem(kept)
 
 
 def _xml_fault(body: bytes, schema: Schema) -> _Said:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Final
 
-from conformance.api.rest.inputs import FORM, MULTIPART, NOTHING, Inputs, whole_body
+from conformance.api.rest.inputs import NOTHING, Inputs, whole_body
 from conformance.api.rest.values import Values, fits, sample
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.openapi import Operation, Parameter, is_json

@@ -2,10 +2,12 @@
 
 import re
 from dataclasses import dataclass
+from http import HTTPStatus
 from typing import Final
 
 from conformance.api.soap.attacks import LEAKS, MARK, Attack
 from conformance.api.soap.calls import read_exchange
+from conformance.contract.sizes import LIMIT_OCTETS
 from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
 
 _LEAK: Final = re.compile(LEAKS)
@@ -31,9 +33,13 @@ class AttackVerdict:
 
 def attack_verdict(attack: Attack, attempt: Attempt) -> AttackVerdict:
     """Return the verdict on one attack by its response, or by the lack of one."""
-    expected = f"{'a refusal' if attack.must_refuse else 'a response'} or a closed connection for {attack.what}"
+    # What a coding hides is over the limit once it is unpacked.
+    over = len(attack.body) > LIMIT_OCTETS or any(name.lower() == "content-encoding" for name, _ in attack.headers)
+    may_close = over or not attack.must_refuse
+    expected = f"{'a refusal' if attack.must_refuse else 'a response'}{' or a closed connection' if may_close else ''}"
+    expected += f" for {attack.what}"
     if isinstance(attempt, Unanswered):
-        return AttackVerdict(is_closed(attempt), expected)
+        return AttackVerdict(is_closed(attempt) and may_close, expected)
     body = attempt.response.body
     leak = _LEAK.search(body)
     if leak:
@@ -49,6 +55,7 @@ def attack_verdict(attack: Attack, attempt: Attempt) -> AttackVerdict:
         return AttackVerdict(holds=True, expected=expected)
     answer = read_exchange(attempt)
     refused = answer.fault is not None or answer.status >= _REFUSED
+    refused = refused and (may_close or answer.status != HTTPStatus.BAD_GATEWAY)
     return AttackVerdict(refused, expected, answer.describe(), f"{attack.name} taken" if answer.accepted else "")
 
 

@@ -55,7 +55,7 @@ def callable_services(soap: SoapServices, *ids: str) -> list[SoapService]:
     if not found:
         pytest.skip("; ".join(reasons) or "no SOAP service has an address")
     for id_ in ids:
-        requirement = soap.run.contract.ledger.get(id_)
+        requirement = soap.run.contract.requirement(id_)
         for reason in reasons:
             if requirement is not None and (reason != _NO_MOTION or "motion" in requirement.needs):
                 soap.run.judge.skip(id_, reason)

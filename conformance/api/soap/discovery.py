@@ -57,7 +57,7 @@ def _located(published: PublishedWsdl, connection: Connection) -> str | None:
     address = soap_address(published.document) if published.document else None
     if published.url is None:
         return address if address and is_http(address) else None
-    if address and may_be_followed(address, published.url, with_token=connection.token is not None):
+    if address and may_be_followed(address, published.url, with_token=bool(connection.credentials)):
         try:
             get(address, connection, timeout_s=min(_PROBE_S, connection.timeout_s))
         except NoAnswerError:

@@ -16,13 +16,21 @@ from conformance.transport.exchange import Listener
 _TEMPLATE = """
 [limits]
 # What is not declared is judged with the reference robot's limits halved, 2 s to settle, and no check of the hold time.
-# linear_m_s = 0.7           # greatest speed
-# angular_rad_s = 2.5        # greatest turning rate
+# linear_m_s = 0.7           # greatest speed, or a pair: [0.0, 0.7] has no reverse gear
+# angular_rad_s = 2.5        # greatest turning rate, or a pair
+# lateral_m_s = 0.5          # greatest speed aside, if it differs
+# navigation_linear_m_s = 1.0     # greatest speed of its own navigation, if it differs
+# navigation_angular_rad_s = 2.5
 # settle_s = 0.6             # a commanded velocity is reached within
 # hold_s = 1.0               # a velocity holds for, unless renewed
 # tolerance = 0.05           # of a reached velocity, relative
 # tolerance_linear_m_s = 0.02     # and absolute
 # tolerance_angular_rad_s = 0.02
+# goal_m = 0.25              # a goal ends within this of its position
+# goal_rad = 0.25            # and of its heading
+# goal_s = 30.0              # a hindered robot may make no progress for
+# plan_step_m = 1.0          # longest step of a plan
+# clock_offset_s = 0.0       # the odometry's stamps are ahead of Date by
 
 [motion]
 # Where the robot may be driven. Without an arena, goals stay within radius_m of where it is.
@@ -32,6 +40,9 @@ _TEMPLATE = """
 # goals = [[1.0, 2.0, 0.0]]           # x, y, yaw: poses that can be reached
 # odom_to_map = [0.0, 0.0, 0.0]       # x, y, yaw of the odometry frame in the map
 # actuated = ["linear.x", "angular.z"]
+# turns_on_the_spot = false           # and the radius of the narrowest circle:
+# min_radius_m = 0.5
+# wheel_separation_m = 0.3            # if a robot that turns drives slower; 0: if it does not
 
 [ros]
 # With a domain, a probe watches what reaches ROS (needs rclpy where the suite runs).

@@ -10,12 +10,15 @@ from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 
-from conformance.mutation.changes import soap
+from conformance.mutation.changes import inputs, parsed, plain, rest, soap
+from conformance.mutation.fields import without
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.programs import built, check_installed, program
 from conformance.mutation.self_test import GoodDevice, HarmlessChange, OpenPlace, SelfTest, Start
 from conformance.mutation.wire import IncompleteMessageError
+from conformance.packs.table1.faulty_bodies import STATEMENTS
 from conformance.packs.table1.mutants import MUTANTS
+from conformance.packs.table1.mutants.paths import GOAL, POSE
 
 _HERE = Path(__file__).parent
 _ROBOTS = _HERE / "independent_robots"
@@ -31,6 +34,12 @@ def _on_ros(start: Start, *options: str) -> list[str]:
 def _realistic(start: Start) -> list[str]:
     """Return a reference robot with odometry, wheels and delays like real ones; each seed is another robot."""
     return _on_ros(start, "--realistic", "--seed", str(start.seed))
+
+
+def _with_body(name: str) -> GoodDevice:
+    """Return a reference robot with another body (``roaas robot --kinematics``)."""
+    statement = _REFERENCE_ROBOT / f"{name}.toml"
+    return GoodDevice(name, lambda start: _on_ros(start, "--kinematics", name), statement, on_ros=True, once=True)
 
 
 def _in_python(name: str, *modules: str, options: tuple[str, ...] = ()) -> Callable[[Start], list[str]]:
@@ -64,9 +73,14 @@ def _on_server(name: str, command: Callable[[Start], list[str]]) -> GoodDevice:
 
 REFERENCE = GoodDevice("reference", _on_ros, _REFERENCE_ROBOT / "reference.toml", on_ros=True)
 REALISTIC = GoodDevice("realistic", _realistic, _REFERENCE_ROBOT / "realistic.toml", on_ros=True)
+BODIES = tuple(_with_body(name) for name in ("ackermann", "no-reverse", "holonomic", "slow-and-busy"))
 PLAIN = _independent("plain")
 BAROQUE = _independent("baroque", shows_effects=True)
 LEGACY = _independent("legacy")
+# A velocity holds so short a time that over a slow link the next reading finds it ended.
+DEADMAN = GoodDevice(
+    "deadman", _in_python("baroque", options=("--hold-s", "0.3")), _ROBOTS / "baroque" / "deadman.toml", once=True
+)
 ON_SERVERS = (
     _on_server("node", _in_javascript),
     _on_server("golang", _in_go),
@@ -78,7 +92,8 @@ ON_SERVERS = (
 
 def with_fault(name: str) -> GoodDevice:
     """Return the robot ``baroque`` with a fault in its body; of an empty name, without one."""
-    return replace(BAROQUE, command=_in_python("baroque", options=("--fault", name) if name else ()))
+    command = _in_python("baroque", options=("--fault", name) if name else ())
+    return replace(BAROQUE, command=command, statement=STATEMENTS.get(name, BAROQUE.statement))
 
 
 class _Behind:
@@ -105,6 +120,26 @@ class _Behind:
                 time.sleep(_MESSAGE_S)
                 self._known[request.body].append(forward(request))
         del self._known[request.body]
+
+
+_OWN = rest("POST", POSE)
+_GOAL_PUT = rest("PUT", GOAL)
+_AT_POSE = rest("", POSE)
+
+
+def _extended(request: Request, forward: Forward) -> Response:
+    """Add a method of the vendor's own at the pose, and ignore the status in a goal that is put back."""
+    if _OWN(request):
+        return plain(204)(request)
+    goal = parsed(request.body) if _GOAL_PUT(request) else None
+    if isinstance(goal, dict) and "status" in goal:
+        request = request.copy()
+        inputs(without("status"))(request)
+    response = forward(request)
+    allow = response.field("Allow")
+    if _AT_POSE(request) and allow is not None:
+        response.put("Allow", f"{allow}, POST")
+    return response
 
 
 _OPEN_PLACES = (
@@ -150,7 +185,7 @@ _OPEN_PLACES = (
 )
 
 SELFTEST = SelfTest(
-    devices=(REFERENCE, PLAIN, BAROQUE, LEGACY, REALISTIC, *ON_SERVERS),
+    devices=(REFERENCE, PLAIN, BAROQUE, LEGACY, REALISTIC, DEADMAN, *BODIES, *ON_SERVERS),
     mutants=MUTANTS,
     short=(
         "safety-unactuated-ignored",
@@ -180,7 +215,12 @@ SELFTEST = SelfTest(
         "nginx-http10": "plain",
     },
     wsdls=lambda publishers: (publishers, publishers.replace("publisher", "subscriber")),
-    variants=(HarmlessChange("behind", "SOAP is a message or two behind REST", _Behind),),
+    variants=(
+        HarmlessChange("behind", "SOAP is a message or two behind REST", _Behind),
+        HarmlessChange(
+            "extended", "POST at the pose is the vendor's own; a goal's status may be sent", lambda: _extended
+        ),
+    ),
     classes={
         r"(get|put|delete)\w*Deliver(y|ies)": ("rest-delivery", "equivalence"),
         r"(get|put|delete)\w*(Velocity|Goal)": ("rest-resources", "equivalence", "safety"),

@@ -31,6 +31,9 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         goals: poses (x, y, yaw) that can be reached; empty: found by asking for plans.
         odom_to_map: (x, y, yaw) of the odometry frame in the frame of goals.
         actuated: the velocity components that the robot can actuate.
+        turns_on_the_spot: whether it can turn without driving; if not, ``min_radius_m`` is its smallest circle.
+        wheel_separation_m: distance of the wheels whose speed linear.x limits, so that a robot drives slower while it
+            turns, m; 0: either limit can be reached whatever the other part is; None: not declared.
     """
 
     arena: tuple[Finite, Finite, Finite, Finite] | None = None
@@ -39,6 +42,18 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     goals: tuple[tuple[Finite, Finite, Finite], ...] = ()
     odom_to_map: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
     actuated: tuple[Component, ...] = ("linear.x", "angular.z")
+    turns_on_the_spot: bool = True
+    min_radius_m: Annotated[float, msgspec.Meta(ge=0.01, le=10)] | None = None
+    wheel_separation_m: Annotated[float, msgspec.Meta(ge=0, le=10)] | None = None
+
+    def __post_init__(self) -> None:
+        """Check that a radius is declared where, and only where, the robot cannot turn on the spot.
+
+        Raises:
+            ValueError: One is declared without the other.
+        """
+        if self.turns_on_the_spot != (self.min_radius_m is None):
+            raise ValueError("turns_on_the_spot = false and min_radius_m must be declared together")
 
 
 class Ros(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -75,8 +90,9 @@ class Statement(generic.Statement, frozen=True):
     @property
     def figures(self) -> dict[str, dict[str, float]]:
         """What result.json tells: the declared figures, and the limits and tolerances that the robot is judged by."""
-        named = msgspec.structs.asdict(self.declared)
-        declared = {name: figure for name, figure in named.items() if figure is not None and name != "noise"}
+        motion = self.motion
+        shape = {"min_radius_m": motion.min_radius_m, "wheel_separation_m": motion.wheel_separation_m}
+        declared = self.declared.figures | {name: figure for name, figure in shape.items() if figure is not None}
         noise = msgspec.structs.asdict(self.declared.noise) if self.declared.noise else {}
         declared |= {f"noise_{name}": figure for name, figure in noise.items() if figure}
         return {"declared": declared, "limits": self.limits.figures, "tolerances": self.limits.tolerances}
@@ -92,9 +108,11 @@ class Statement(generic.Statement, frozen=True):
             Prerequisite.LIMITS: all(declared[kind] for kind in kinds),
         }
         words = {Prerequisite.HOLD: "hold time", Prerequisite.LIMITS: "limits of speed and turning rate"}
-        return {
+        lacking: dict[str, str] = {
             need: f"not tested: the statement declares no {words[need]}" for need, known in there.items() if not known
         }
+        unresolved = limits.unresolved
+        return lacking | ({Prerequisite.RESOLVED: f"not tested: {unresolved}"} if unresolved else {})
 
     @property
     def domain_id(self) -> int | None:

@@ -17,17 +17,20 @@ pytestmark = pytest.mark.phase("reach")
 def test_interfaces_answer(run: Run, interfaces: Interfaces, judge: Judge) -> None:
     """Send a request to each interface that a claimed class needs.
 
-    A class whose prerequisite is missing fails; it is not skipped.
+    A requirement that binds several classes is about the interfaces of its own one, which all of them need. A class
+    whose prerequisite is missing fails; it is not skipped.
     """
     found = {name: _look(interfaces, name) for name in run.contract.interfaces}
-    for class_ in run.claims:
-        needed, any_of = _needed(run, class_), run.contract.classes[class_].one_is_enough
+    for id_, requirement in run.contract.ledger.items():
+        if not id_.endswith("/reachable") or not requirement.binds(run.claims):
+            continue
+        needed, any_of = _needed(run, requirement.class_), run.contract.classes[requirement.class_].one_is_enough
         problems = {name: found[name] for name in needed if found[name][0]}
         missing = len(problems) == len(needed) if any_of else bool(problems)
         shown = problems if missing else {name: found[name] for name in needed if not found[name][0]}
         problem, attempt = next(iter(shown.values()), ("", None))
         expected = f"a response from {(' or ' if any_of else ' and ').join(needed)}"
-        expect(judge, f"{class_}/reachable", attempt).that(not missing, expected, problem)
+        expect(judge, id_, attempt).that(not missing, expected, problem)
 
 
 def _needed(run: Run, class_: str) -> tuple[Interface, ...]:

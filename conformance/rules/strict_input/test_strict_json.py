@@ -75,7 +75,6 @@ def _try(api: RestInterface, judge: Judge, call: Call, item: Mutation[bytes]) ->
         field=item.field,
         shown=item.shown,
         malformed=item.malformed,
-        closing=item.kind == "depth",
     )
     if not refused:
         api.device.halt(api)

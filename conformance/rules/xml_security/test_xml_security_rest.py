@@ -117,8 +117,8 @@ def _runner(api: RestInterface, method: str, path: str, *, alone: bool) -> Attac
 
     def ids(attack: Attack) -> tuple[str, ...]:
         own = f"xml-security/{attack.name}"
-        ledger = api.run.contract.ledger
-        must = own in ledger and ledger[own].level is Level.MUST and attack.name not in _NOT_HERE
+        requirement = api.run.contract.requirement(own)
+        must = requirement is not None and requirement.level is Level.MUST and attack.name not in _NOT_HERE
         return (*((own,) if alone else ()), *((_REST,) if must else ()))
 
     times = [ask().response.elapsed_ms for _ in range(5)]

@@ -1,5 +1,6 @@
 """The base class of the REST and SOAP interfaces: access check, response, and errors without tracebacks."""
 
+import asyncio
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable, Coroutine
@@ -16,7 +17,13 @@ _LOGGER: Final = logging.getLogger(__name__)
 
 
 class Interface(ABC):
-    """An interface that answers the requests to one port; subclasses implement ``answer`` and ``scope``."""
+    """An interface that answers the requests to one port; subclasses implement ``answer`` and ``scope``.
+
+    Attributes:
+        lag: How much later each request is answered, s.
+    """
+
+    lag = 0.0
 
     def __init__(self, admission: Admission) -> None:
         self._admission = admission
@@ -41,6 +48,16 @@ class Interface(ABC):
 
     def respond(self, request: Request) -> Response | Coroutine[Any, Any, Response]:
         """Return the response to an admitted request, or a coroutine if ROS must be waited for; never raises."""
+        if self.lag:
+            return self._later(request)
+        return self._respond(request)
+
+    async def _later(self, request: Request) -> Response:
+        await asyncio.sleep(self.lag)
+        outcome = self._respond(request)
+        return outcome if isinstance(outcome, Response) else await outcome
+
+    def _respond(self, request: Request) -> Response | Coroutine[Any, Any, Response]:
         try:
             outcome = self.answer(request)
         except Exception as error:  # noqa: BLE001 - after any error the client gets a response

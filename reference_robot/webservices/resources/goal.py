@@ -4,7 +4,6 @@ from typing import Final
 
 from reference_robot.webservices.http.address import Address
 from reference_robot.webservices.http.messages import Request, Response
-from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.resources.resource import NO_CONTENT, Resource, represented, sent, wanted_format
 from reference_robot.webservices.robot.goals import GOAL, Goals
 
@@ -23,10 +22,7 @@ class Goal(Resource):
     def get(self, request: Request) -> Response:
         """Return the active goal; raise the Problem 404 if there is none."""
         media_type = wanted_format(request)
-        goal = self._goals.current()
-        if goal is None:
-            raise Problem(404, "the robot follows no goal")
-        return represented(goal, GOAL.name, media_type)
+        return represented(self._goals.followed(), GOAL.name, media_type)
 
     async def put(self, request: Request) -> Response:
         """Send a goal to the navigation; return 201 for a new goal, 202 if it displaces another, 200 for a repeat."""

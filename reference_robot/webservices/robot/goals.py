@@ -22,7 +22,14 @@ from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import message_from
 from reference_robot.webservices.representation.problems import Problem, not_yet
 from reference_robot.webservices.representation.shapes import Record, Text, shape_of
-from reference_robot.webservices.robot.reported_goals import STATUS_TEXTS, goal_from_report, goal_from_status
+from reference_robot.webservices.robot.reported_goals import (
+    ENDED_TEXTS,
+    STATUS_TEXTS,
+    ended_goal,
+    goal_from_report,
+    goal_from_status,
+    status_of,
+)
 from reference_robot.webservices.robot.target_poses import require_pose
 
 _GOAL_ID: Final = Record("GoalID", (("stamp", shape_of(Time)), ("id", Text(1, 255))), optional=frozenset({"stamp"}))
@@ -81,6 +88,7 @@ class Goals:
         self._navigator = navigator
         self._frames = frames
         self._own: _Goal | None = None
+        self._last: _Goal | None = None  # the goal that was accepted last, also after its end
         self._sending = 0  # goals that are being sent, or wait to be sent
         self._cancels = 0
         # Ids of our own and of cancelled goals, because the robot's report of its goal may lag behind.
@@ -98,8 +106,21 @@ class Goals:
             raise not_yet(f"ROS has been silent for {ros.silence():.1f} s: the goal is unknown")
         own = self._active_own()
         if own is not None:
-            return own.described | {"status": {"code": own.status, "text": STATUS_TEXTS[own.status]}}
+            return own.described | {"status": status_of(own.status)}
         return self._foreign()
+
+    def followed(self) -> dict[str, Any]:
+        """Return the active goal.
+
+        Raises:
+            Problem: 404 without one, with id and status of the goal that ended last as the member ``last_goal``; 503
+                as for current().
+        """
+        goal = self.current()
+        if goal is None:
+            last = self._ended()
+            raise Problem(404, "the robot follows no goal", extensions=None if last is None else {"last_goal": last})
+        return goal
 
     def is_active(self) -> bool:
         """Return whether the robot follows a goal of any client."""
@@ -132,9 +153,9 @@ class Goals:
             if _destination(wanted) != _destination(current):
                 raise Problem(409, f"goal_id.id {identity!a} is the current goal's, which has another target_pose")
             return 200, current
-        own = self._own = await self._accepted(self._filled_in(wanted), cancels)
+        own = self._own = self._last = await self._accepted(self._filled_in(wanted), cancels)
         # A goal at the robot's present pose may have ended already; then there is no current goal.
-        sent = self.current() or own.described | {"status": {"code": 1, "text": "accepted"}}
+        sent = self.current() or own.described | {"status": status_of(GoalStatus.STATUS_ACCEPTED)}
         return (201 if current is None else 202), sent
 
     async def cancel(self) -> None:
@@ -145,7 +166,7 @@ class Goals:
         """
         current, own, sending = self.current(), self._own, self._sending
         if current is None and not sending:
-            raise Problem(404, "the robot follows no goal")
+            self.followed()  # raises the Problem 404
         self._cancels += 1
         # Cancel all goals: another goal may have displaced the known one a moment ago.
         doomed = [goal.identity for goal in self._subscribers.goals.active()]
@@ -166,6 +187,24 @@ class Goals:
         if is_lost or own.status not in STATUS_TEXTS:
             self._own = own = None  # it has ended
         return own
+
+    def _ended(self) -> dict[str, Any] | None:
+        """Return id and status of the goal that was accepted last, of this or another client, after its end."""
+        reported = [goal for goal in self._subscribers.goals.reported if goal.status in ENDED_TEXTS]
+        newest = max(reported, key=lambda goal: (goal.seconds, goal.nanoseconds), default=None)
+        own = self._last
+        if own is None:
+            return None if newest is None else ended_goal(newest)
+        since = own.handle.stamp.sec, own.handle.stamp.nanosec
+        if newest is not None and newest.identity != own.identity.hex() and newest[2:] > since:
+            return ended_goal(newest)
+        # The end of a cancelled goal may not be reported yet; that of a goal whose server is gone never is.
+        lost = own.losses != self._subscribers.goals.losses
+        code = GoalStatus.STATUS_ABORTED if lost else GoalStatus.STATUS_CANCELED
+        return {
+            "goal_id": own.described["goal_id"],
+            "status": status_of(own.status if own.status in ENDED_TEXTS else code),
+        }
 
     def _foreign(self) -> dict[str, Any] | None:
         """Return the active goal that another client or a mission of the robot has sent, or None."""

@@ -16,6 +16,11 @@ STATUS_TEXTS: Final = {
     GoalStatus.STATUS_EXECUTING: "executing",
     GoalStatus.STATUS_CANCELING: "canceling",
 }
+ENDED_TEXTS: Final = {
+    GoalStatus.STATUS_SUCCEEDED: "succeeded",
+    GoalStatus.STATUS_CANCELED: "canceled",
+    GoalStatus.STATUS_ABORTED: "aborted",
+}
 _ORIGIN: Final = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
 
 
@@ -29,10 +34,21 @@ def goal_from_report(report: str) -> dict[str, Any] | None:
             "header": header,
             "goal_id": {"stamp": header["stamp"], "id": str(fields["goal_id"])},
             "goal": {"target_pose": reader_of(PoseStamped)(message_from(shape_of(PoseStamped), pose))},
-            "status": {"code": code, "text": STATUS_TEXTS[code]},
+            "status": status_of(code),
         }
     except (ValueError, TypeError, KeyError, AssertionError, Problem):
         return None
+
+
+def ended_goal(goal: ReportedGoal) -> dict[str, Any]:
+    """Return id and status of a goal of another client that has ended."""
+    stamp = {"sec": goal.seconds, "nanosec": goal.nanoseconds}
+    return {"goal_id": {"stamp": stamp, "id": goal.identity}, "status": status_of(goal.status)}
+
+
+def status_of(code: int) -> dict[str, Any]:
+    """Return the status {code, text} of a goal."""
+    return {"code": code, "text": (STATUS_TEXTS | ENDED_TEXTS)[code]}
 
 
 def goal_from_status(goal: ReportedGoal) -> dict[str, Any]:

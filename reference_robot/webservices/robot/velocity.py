@@ -95,15 +95,26 @@ class Velocity:
         self._publishers.publish_velocity(Twist())
 
     def _check_limits(self, twist: dict[str, Any]) -> None:
-        limits = {("linear", "x"): self._settings.max_linear, ("angular", "z"): self._settings.max_angular}
+        web = self._settings
+        reverse = web.max_linear if web.max_reverse is None else web.max_reverse
+        ranges = {
+            ("linear", "x"): (-reverse, web.max_linear),
+            ("linear", "y"): (-web.max_lateral, web.max_lateral),
+            ("angular", "z"): (-web.max_angular, web.max_angular),
+        }
         for part, components in twist.items():
             for axis, value in components.items():
-                limit = limits.get((part, axis))
-                if limit is None and value != 0:
+                least, most = ranges.get((part, axis), (0.0, 0.0))
+                if least == most and value != 0:
                     raise Problem(422, f"{part}.{axis} must be 0: this robot cannot actuate it, not {value}")
-                if limit is not None and abs(value) > limit:
+                if not least <= value <= most:
                     unit = "m/s" if part == "linear" else "rad/s"
-                    raise Problem(422, f"{part}.{axis} must lie within -{limit} and {limit} {unit}, not {value}")
+                    raise Problem(422, f"{part}.{axis} must lie within {least} and {most} {unit}, not {value}")
+        ahead, turn = twist["linear"]["x"], twist["angular"]["z"]
+        if abs(ahead) < web.min_radius * abs(turn):
+            raise Problem(
+                422, f"angular.z must be at most {abs(ahead) / web.min_radius} rad/s beside linear.x, not {turn}"
+            )
 
     async def _robot_found(self) -> None:
         give_up = time.monotonic() + _DISCOVERY

@@ -1,11 +1,11 @@
 """SOAP faults (SOAP 1.1, 4.4)."""
 
 from enum import StrEnum
-from typing import Final
+from typing import Any, Final
 
 from lxml import etree
 
-from reference_robot.webservices.representation.writing import text_of
+from reference_robot.webservices.representation.writing import element_of, text_of
 
 SOAP: Final = "http://schemas.xmlsoap.org/soap/envelope/"
 
@@ -20,12 +20,13 @@ class FaultCode(StrEnum):
 
 
 class Fault(Exception):  # noqa: N818 - SOAP's own name for it
-    """An error that is answered with a SOAP fault; its text names element and value."""
+    """An error that is answered with a SOAP fault; its text names element and value, ``detail`` holds more, by name."""
 
-    def __init__(self, code: FaultCode, text: str) -> None:
+    def __init__(self, code: FaultCode, text: str, detail: dict[str, Any] | None = None) -> None:
         super().__init__(text)
         self.code = code
         self.text = text
+        self.detail = detail
 
     def envelope(self) -> bytes:
         """Return the serialized envelope with the fault: its children unqualified (R1001), its code qualified."""
@@ -33,6 +34,8 @@ class Fault(Exception):  # noqa: N818 - SOAP's own name for it
         fault = etree.SubElement(etree.SubElement(root, f"{{{SOAP}}}Body"), f"{{{SOAP}}}Fault")
         etree.SubElement(fault, "faultcode").text = f"soap:{self.code}"
         etree.SubElement(fault, "faultstring").text = text_of(self.text)
+        if self.detail:
+            fault.append(element_of(self.detail, "detail"))
         return etree.tostring(root, encoding="utf-8", xml_declaration=True)
 
 

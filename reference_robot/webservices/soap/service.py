@@ -87,7 +87,7 @@ class SoapService:
 def _faulted(root: etree._Element, error: Exception) -> Response:
     if isinstance(error, Problem):
         code = FaultCode.SERVER if error.status >= _SERVERS_FAULT else FaultCode.CLIENT
-        error = Fault(code, error.detail)
+        error = Fault(code, error.detail, error.extensions)
     elif not isinstance(error, Fault):
         _LOGGER.error("cannot respond to %s", root.tag, exc_info=error)
         error = Fault(FaultCode.SERVER, "an internal error of the robot; the robot's log has the details")

@@ -37,7 +37,7 @@ class SubscribersWebService(SoapService):
             "GetVelocity": lambda: [velocity.measured()],
             "GetSensors": subscribers.sensors,
             "GetNavigationServices": subscribers.navigation_services,
-            "GetGoal": lambda: [goal] if (goal := goals.current()) else [],
+            "GetGoal": lambda: [goals.followed()],
         }
         operations: dict[str, Operation] = {
             name: partial(self._return_values, name, values) for name, values in returned.items()

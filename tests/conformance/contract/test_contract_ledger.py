@@ -1,11 +1,15 @@
 """The ledger has every class, and every requirement can be told from every other."""
 
+import re
+
 import pytest
 
+from conformance.contract.classes import Topic
 from conformance.contract.generic import generic_classes, generic_ledger
 from conformance.contract.ledger import LedgerError, load_ledger
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
+from conformance.contract.requirement_sets import load_set
 
 CONTRACT = Contract.load()
 LEDGER, CLASSES = CONTRACT.ledger, CONTRACT.classes
@@ -14,7 +18,8 @@ LEDGER, CLASSES = CONTRACT.ledger, CONTRACT.classes
 def test_every_class_has_requirements_and_says_what_it_needs():
     by_class = {name: [item for item in LEDGER.values() if item.class_ == name] for name in CLASSES}
     assert all(len(items) >= 5 for items in by_class.values())
-    assert all(f"{name}/reachable" in LEDGER for name in CLASSES if name not in {"describe", "rest-formats"})
+    reach = [item for item in LEDGER.values() if item.id.endswith("/reachable")]
+    assert {name for item in reach for name in item.classes} == set(CLASSES) - {"describe", "rest-formats"}
     assert set(CONTRACT.profiles["full"]) == set(CLASSES)
     assert set(generic_classes()) - {"description", "robustness"} < set(CLASSES)
 
@@ -41,7 +46,22 @@ def test_all_files_of_the_contract_are_there():
 
 @pytest.mark.parametrize("name", ["R2003", "R2028", "R2105", "R2201", "R2204", "R2206", "R2304", "R2401", "R2718"])
 def test_rules_of_the_basic_profile_for_descriptions(name):
-    assert f"BP {name}" in LEDGER[f"describe/wsdl-{name}"].source
+    item = CONTRACT.requirement(f"describe/wsdl-{name}")
+    assert item is not None
+    assert re.search(rf"^BP .*\b{name}\b", item.source)
+
+
+def test_an_id_that_went_is_an_alias_of_the_requirement_that_asks_it_now():
+    """Nothing that was asked by 1.1 is lost: each id is there, or an alias."""
+    assert set(load_set(CONTRACT, "1.2").requirements) <= set(LEDGER) | set(CONTRACT.renamed)
+    assert set(CONTRACT.renamed.values()) <= set(LEDGER)
+    assert not set(CONTRACT.renamed) & set(LEDGER)
+    assert Contract.load(only=("rest-delivery/put-body",)).ledger.keys() == {"rest-delivery/put"}
+
+
+def test_what_is_hygiene_says_what_breaks():
+    for item in LEDGER.values():
+        assert (item.topic is Topic.HYGIENE) == (item.breaks is not None), item.id
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,10 @@
 """What an exception in a check says of the requirements that it was to judge."""
 
+import pytest
+
 from conformance.engine.certification import draw_verdicts
 from conformance.engine.record_exception import record_exception
+from conformance.scenarios.scenario import NoOccasionError, NotPossibleError
 from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError, Request, Response, Unanswered
 from conformance.verdict.run import Run
 
@@ -16,7 +19,7 @@ def broken(error: Exception, *judged: str, alive: bool = True) -> Run:
         run.judge.check(id_, holds=True, exchange=_FINE, expected="")
     try:
         raise error
-    except (ValueError, NoAnswerError) as raised:
+    except (ValueError, NoAnswerError, NotPossibleError) as raised:
         record_exception(run, lambda: alive, _IDS, dict.fromkeys(_IDS, 0), raised)
     return run
 
@@ -29,6 +32,17 @@ def test_what_was_not_judged_yet_is_told_of():
 def test_when_all_were_judged_it_is_told_of_all():
     assert all(broken(ValueError("no"), *_IDS).judge.evidence[id_].errors for id_ in _IDS)
     assert set(broken(_SILENT, *_IDS).judge.refuted()) == set(_IDS)
+
+
+@pytest.mark.parametrize(
+    ("error", "values"), [(NotPossibleError("no"), ["skip", "skip"]), (NoOccasionError("no"), ["pass", "skip"])]
+)
+def test_without_an_occasion_what_other_checks_judged_stays_judged(error, values):
+    run = broken(error, "http/date")
+    run.claims = ("http",)
+    by_id = {verdict.requirement.id: verdict for verdict in draw_verdicts(run)[0]}
+    assert [by_id[id_].value for id_ in _IDS] == values
+    assert all(by_id[id_].reason == "no" for id_ in _IDS)
 
 
 def test_a_robot_that_is_gone_ends_the_run():

@@ -68,7 +68,7 @@ def test_a_folder_packs_checks_are_found_by_file():
     assert coverage.checks_by_requirement(LAMP)["lamp/fades"] == ("test_lamp::fades",)
     assert coverage.disagreements(LAMP) == []
     page = coverage.page(LAMP)
-    assert "## lamp" in page
+    assert "| `lamp/fades` |" in page.partition("## Does it do what it says?")[2]
     assert "mutants by rule" in page
 
 

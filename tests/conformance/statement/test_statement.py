@@ -70,14 +70,19 @@ def test_a_full_statement(tmp_path):
             "unknown key 'robto'; known are api, calls, claims, endpoints, limits, load, motion, robot, ros, values",
         ),
         ("[limts]\nhold_s = 1", "unknown key 'limts'"),
-        ("[endpoints]\nrset = 'x'", "[endpoints] unknown key 'rset'; known are ca_file, publishers_endpoint,"),
+        ("[endpoints]\nrset = 'x'", "[endpoints] unknown key 'rset'; known are api_key,"),
         ("[endpoints]\nrest = 7003", "[endpoints] rest = 7003 must be a string"),
         ("[endpoints]\ntimeout_s = -1", "[endpoints] timeout_s = -1 must be a positive number"),
         ("[claims]\nprofile = 'half'", "[claims] profile = 'half' must be one of paper, full"),
         ("[claims]\nclasses = ['rest']", "[claims] classes[0] = 'rest' must be one of rest-resources, rest-delivery,"),
         ("[claims]\nclasses = 'http'", "[claims] classes = 'http' must be a list, each item a string"),
-        ("[limits]\nlinear_m_s = 'fast'", "[limits] linear_m_s = 'fast' must be a number, and not negative"),
-        ("[limits]\nlinear_m_s = true", "[limits] linear_m_s = True must be a number, and not negative"),
+        ("[limits]\nlinear_m_s = 'fast'", "[limits] linear_m_s = 'fast' must be a finite number or 2 numbers"),
+        ("[limits]\nlinear_m_s = true", "[limits] linear_m_s = True must be a finite number or 2 numbers"),
+        ("[limits]\nlinear_m_s = -1", "[limits] linear_m_s = -1 must be a number, and not negative"),
+        ("[limits]\nangular_rad_s = nan", "[limits] angular_rad_s = nan must be a number, and not negative"),
+        ("[limits]\nlinear_m_s = [0.1, 0.7]", "[limits] linear_m_s = [0.1, 0.7] must be the least velocity, at most 0"),
+        ("[limits]\nlinear_m_s = [0, 0]", "[limits] linear_m_s = [0.0, 0.0] must be the least velocity, at most 0"),
+        ("[limits]\nlinear_m_s = [-1, inf]", "[limits] linear_m_s = [-1.0, inf] must be the least velocity, at most 0"),
         *(
             (f"[limits]\n{line}", f"[limits] {line} must be a number {bounds}")
             for line, bounds in (
@@ -90,9 +95,17 @@ def test_a_full_statement(tmp_path):
                 ("tolerance_abs = 0.11", "from 0 to 0.1"),
                 ("tolerance_linear_m_s = 0.11", "from 0 to 0.1"),
                 ("tolerance_angular_rad_s = 0.21", "from 0 to 0.2"),
+                ("goal_m = 0.6", "from 0.01 to 0.5"),
+                ("goal_rad = 0.6", "from 0.01 to 0.5"),
+                ("goal_s = 121", "from 1 to 120"),
+                ("plan_step_m = 11", "from 0.01 to 10"),
             )
         ),
-        ("[limits]\nodometry_hz = 0", "[limits] odometry_hz = 0 must be a positive number"),
+        ("[limits]\nodometry_hz = 0", "[limits] odometry_hz = 0 must be a number from 2 to 1000"),
+        ("[limits]\ntime_scale = 1e-6", "[limits] time_scale = 1e-06 must be a number from 0.1 to 25"),
+        ("[endpoints]\nrequest_rate = 1e-9", "[endpoints] request_rate = 1e-09 must be a number from 1 to 100000"),
+        ("[motion]\nturns_on_the_spot = false", "[motion] turns_on_the_spot = false and min_radius_m must be declared"),
+        ("[motion]\nmin_radius_m = 0.4", "[motion] turns_on_the_spot = false and min_radius_m must be declared"),
         ("[limits.noise]\nposition_m = 0.06", "position_m = 0.06 must be a number from 0 to 0.05"),
         ("[limits.noise]\nangular_rad_s = 0.2", "angular_rad_s = 0.2 must be"),
         ("[motion]\narena = [1, 2]", "[motion] arena = [1, 2] must be 4 numbers"),
@@ -137,7 +150,13 @@ def test_noise_rate_and_clock_are_declared_among_the_limits(tmp_path):
     assert (limits.odometry_hz, limits.time_scale) == (10, 2)
     assert limits.noise == Noise(position_m=0.01, linear_m_s=0.02)
     declared = dict.fromkeys(("tolerance_abs", "tolerance_linear_m_s", "tolerance_angular_rad_s"), 0.02)
-    declared |= {"tolerance": 0.05, "noise_position_m": 0.01, "noise_linear_m_s": 0.02}
+    declared |= {
+        "tolerance": 0.05,
+        "goal_m": 0.25,
+        "goal_rad": 0.25,
+        "noise_position_m": 0.01,
+        "noise_linear_m_s": 0.02,
+    }
     assert limits.tolerances == declared
     assert Statement().limits.odometry_hz is None
 
@@ -150,6 +169,34 @@ def test_absolute_tolerances_are_declared_apart_or_by_one_figure(tmp_path):
     assert is_near(apart, Velocity(0.04, angular_z=0.19), STILL)
     assert not is_near(apart, Velocity(0.06), STILL)
     assert not is_near(apart, Velocity(angular_z=0.21), STILL)
+
+
+def test_limits_may_differ_between_the_directions_and_from_those_of_the_navigation(tmp_path):
+    text = "[limits]\nlinear_m_s = [-0.1, 0.7]\nangular_rad_s = 2\nlateral_m_s = 0.3\nnavigation_linear_m_s = 1"
+    statement = _load(tmp_path, text)
+    limits = statement.limits
+    assert [limits.range_of(component) for component in (0, 1, 5)] == [(-0.1, 0.7), (-0.3, 0.3), (-2, 2)]
+    assert (limits.linear_m_s, limits.navigation_m_s, limits.navigation_rad_s) == (0.7, 1, 2)
+    assert statement.figures["limits"] == {
+        "linear_m_s": 0.7, "linear_least_m_s": -0.1, "linear_greatest_m_s": 0.7, "angular_rad_s": 2, "settle_s": 2,
+        "lateral_m_s": 0.3, "navigation_linear_m_s": 1,
+    }  # fmt: skip
+    back = _load(tmp_path, "[limits]\nlinear_m_s = [-0.7, 0]").limits
+    assert (back.linear_m_s, back.range_of(0)) == (0.7, (-0.7, 0))
+
+
+@pytest.mark.parametrize(
+    ("text", "resolved"),
+    [
+        ("linear_m_s = 0.4\ntolerance_linear_m_s = 0.1", True),
+        ("linear_m_s = 0.39\ntolerance_linear_m_s = 0.1", False),
+        ("angular_rad_s = 0.7\ntolerance_angular_rad_s = 0.2", False),
+        ("linear_m_s = 0.4\ntolerance_linear_m_s = 0.08\n[limits.noise]\nlinear_m_s = 0.03", False),
+        ("angular_rad_s = 0", True),
+    ],
+)
+def test_where_rest_could_pass_for_motion_that_is_said(tmp_path, text, resolved):
+    assert ("resolved" in _load(tmp_path, f"[limits]\n{text}").undeclared) is not resolved
 
 
 def test_without_claims_the_classes_follow_from_the_addresses():

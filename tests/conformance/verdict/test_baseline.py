@@ -13,9 +13,9 @@ from conformance.verdict.verdicts import Value, Verdict
 _TODAY = dt.date(2026, 11, 20)
 
 
-def _applied(value, expires):
+def _applied(value, expires, *, intermittent=False):
     requirement = Requirement("http/date", "http", Level.MUST, "A text.", "RFC", Origin.NORM)
-    entry = Expectation("http/date", "ticket 7", dt.date.fromisoformat(expires))
+    entry = Expectation("http/date", "ticket 7", dt.date.fromisoformat(expires), intermittent)
     return apply_baseline([Verdict(requirement, Value(value), "why", Evidence())], [entry], _TODAY)[0]
 
 
@@ -30,6 +30,16 @@ def _applied(value, expires):
 )
 def test_an_entry_changes_the_verdict_it_is_for(value, expected):
     assert {expires: _applied(value, expires).value for expires in expected} == expected
+
+
+@pytest.mark.parametrize(
+    ("value", "expires", "expected"),
+    [("fail", "2026-12-31", "warn"), ("pass", "2026-12-31", "pass"), ("pass", "2026-11-19", "error")],
+)
+def test_an_intermittent_failure_may_also_pass(value, expires, expected):
+    applied = _applied(value, expires, intermittent=True)
+    assert applied.value == expected
+    assert "ticket 7" in applied.reason
 
 
 def test_accepted_is_what_all_entries_still_accept():
@@ -62,3 +72,12 @@ def test_a_wrong_baseline_is_refused_by_name(tmp_path, text, named):
     with pytest.raises(BaselineError) as error:
         load_baseline(path, {"http/date"})
     assert named in str(error.value)
+
+
+def test_an_entry_with_an_id_that_went_is_one_of_the_requirement_that_asks_it_now(tmp_path):
+    path = tmp_path / "baseline.toml"
+    path.write_text('[[expected]]\nrequirement = "http/old"\nreason = "ticket 7"\nexpires = 2026-12-31\n')
+    (entry,) = load_baseline(path, ["http/date"], {"http/old": "http/date"})
+    assert (entry.requirement, entry.reason) == ("http/date", "ticket 7; http/old is http/date now")
+    with pytest.raises(BaselineError, match="no requirement"):
+        load_baseline(path, ["http/date"])

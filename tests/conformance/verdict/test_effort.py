@@ -47,24 +47,24 @@ def test_what_was_left_out_is_told_with_the_class_and_no_figure_of_this_run():
 
 
 def test_cases_for_which_no_time_is_left_stand_on_the_certificate(monkeypatch):
-    monkeypatch.setitem(effort._BUDGETS_S, "standard", 0.05)  # noqa: SLF001 - instead of ten seconds
+    monkeypatch.setitem(effort._BUDGETS_S, "standard", 0.05 / 3)  # noqa: SLF001 - instead of ten seconds
     run = Run()
     tried = []
-    explore = Explorer(0, "test_x.py::test_slow", run.effort, run.cut_short)
+    explore = Explorer(0, "test_x.py::test_slow", run.effort, run.tally)
     explore(st.integers(), lambda value: (tried.append(value), time.sleep(0.02)), cases=20)
     assert len(tried) < 20
-    assert run.cut_short == {"test_x.py::test_slow": 20 - len(tried)}
+    assert run.tally.cut_short == {"test_x.py::test_slow": 20 - len(tried)}
     (remark,) = run.remarks
     assert f"test_x.py::test_slow ({20 - len(tried)} cases)" in remark
 
 
 def test_attempts_to_make_a_failure_smaller_are_no_cases(monkeypatch):
-    monkeypatch.setitem(effort._BUDGETS_S, "standard", 0.05)  # noqa: SLF001 - instead of ten seconds
+    monkeypatch.setitem(effort._BUDGETS_S, "standard", 0.05 / 3)  # noqa: SLF001 - instead of ten seconds
     run = Run()
 
     def refuted(_value: int) -> None:
         time.sleep(0.02)
         raise RefutedError
 
-    Explorer(0, "test_x.py::test_wrong", run.effort, run.cut_short)(st.integers(), refuted, cases=20)
-    assert (run.cut_short, run.remarks) == ({}, ())
+    Explorer(0, "test_x.py::test_wrong", run.effort, run.tally)(st.integers(), refuted, cases=20)
+    assert (run.tally.cut_short, run.remarks) == ({}, ())

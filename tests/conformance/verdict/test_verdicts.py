@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.contract.classes import Level, Origin
+from conformance.contract.classes import Level, Origin, Prerequisite
 from conformance.contract.ledger import Requirement
 from conformance.verdict.evidence import Evidence, Judge
 from conformance.verdict.verdicts import class_verdicts, overall, verdict_of, views
@@ -92,6 +92,12 @@ def test_what_need_not_be_judged_does_not_hold_a_class_back(requirement):
     assert _class((_requirement(), _evidence(cases=1)), (requirement, _evidence()))[0] == "pass"
 
 
+@pytest.mark.parametrize(("level", "expected"), [("MAY", "pass"), ("SHOULD", "inconclusive"), ("MUST", "inconclusive")])
+def test_an_error_in_what_is_optional_does_not_hold_a_class_back(level, expected):
+    broken = (_requirement(level), _evidence(errors=["the suite could not judge this"]))
+    assert _class((_requirement(), _evidence(cases=1)), broken)[0] == expected
+
+
 def test_a_warning_leaves_the_class_passed():
     assert _class((_requirement(), _evidence(cases=1)), (_requirement("SHOULD"), _evidence(failing=True)))[0] == "pass"
 
@@ -120,3 +126,47 @@ def test_failures_of_one_cause_are_one_finding():
         judge.check("http/x", False, None, "status 404", found=f"status {status}")
     findings = judge.evidence["http/x"].findings
     assert [finding.seen for finding in findings.values()] == [20]
+
+
+_MERGED = _requirement(aliases=("http/part",), also=("safety",))
+
+
+def _parts(*names, failing=()):
+    judge = Judge({_MERGED.id: _MERGED})
+    judge.announce(("http/x", "http/part"))
+    for name in names:
+        judge.check(name, name not in failing, None, "something", found="nothing")
+    return verdict_of(_MERGED, judge.evidence["http/x"], _CLAIMS)
+
+
+def test_a_requirement_passes_when_each_part_of_it_was_judged():
+    """What was judged by two ids stays judged under one."""
+    assert _parts("http/x", "http/part").value == "pass"
+    assert _parts("http/x", "http/part", failing=("http/part",)).value == "fail"
+    half = _parts("http/x")
+    assert (half.value, half.reason) == ("skip", "nothing was executed for http/part, a part of it")
+
+
+def test_a_requirement_of_two_classes_is_judged_for_either_and_fails_both():
+    failed = _parts("http/x", failing=("http/x",))
+    assert {name: value for name, (value, _) in class_verdicts([failed], ("http", "safety")).items()} == {
+        "http": "fail",
+        "safety": "fail",
+    }
+    assert verdict_of(_MERGED, _evidence(cases=1), ("safety",)).value == "pass"
+    assert verdict_of(_MERGED, _evidence(cases=1), ("describe",)).value == "not-claimed"
+
+
+def test_a_class_whose_effects_nobody_saw_on_ros_is_a_black_box():
+    """A delivery that is listed and never published passes without a probe."""
+    delivery = Requirement("d/put", "d", Level.MUST, "A text.", "contract.md#x", Origin.CONTRACT)
+    on_list = Requirement("e/seen", "e", Level.MUST, "A.", "c", Origin.CONTRACT, needs=(Prerequisite.OBSERVER,))
+    on_ros = Requirement("e/ros", "e", Level.MUST, "B.", "c", Origin.CONTRACT, needs=(Prerequisite.PROBE,))
+    claims = ("d", "e")
+
+    def seen(probe):
+        cases = {delivery: 1, on_list: 1, on_ros: int(probe)}
+        return views([verdict_of(item, Evidence(cases=number), claims) for item, number in cases.items()], {"d"})
+
+    assert seen(probe=False) == {"d": "black box", "e": "black box"}
+    assert seen(probe=True) == {"d": "seen on ROS", "e": "seen on ROS"}

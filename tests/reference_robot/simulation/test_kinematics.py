@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from reference_robot.kinematics import KINEMATICS
 from reference_robot.simulation.kinematics import MAX_ANGULAR, MAX_LINEAR, Motion, advance, wrap
 
 speeds = st.floats(-10, 10)
@@ -59,3 +60,25 @@ def test_against_a_wall_the_body_stays_its_wheels_turn_and_it_can_turn():
     motion = advance(Motion(3, 4, 0, 0.5), (0.5, 0.0), 0.1, nowhere)
     assert (motion.x, motion.y, motion.linear) == (3, 4, 0.5)
     assert advance(Motion(3, 4, 0), (0.0, 2.0), 0.1, nowhere).yaw > 0
+
+
+@pytest.mark.parametrize(
+    ("body", "setpoint", "velocity"),
+    [
+        ("differential", (-0.5, 1.0, 0.3), (-0.5, 1.0, 0.0)),
+        ("no-reverse", (-0.5, 1.0, 0.0), (0.0, 1.0, 0.0)),
+        ("holonomic", (0.5, 1.0, -0.9), (0.5, 1.0, -0.5)),
+        ("ackermann", (-0.3, 2.0, 0.0), (-0.3, 1.0, 0.0)),
+        ("ackermann", (0.0, 2.0, 0.0), (0.0, 0.0, 0.0)),
+    ],
+)
+def test_a_body_drives_what_it_can(body, setpoint, velocity):
+    motion = Motion(0, 0, 0)
+    for _ in range(30):
+        motion = advance(motion, setpoint, 0.02, anywhere, KINEMATICS[body])
+    assert (motion.linear, motion.angular, motion.lateral) == pytest.approx(velocity)
+
+
+def test_a_body_that_moves_aside_does_so_across_its_heading():
+    motion = advance(Motion(1, 2, math.pi / 2, lateral=0.5), (0.0, 0.0, 0.5), 0.1, anywhere, KINEMATICS["holonomic"])
+    assert (motion.x, motion.y) == pytest.approx((0.95, 2.0))

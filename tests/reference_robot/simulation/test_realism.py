@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference_robot.simulation.kinematics import Motion, advance
-from reference_robot.simulation.realism import Delayed, Realism
+from reference_robot.simulation.realism import IMPERFECT, Delayed, Realism
 
 seeds = st.integers(0, 10_000)
 
@@ -20,7 +20,7 @@ def driven(seed: int, setpoint: tuple[float, float], seconds: float = 10.0) -> t
     body = belief = Motion(0.0, 0.0, 0.0)
     bodies, beliefs = [], []
     for _ in range(int(seconds * 50)):
-        after = advance(body, setpoint, 0.02, lambda _x, _y: True, realism.accelerations)
+        after = advance(body, setpoint, 0.02, lambda _x, _y: True, IMPERFECT)
         before, body = body, realism.slipped(body, after)
         belief = realism.believed(belief, before, after, body, 0.02)
         bodies.append(body)

@@ -25,8 +25,26 @@ def test_a_goal_is_sent_shown_and_cancelled(served, foreign):
     assert served.call("GET", PATH).status_code == 404
     assert served.call("DELETE", PATH).status_code == 404
     soap = served.soap(query_envelope("GetGoal"), url=served.subscribers)
-    assert soap.status_code == 200
-    assert etree.fromstring(soap.content).find(".//return") is None
+    assert soap.status_code == 500
+    assert etree.fromstring(soap.content).findtext(".//detail/last_goal/goal_id/id") == "one"
+
+
+def _last_goal(served):
+    answer = served.call("GET", PATH)
+    return answer.status_code == 404 and answer.json().get("last_goal")
+
+
+def test_without_a_goal_the_robot_tells_how_the_last_one_ended(served, foreign):
+    for number, (end, status) in enumerate(
+        [(lambda: foreign.do(finish=True), (4, "succeeded")), (lambda: served.call("DELETE", PATH), (5, "canceled"))]
+    ):
+        served.call("PUT", PATH, json=goal(f"goal {number}"))
+        foreign.next("goal")
+        end()
+        last = eventually(lambda: _last_goal(served))
+        assert (last["goal_id"]["id"], tuple(last["status"].values())) == (f"goal {number}", status)
+    as_xml = etree.fromstring(served.call("GET", PATH, headers={"Accept": "application/xml"}).content)
+    assert as_xml.findtext("{*}last_goal/{*}status/{*}text") == "canceled"
 
 
 def test_a_repeat_is_a_no_op_and_another_pose_a_conflict(served, foreign):

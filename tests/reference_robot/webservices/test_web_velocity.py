@@ -66,6 +66,29 @@ def test_while_a_goal_is_active_velocity_is_refused(served, foreign):
     foreign.next("velocity")
 
 
+def test_what_another_body_cannot_drive_is_refused(domain_id, tmp_path):
+    config = tmp_path / "robot.toml"
+    config.write_text("[web]\nmax_reverse = 0\nmax_lateral = 0.3\nmin_radius = 0.5\nlag = 0.01\n")
+    aside = twist() | {"linear": {"x": 0.0, "y": -0.3, "z": 0.0}}
+    with (
+        ForeignRobot(domain_id, "Twist") as foreign,
+        running_robot(domain_id, "--attach", f"--config={config}") as served,
+    ):
+        eventually(lambda: served.call("PUT", VELOCITY, json=aside).status_code == 200)
+        foreign.forget()
+        assert served.call("PUT", VELOCITY, json=twist(x=0.6, z=1.1)).status_code == 200
+        foreign.next("velocity")
+        for value, name in (
+            (twist(x=-0.1), "linear.x"),
+            (twist(x=0.0, z=0.1), "angular.z"),
+            (twist(x=0.6, z=1.3), "angular.z"),
+        ):
+            assert name in problem(served.call("PUT", VELOCITY, json=value), 422)
+        # The angular part that is in force counts as well.
+        assert "angular.z" in problem(served.call("PUT", LINEAR, json={"x": 0.5, "y": 0.0, "z": 0.0}), 422)
+        assert foreign.heard_nothing()
+
+
 def test_a_robot_that_takes_stamped_twists_gets_them(domain_id):
     with ForeignRobot(domain_id, "TwistStamped") as stamped, running_robot(domain_id, "--attach") as served:
         eventually(lambda: served.call("PUT", VELOCITY, json=twist(x=0.3, z=0.2)).status_code == 200)

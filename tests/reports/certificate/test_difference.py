@@ -124,3 +124,12 @@ def test_the_command(pair, tmp_path, new, code):
 
 def test_what_cannot_be_read_is_no_difference(tmp_path):
     assert CliRunner().invoke(diff, [str(tmp_path), str(tmp_path)]).exit_code == 2
+
+
+def test_requirements_that_were_merged_are_compared_with_the_one_that_asks_it_now(pair):
+    merged = {**requirement(id_="http/one"), "aliases": ["http/two"]}
+    found = difference(*pair([requirement(id_="http/one"), requirement("fail", id_="http/two")], [merged]))
+    assert {change.kind for change in found.changes} == {Kind.MERGED, Kind.FIXED}
+    assert found.changes[-1].reason == "It was http/one, http/two."
+    same = difference(*pair([requirement(id_="http/one"), requirement(id_="http/two")], [merged]))
+    assert {change.kind for change in same.changes} == {Kind.MERGED}

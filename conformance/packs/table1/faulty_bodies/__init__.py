@@ -4,8 +4,14 @@ Each is a class of bodies for the independent robot ``baroque``. A mutant behind
 send consistent messages and behave otherwise.
 """
 
+from pathlib import Path
+
 from conformance.packs.table1.faulty_bodies.missions import MISSIONS
 from conformance.packs.table1.faulty_bodies.readings import READINGS
 from conformance.packs.table1.faulty_bodies.velocities import VELOCITIES
 
 FAULTY_BODIES = {**VELOCITIES, **READINGS, **MISSIONS}
+#: Statements of faulty bodies that declare something else than ``baroque.toml`` does, by the fault's name.
+STATEMENTS = {path.stem: path for path in Path(__file__).parent.glob("*.toml")}
+#: Faults of which a statement leaves nothing to see: they need not fail, but must not pass.
+UNSEEN = frozenset({"dead-base"})

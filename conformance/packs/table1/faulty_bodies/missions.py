@@ -1,5 +1,6 @@
 """Bodies that handle goals, plans or deliveries wrongly."""
 
+import math
 import struct
 import threading
 import time
@@ -103,6 +104,16 @@ class _ResumesOnArrival(_Resumes):
         if driven and self.goal is None:
             self.goal, self._displaced = self._displaced, None
         return aim
+
+
+class _HeadingIgnored(Body):
+    """A body that ends a goal at its position, whatever its heading."""
+
+    def send(self, id_: str | None, target: dict[str, Any], frame: str) -> tuple[Goal, bool]:
+        """Accept a goal, and take the way's direction for its heading."""
+        goal, new = super().send(id_, target, frame)
+        goal.yaw = math.atan2(goal.y - self._state.y, goal.x - self._state.x)
+        return goal, new
 
 
 class _VelocityAfterGoal(Body):
@@ -217,6 +228,7 @@ MISSIONS: dict[str, type[Body]] = {
     "goal-coasts": _Coasts,
     "goal-resumed": _Resumes,
     "goal-resumed-on-arrival": _ResumesOnArrival,
+    "goal-heading-ignored": _HeadingIgnored,
     "velocity-after-goal": _VelocityAfterGoal,
     "velocity-forgotten-for-goal": _VelocityForgotten,
     "plan-start-forgotten": _StartForgotten,

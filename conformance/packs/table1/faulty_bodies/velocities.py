@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from conformance.packs.table1.independent_robots.body import TICK_S, Body
 
@@ -24,6 +25,23 @@ def _holding(factor: Callable[[float, float | None], float]) -> type[Body]:
                 return kept
 
     return Holding
+
+
+class _WatchdogSometimes(Body):
+    """A body whose watchdog stops every second velocity that is not renewed; the others go on for a minute."""
+
+    _MINUTE = round(60 / TICK_S)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._ended = 0
+
+    def _aim(self) -> tuple[float, float]:
+        if self.goal is None and self._tick == self._until and any(self._command):
+            self._ended += 1
+            if self._ended % 2:
+                self._until += self._MINUTE
+        return super()._aim()
 
 
 class _RenewedByChange(Body):
@@ -63,6 +81,31 @@ class _SlowReversal(Body):
         return v, w
 
 
+class _DeadBase(Body):
+    """A body that ignores velocities, and whose statement has limits so low that rest is "near" each of them."""
+
+    def __post_init__(self) -> None:
+        """Lower the limits of the build to those of the statement."""
+        self.build = replace(self.build, linear_m_s=0.12, angular_rad_s=0.25, cruise_m_s=0.24, turn_rad_s=0.5)
+        super().__post_init__()
+
+    def _aim(self) -> tuple[float, float]:
+        commanded = self.goal is None
+        aim = super()._aim()
+        return (0.0, 0.0) if commanded else aim
+
+
+class _AxesIgnored(Body):
+    """A body that accepts a velocity along each of six axes, as its statement says, and moves along two of them."""
+
+    further_axes = 0.3
+
+    def __post_init__(self) -> None:
+        """Lower the limit of turning to that of the further axes, as the statement has one figure for all of them."""
+        self.build = replace(self.build, angular_rad_s=self.further_axes, turn_rad_s=0.29)
+        super().__post_init__()
+
+
 _LINEAR, _ANGULAR = 0.25, 1.2  # what is fast for the robot, m/s and rad/s
 _SLOW, _SLOW_TURN = 0.1, 0.6
 _DEAD, _DEAD_TURN = 0.06, 0.25  # what is too slow for its motors
@@ -76,6 +119,11 @@ VELOCITIES: dict[str, type[Body]] = {
     "hold-forever-linear": _holding(lambda v, w: 40.0 if v and w is None else 1.0),
     "hold-long-slow": _holding(lambda v, w: 2.0 if w and abs(w) < _SLOW_TURN and abs(v) < _SLOW else 1.0),
     "hold-short-fast": _holding(lambda v, _w: 0.5 if abs(v) > _LINEAR else 1.0),
+    "hold-forever-full-ahead": _holding(lambda v, w: 40.0 if v > 0 and w is not None else 1.0),
+    "hold-forever-full-back": _holding(lambda v, w: 40.0 if v < 0 and w is not None else 1.0),
+    "hold-forever-linear-ahead": _holding(lambda v, w: 40.0 if v > 0 and w is None else 1.0),
+    "hold-forever-left": _holding(lambda _v, w: 40.0 if w and w > 0 else 1.0),
+    "watchdog-sometimes": _WatchdogSometimes,
     "renewed-by-change": _RenewedByChange,
     "back-capped": _driving(lambda v, w: (max(v, -_MOST_BACK), w)),
     "left-capped": _driving(lambda v, w: (v, min(w, _MOST_TURN))),
@@ -87,4 +135,6 @@ VELOCITIES: dict[str, type[Body]] = {
     "mirrored-back": _driving(lambda v, w: (v, -w if v < 0 else w)),
     "drift": _driving(lambda v, w: (v, 0.12 if v and not w else w)),
     "slow-reversal": _SlowReversal,
+    "dead-base": _DeadBase,
+    "axes-ignored": _AxesIgnored,
 }

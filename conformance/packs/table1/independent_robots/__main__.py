@@ -4,6 +4,7 @@ import argparse
 import signal
 import sys
 import threading
+from dataclasses import replace
 from importlib import import_module
 
 from conformance.packs.table1.faulty_bodies import FAULTY_BODIES
@@ -19,16 +20,20 @@ def main() -> int:
     parser.add_argument("--rest-port", type=int, default=0, help="0: a free one")
     parser.add_argument("--soap-port", type=int, default=0, help="0: a free one")
     parser.add_argument("--fault", choices=FAULTY_BODIES, help="in its body; of the robot baroque only")
+    parser.add_argument("--hold-s", type=float, help=f"how long a velocity holds, s; of the robot {_WITH_FAULTS} only")
     given = parser.parse_args()
-    if given.fault and given.name != _WITH_FAULTS:
-        parser.error(f"--fault {given.fault}: only {_WITH_FAULTS} has bodies with faults")
+    if (given.fault or given.hold_s) and given.name != _WITH_FAULTS:
+        parser.error(f"--fault and --hold-s: only {_WITH_FAULTS} has other bodies")
     ended = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: ended.set())
-    kind = (FAULTY_BODIES[given.fault],) if given.fault else ()
-    rest, soap, stop = import_module(f"conformance.packs.table1.independent_robots.{given.name}").serve(
-        given.rest_port, given.soap_port, *kind
-    )
+    module = import_module(f"conformance.packs.table1.independent_robots.{given.name}")
+    options: dict[str, object] = {}
+    if given.fault:
+        options["kind"] = FAULTY_BODIES[given.fault]
+    if given.hold_s:
+        options["build"] = replace(module.BUILD, hold_s=given.hold_s)
+    rest, soap, stop = module.serve(given.rest_port, given.soap_port, **options)
     sys.stdout.write(f"ready rest={rest} soap={soap}\n")
     sys.stdout.flush()
     ended.wait()

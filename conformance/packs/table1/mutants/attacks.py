@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
-from conformance.mutation.changes import Where, plain, posted
+from conformance.mutation.changes import Where, hanging_up, plain, posted
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import TNS
@@ -189,6 +189,8 @@ _mutant("attack-expansion-fine", "expansion", "Exponentially expanding entities 
 _mutant(
     "attack-quadratic-fine", "quadratic", "A long entity that is used many times returns a normal response."
 ).rewritten(_posting(lambda body: 0 < body.count(b"<!ENTITY") <= 2 and body.count(b"&") > 50), _undeclared)
+_mutant("attack-depth-crash", "depth", "Deeply nested XML ends the process that reads it.").made(hanging_up(_nested))
+_mutant("attack-depth-bad-gateway", "depth", "Deeply nested XML returns 502.").instead(_nested, plain(502))
 _mutant("attack-depth-fine", "depth", "Deeply nested XML returns 200.").instead(_nested, _DONE)
 _mutant("attack-attributes-fine", "attributes", "Thousands of attributes return 200.").instead(
     _posting(lambda body: body.count(b'="') > 5000), _DONE

@@ -143,6 +143,24 @@ class _GoalOfTwo:
         return response
 
 
+class _OneServed:
+    """A change that serves one read at a time; others meanwhile are refused as too many."""
+
+    def __init__(self) -> None:
+        self._serving = threading.Lock()
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        if not rest("GET")(request):
+            return forward(request)
+        if not self._serving.acquire(blocking=False):
+            return problem(503, "busy", ("Retry-After", "1"))(request)
+        try:
+            time.sleep(_MEETS_S)
+            return forward(request)
+        finally:
+            self._serving.release()
+
+
 class _Blended:
     """A change that gives concurrent requests the same value of one JSON member: that of the first request."""
 
@@ -219,6 +237,9 @@ _resource(
     "concurrent-puts",
     "Of concurrent velocity commands, the robot uses the linear part of one and the angular part of another.",
 ).made(lambda: _Blended(_PUT_VELOCITY, "angular"))
+_mutant("clients-one-served", "concurrent-served", "While a read is answered, every other client gets 503.").made(
+    _OneServed
+)
 _order("clients-soap-crossed", "concurrent-answers", "Two concurrent SOAP deliveries get each other's responses.").made(
     lambda: _Mixed(posted, _exchanged, 1)
 )

@@ -98,23 +98,56 @@ def _delete_conflict(request: Request, forward: Forward) -> Response:
     return forward(request)
 
 
-@_mutant(
+def _driven_to(sent: Callable[[Any], Any], shown: Callable[[Any], Any]) -> Make:
+    """Return a change that drives to another goal: ``sent`` edits a PUT, and ``shown`` undoes that in responses."""
+
+    def change(request: Request, forward: Forward) -> Response:
+        if not _AT(request):
+            return forward(request)
+        if _PUT(request):
+            request = request.copy()
+            inputs(_guarded(sent))(request)
+        response = forward(request)
+        if success(response):
+            values(_guarded(shown))(response)
+        return response
+
+    return lambda: change
+
+
+def _turned(by: float) -> Callable[[Any], None]:
+    """Return an edit that turns a goal's pose by an angle, rad."""
+
+    def edit(goal: Any) -> None:
+        q = goal["goal"]["target_pose"]["pose"]["orientation"]
+        cos, sin = math.cos(by / 2), math.sin(by / 2)
+        x, y, z, w = (q[axis] for axis in "xyzw")
+        q.update(x=cos * x - sin * y, y=cos * y + sin * x, z=cos * z + sin * w, w=cos * w - sin * z)
+
+    return edit
+
+
+_mutant(
     "goal-beside",
     "goal-drives",
     "The robot stops 80 cm beside the goal, and GET returns the goal that the client sent.",
+).made(_driven_to(field(_X, plus(0.8)), field(_X, plus(-0.8))))
+_mutant(
+    "goal-beside-a-little",
+    "goal-drives",
+    "The robot stops 29 cm beside the goal, and GET returns the goal that the client sent.",
+).made(_driven_to(field(_X, plus(0.29)), field(_X, plus(-0.29))))
+_mutant(
+    "goal-heading-off",
+    "goal-drives",
+    "The robot arrives with a heading 0.6 rad beside the goal's, and GET returns the goal that the client sent.",
+).made(_driven_to(_turned(0.6), _turned(-0.6)))
+_mutant("goal-outcome-untold", "goal-outcome", "The 404 after a goal does not say how the goal ended.").json(
+    _GET, lambda told: told.pop("last_goal", None), status(404)
 )
-def _beside(request: Request, forward: Forward) -> Response:
-    if not _AT(request):
-        return forward(request)
-    if _PUT(request):
-        request = request.copy()
-        inputs(_guarded(field(_X, plus(0.8))))(request)
-    response = forward(request)
-    if success(response):
-        values(_guarded(field(_X, plus(-0.8))))(response)
-    return response
-
-
+_mutant("goal-outcome-always-success", "goal-outcome", "A cancelled goal is reported as succeeded.").json(
+    _GET, lambda told: told.get("last_goal", {"status": {}})["status"].update(code=4), status(404)
+)
 _mutant("goal-get-swapped", "goal-get", "GET returns the goal with x and y swapped.").json(_GET, swapped(_X, _Y))
 _mutant("goal-none-empty", "goal-none", "Without a goal, GET returns 200 with null.").altered(
     _GET, page(200, b"null", JSON), status(404)

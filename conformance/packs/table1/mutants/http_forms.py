@@ -99,6 +99,76 @@ def _in_chunks(response: Response) -> None:
     response.raw = head.encode() + b"%x\r\n%b\r\n0\r\n\r\n" % (len(response.body), response.body)
 
 
+def _and_rubbish(response: Response) -> None:
+    """Answer what follows, read from the wrong place, as a request that is none."""
+    response.raw = response.octets() + b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n"
+
+
+def _mended(pattern: bytes) -> Callable[[Request], Request | None]:
+    """Return a function that makes a plain GET of a malformed request, or returns None for other requests."""
+    compiled = re.compile(pattern)
+
+    def mend(request: Request) -> Request | None:
+        if request.side != "rest" or request.raw is None or not compiled.search(request.raw):
+            return None
+        line = request.raw.split(b"\r\n", 1)[0].decode("latin-1").split(" ")
+        return Request("rest", "GET", line[1], fields=[("Host", "robot")])
+
+    return mend
+
+
+def _acting(pattern: bytes) -> Callable[[], Change]:
+    """Return a change that takes what malformed requests hide as a Content-Length, and loses the place."""
+
+    def change(request: Request, forward: Forward) -> Response:
+        mended = _mended(pattern)(request)
+        response = forward(mended or request)
+        if mended is not None:
+            _and_rubbish(response)
+        return response
+
+    return lambda: change
+
+
+def _ignoring(pattern: bytes) -> Callable[[], Change]:
+    """Return a change that ignores what is malformed."""
+    return lambda: lambda request, forward: forward(_mended(pattern)(request) or request)
+
+
+def _without_length(request: Request) -> None:
+    request.drop("Content-Length")
+
+
+_both = _came(rb"(?is)(?=.*\r\nTransfer-Encoding:)(?=.*\r\nContent-Length:)")
+
+
+@_mutant(
+    "http-length-before-chunks", "length-and-chunks", "Content-Length ends a request that also has Transfer-Encoding."
+)
+def _length_first(request: Request, forward: Forward) -> Response:
+    if not _both(request):
+        return forward(request)
+    request.drop("Content-Length")
+    response = forward(request)
+    _and_rubbish(response)
+    return response
+
+
+_mutant(
+    "http-length-and-chunks-go-on",
+    "length-and-chunks-closed",
+    "After a request with Content-Length and Transfer-Encoding, the robot keeps the connection open.",
+).rewritten(_both, _without_length)
+_mutant("http-folded-header", "header-lines", "A folded line counts as a header of its own.").altered(
+    _came(rb"(?i)\r\n[ \t]+Content-Length:"), _and_rubbish, anything
+)
+_mutant("http-bare-cr", "header-lines", "A bare CR ends a header line.").made(_acting(rb"\r(?!\n)"))
+_mutant("http-length-before-space", "header-lines", "A space before the colon of Content-Length is ignored.").made(
+    _acting(rb"(?i)\r\nContent-Length[ \t]+:")
+)
+_mutant("http-space-before-colon", "space-before-colon", "A header with a space before its colon is ignored.").made(
+    _ignoring(rb"\r\n[\w-]+[ \t]+:")
+)
 _mutant("http-no-chunk-extensions", "chunk-forms", "A chunk extension returns 400.").instead(
     _came(rb"\r\n[0-9a-f]+;[^\r]*\r\n"), problem(400, "no chunk size")
 )
@@ -147,8 +217,8 @@ _mutant(
 _mutant(
     "http-head-of-what-cannot-be-read", "method-not-allowed", "HEAD of a delivery returns 200, though GET returns 405."
 ).instead(_having(lambda request: _HEAD(request) and deliveries(request.copy(method="PUT"))), plain(200))
-_mutant("http-no-chunks", "chunked", "Chunked request bodies return 411.").instead(
-    _chunked, problem(411, "a length, please")
+_mutant("http-no-chunks", "chunked", "Chunked request bodies return 400.").instead(
+    _chunked, problem(400, "a length, please")
 )
 _mutant("http-few-chunks", "chunked", "The robot reads only 1 KiB of a chunked request body.").rewritten(
     _chunked, _shortened

@@ -10,6 +10,7 @@ from conformance.mutation.changes import (
     Make,
     Where,
     altered,
+    hanging_up,
     header,
     instead,
     parsed,
@@ -121,11 +122,22 @@ def _in_latin(response: Response) -> None:
         response.body = json.dumps(value, ensure_ascii=False).encode("latin-1")
 
 
-def _token(refused: Callable[[Request], Response]) -> Callable[[], Any]:
-    """Return a change that requires a bearer token, and lets ``refused`` answer requests without it."""
+_unauthorized = problem(401, "no token", ("WWW-Authenticate", "Bearer"))
+
+
+def _token(refused: Callable[[Request], Response], where: Where = _ANY, *, acts: bool = False) -> Callable[[], Any]:
+    """Return a change that requires a bearer token, and lets ``refused`` answer requests without it.
+
+    Args:
+        refused: the response to requests without the token.
+        where: the requests that require it.
+        acts: whether a request without it is carried out all the same.
+    """
 
     def change(request: Request, forward: Forward) -> Response:
-        if request.side == "rest" and request.raw is None and request.field("Authorization") != f"Bearer {_SESAME}":
+        if where(request) and request.raw is None and request.field("Authorization") != f"Bearer {_SESAME}":
+            if acts:
+                forward(request)
             return refused(request)
         return forward(request)
 
@@ -145,6 +157,11 @@ def _page(response: Response) -> None:
 _mutant("http-large-body-fine", "content-too-large", "Bodies over 10 MiB return 204.").made(
     _big(10 * 1024 * 1024, plain(204))
 )
+_mutant(
+    "http-large-body-closes",
+    "content-too-large-answered",
+    "Bodies over 10 MiB close the connection without a response.",
+).made(hanging_up(lambda request: request.side == "rest" and len(request.body) > 10 * 1024 * 1024))
 _mutant("http-small-limit", "content-too-large", "Bodies over 20 KiB return 413.").made(
     _big(20_000, problem(413, "too large"))
 )
@@ -210,6 +227,15 @@ _mutant("http-latin", "json-encoding", "JSON responses are encoded in ISO 8859-1
 _mutant("http-name-twice", "json-unique-names", "A JSON object has the same member name twice.").altered(
     _POSE, text(r'"child_frame_id"', '"child_frame_id": "base", "child_frame_id"', 1)
 )
+_mutant("http-writes-open", "authentication-writes", "Only reads require the token.", token=_SESAME).made(
+    _token(_unauthorized, _GET)
+)
+_mutant(
+    "http-unauthorized-acts",
+    "authentication-writes",
+    "A request without the token returns 401 and is carried out all the same.",
+    token=_SESAME,
+).made(_token(_unauthorized, acts=True))
 _mutant("http-token-forbidden", "authentication-asked", "A request without the token returns 403.", token=_SESAME).made(
     _token(problem(403, "no token"))
 )

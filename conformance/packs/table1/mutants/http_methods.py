@@ -47,6 +47,11 @@ def _typed_as_json(request: Request) -> None:
         request.put("Content-Type", JSON)
 
 
+def _unavailable(response: Response) -> None:
+    page(503, b'{"status": 503, "detail": "not now"}', "application/problem+json")(response)
+    response.put("Retry-After", "1")
+
+
 def _charset(request: Request) -> bool:
     return _INPUT(request) and "charset" in (request.field("Content-Type") or "").lower()
 
@@ -123,6 +128,9 @@ _mutant("http-crash-on-input", "no-server-error", "Invalid request bodies return
 _mutant("http-crash-on-query", "no-server-error", "Invalid queries return 500.").altered(
     rest("GET", "/robot/navigation/service/plan"), becomes(500), refusal
 )
+_mutant("http-every-second-read", "available", "Every second GET returns 503 with Retry-After.").altered(
+    _GET, _unavailable, anything, nth=2
+)
 _mutant("http-crash-sometimes", "declared-status", "One GET in 50 returns 502.").altered(
     _GET, becomes(502), anything, nth=50
 )
@@ -156,8 +164,8 @@ _mutant("http-options-mute", "options", "Responses to OPTIONS have no Allow head
 _mutant("http-allow-get-only", "allow-agrees", "Allow lists only GET, HEAD and OPTIONS.").altered(
     _ANY, _allow(lambda _: ["GET", "HEAD", "OPTIONS"]), anything
 )
-_mutant("http-allow-too-much", "allow-agrees", "Allow lists DELETE and PATCH everywhere.").altered(
-    _ANY, _allow(lambda methods: sorted({*methods, "DELETE", "PATCH"})), anything
+_mutant("http-allow-too-much", "allow-agrees", "Allow in a 405 response lists all standard methods.").altered(
+    _ANY, _allow(lambda methods: sorted({*methods, "PUT", "POST", "DELETE", "PATCH"})), status(405)
 )
 _mutant("http-unknown-path-page", "not-found", "An unknown path returns 200 with a page.").altered(
     lambda request: _ANY(request) and request.path not in RESOURCES,

@@ -7,7 +7,18 @@ from collections.abc import Callable
 from typing import Any
 from urllib.parse import parse_qsl
 
-from conformance.mutation.changes import becomes, parsed, plain, query, refusal, rest, rewritten, status, success
+from conformance.mutation.changes import (
+    becomes,
+    hanging_up,
+    parsed,
+    plain,
+    query,
+    refusal,
+    rest,
+    rewritten,
+    status,
+    success,
+)
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.delivery import any_code, finite, lenient, segments
@@ -193,6 +204,8 @@ _mutant("input-last-wins", "json-duplicate", "Of a duplicate JSON member, the la
 )
 _mutant("input-coerced", "json-type", "Strings, null and booleans count as numbers.").made(_repairing(_typed))
 _mutant("input-nan-is-zero", "json-non-finite", "NaN and numbers that overflow count as 0.").made(_repairing(_finite))
+_mutant("input-deep-crash", "json-depth", "Deeply nested JSON ends the process that reads it.").made(hanging_up(_deep))
+_mutant("input-deep-bad-gateway", "json-depth", "Deeply nested JSON returns 502.").instead(_deep, plain(502))
 _mutant("input-deep-fine", "json-depth", "Deeply nested JSON returns 204.").made(_swallowed(_deep))
 _mutant("input-empty-fine", "json-empty", "An empty body returns 204.").made(
     _swallowed(lambda request: _is_json(request) and not request.body.strip())

@@ -112,6 +112,9 @@ _mutant(
 _mutant("pose-clock-milliseconds", "pose-clock", "The stamp's nanosec counts milliseconds.").json(
     _AT, field(_NANOSEC, lambda nanosec: nanosec // 10**6)
 )
+_mutant("pose-clock-hour-ahead", "pose-clock-offset", "The odometry stamps are an hour ahead of Date.").json(
+    _AT, field(_SEC, plus(3600))
+)
 _mutant("pose-short-covariance", "pose-type", "The pose's covariance has 35 values.").json(
     _AT, field("pose.covariance", lambda numbers: numbers[:35])
 )

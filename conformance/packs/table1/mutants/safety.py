@@ -99,11 +99,58 @@ class _SlowCancel:
         return forward(request)
 
 
+# A stop or a cancel that is carried out so late is answered as late, s.
+_HELD_BACK_S = 4.0
+
+
+@_mutant("safety-stop-held-back", "stop-answered", "PUT of zero velocity to a moving robot takes effect 4 s later.")
+class _StopHeldBack:
+    def __init__(self) -> None:
+        self._moving = False
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        if self._moving and _PUT(request) and _zero(parsed(request.body)):
+            time.sleep(_HELD_BACK_S)
+        response = forward(request)
+        if _PUT(request) and success(response):
+            self._moving = _moving(request)
+        return response
+
+
+@_mutant("safety-cancel-held-back", "stop-answered", "DELETE of the active goal takes effect 4 s later.")
+def _cancel_held_back(request: Request, forward: Forward) -> Response:
+    if _DELETE(request) and active(forward, request) is not None:
+        time.sleep(_HELD_BACK_S)
+    return forward(request)
+
+
+@_mutant("safety-watchdog-sometimes", "watchdog", "Every second velocity that is not renewed goes on for 10 s.")
+class _Sometimes(_GoingOn):
+    def __init__(self) -> None:
+        super().__init__(_again, 0.55, 10.0)
+        self._ended = 0
+
+    def _go_on(self, turn: int, request: Request, forward: Forward) -> None:
+        if self._turn == turn:
+            self._ended += 1
+            if self._ended % 2:
+                super()._go_on(turn, request, forward)
+
+
 @_mutant("safety-second-wind", "cancel-stays", "One second after DELETE of the goal, the robot drives again.")
 def _second_wind(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if _DELETE(request) and response.status == 204:
         later(1.0, goal_ahead, request.copy(), forward, 0.8)
+    return response
+
+
+@_mutant("safety-cancel-creeps", "cancel-stays", "One second after DELETE of the goal, the robot creeps.")
+def _creeps(request: Request, forward: Forward) -> Response:
+    response = forward(request)
+    if _DELETE(request) and response.status == 204:
+        # Beyond the tolerances at rest of the good robots, 0.02 and 0.03 m/s, but less than twice these.
+        later(1.0, drive, request.copy(), forward, 0.035)
     return response
 
 

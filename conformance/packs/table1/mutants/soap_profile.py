@@ -17,7 +17,7 @@ from conformance.mutation.changes import (
     status,
     text,
 )
-from conformance.mutation.messages import Forward, Request, Response
+from conformance.mutation.messages import Forward, Request, Response, unchanged
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import each, gone, says, tree
 from conformance.packs.table1.mutants.soap_responses import (
@@ -39,6 +39,7 @@ from conformance.packs.table1.mutants.soap_responses import (
     wrapper_as_asked,
 )
 
+_SESAME = "open-sesame"
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("soap-basic-profile", "soap")
 
@@ -144,8 +145,9 @@ _mutant("bp-type-case", "media-type-case", "A Content-Type with a capital letter
 _mutant("bp-quoted-charset", "charset-forms", "A charset in quotation marks returns 415.").instead(
     lambda request: posted(request) and '"' in (request.field("Content-Type") or ""), problem(415, "text/xml, please")
 )
-_mutant("bp-no-chunks", "chunked", "A chunked message returns 411.").instead(
-    _in_chunks, problem(411, "a length, please")
+_mutant("bp-token-ignored", "authentication", "SOAP messages need no token.", token=_SESAME)(unchanged)
+_mutant("bp-no-chunks", "chunked", "A chunked message returns 400.").instead(
+    _in_chunks, problem(400, "a length, please")
 )
 _mutant("bp-few-chunks", "chunked", "The robot reads only 8 KiB of a chunked message.").rewritten(
     _in_chunks, _first_part

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import posted, problem, soap, text
+from conformance.mutation.changes import posted, problem, soap, status, text
 from conformance.mutation.messages import Request
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import each, gone, named, says
@@ -44,6 +44,9 @@ def _in_map(request: Request) -> None:
 
 _mutant("soap-pose-not-unit", "pose", "GetPose returns a quaternion with w = 3.").xml(
     _POSE, _first_is("orientation", "w", "3.0")
+)
+_mutant("soap-goal-outcome-untold", "goal-outcome", "The fault of GetGoal has no detail.").xml(
+    soap("GetGoal"), each("detail", gone), status(500)
 )
 _mutant("soap-velocity-nan", "velocity", "GetVelocity returns NaN.").xml(_VELOCITY, _first_is("linear", "x", "NaN"))
 _mutant("soap-sensors-short-types", "sensors", "GetSensors returns types without /msg/.").altered(

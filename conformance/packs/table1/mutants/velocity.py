@@ -171,7 +171,7 @@ _mutant(
     "While a goal is active, PUT of a velocity returns 204 without any effect.",
 ).made(_while_goal(plain(204)))
 _mutant(
-    "velocity-one-at-once", "velocity-range", "Near both limits at once, the robot drives at half the linear velocity."
+    "velocity-one-at-once", "velocity-both", "Near both limits at once, the robot drives at half the linear velocity."
 ).made(secretly(lambda request: min(_shares(request)) >= 0.7, inputs(field("linear.x", scaled(0.5)))))
 _mutant(
     "velocity-deadband", "velocity-range", "The robot accepts velocities below 0.05 m/s or rad/s and stands still."

@@ -1,5 +1,6 @@
 """Measure how fast a robot's clock runs, by comparing its odometry stamps with the local clock."""
 
+from email.utils import parsedate_to_datetime
 from statistics import median
 from typing import Final
 
@@ -25,6 +26,19 @@ class Clock:
         self._readings: list[tuple[float, float]] = []
         self._every = _EVERY_S
         self._first: list[tuple[float, float]] = []
+        self._ahead: list[float] = []
+
+    def dated(self, stamp: float, date: str) -> None:
+        """Add a response's stamp, s, and its ``Date`` field; one that is no date does not count."""
+        try:
+            self._ahead = [*self._ahead[-_MOST:], stamp - parsedate_to_datetime(date).timestamp()]
+        except ValueError:
+            return
+
+    @property
+    def ahead_s(self) -> float | None:
+        """Return how far the stamps are ahead of ``Date``, s, as the median of the last readings; None without any."""
+        return median(self._ahead) if self._ahead else None
 
     def take(self, at: float, stamp: float) -> None:
         """Add a reading: the local time and the robot's stamp, s."""

@@ -9,13 +9,12 @@ from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_trace import Seen
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
 from conformance.packs.table1.robot.message_shapes import read_as
-from conformance.packs.table1.robot.probe.client import Probe, ProbeError, RosProbe
+from conformance.packs.table1.robot.probe.client import ARRIVES_S, Probe, ProbeError, RosProbe
 from conformance.packs.table1.robot.robot import ACCEPT_JSON, DELIVERIES
 from conformance.packs.table1.statement import said_of
 from conformance.transport.client import Connection, HttpClient
 
-# How long messages are waited for, and how long after the last one another is still looked for, s.
-_ARRIVES_S: Final = 2.0
+# How long after the last message another is still looked for, s.
 QUIET_S: Final = 0.15
 _STEP_S: Final = 0.02
 
@@ -64,7 +63,7 @@ class ListObserver:
 
     def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
         """Return the new entries of the list."""
-        patience = Patience(self._rest.connection.pace, _ARRIVES_S + 4 * self._slow_s, self._clock)
+        patience = Patience(self._rest.connection.pace, ARRIVES_S + 4 * self._slow_s, self._clock)
         for _ in poll(self._clock, _STEP_S, lambda: patience.over):
             listed = self._listed()
             if len(self._new(listed)) >= count:
@@ -124,7 +123,7 @@ class ProbeObserver:
     def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
         """Return the new messages."""
         seen: list[Delivery] = []
-        for _ in poll_for(self._clock, _STEP_S, _ARRIVES_S):
+        for _ in poll_for(self._clock, _STEP_S, ARRIVES_S):
             seen += self._probe.deliveries()
             if len(seen) >= count:
                 break

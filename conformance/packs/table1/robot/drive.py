@@ -1,13 +1,20 @@
-"""Drive a robot by velocity commands and record a trace; drive_rules judges the trace."""
+"""Drive a robot by velocity commands and record a trace; drive_rules judges the trace.
+
+Over 300 lines because the commands, the looks and the waits of a drive share one trace.
+"""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from http import HTTPStatus
 from typing import Final
 
+from conformance.observe.clock import WALL_CLOCK
 from conformance.packs.table1.robot import drive_rules, windows
 from conformance.packs.table1.robot.drive_trace import ALL, Command, Reach, Sighting, Trace, Turn
 from conformance.packs.table1.robot.letting_go import COUNTED_ON_S, certain_s
+from conformance.packs.table1.robot.renewing import Renewing
 from conformance.packs.table1.robot.robot import STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.windows import SEVERAL
 from conformance.scenarios.scenario import NotPossibleError
@@ -17,8 +24,12 @@ from conformance.transport.exchange import Exchange
 _PACE_S: Final = 0.02
 # A velocity of which too few samples are seen is looked at for so much longer, s.
 _LONGER_S: Final = 1.0
+# Of the hold time: a look that takes longer makes a renewal late.
+_LOOK_SHARE: Final = 0.25
 # So many requests are a look.
 _LOOK: Final = 3
+# How often a stop is tried whose response is late.
+_STOPS: Final = 3
 # How often it is begun anew to reach a velocity that was renewed too late, so that it may have ended before.
 _LAPSES: Final = 2
 
@@ -34,6 +45,7 @@ class Drive:
         self.robot, self.clock = robot, robot.clock
         self.trace = Trace(self.clock.now())
         self._turn_at = 0.0
+        self._crowded = False
 
     def command(self, velocity: Velocity, *, integers: bool = False) -> bool:
         """PUT a velocity; return whether the response conforms to the contract.
@@ -100,6 +112,29 @@ class Drive:
         hold_s = self.robot.limits.hold_s
         return hold_s is not None and self.look_s > hold_s
 
+    @property
+    def paces(self) -> bool:
+        """Return whether a velocity must be renewed beside the looks, as a look takes too long to renew it between two.
+
+        Not where the robot limits the rate of requests, or answers several at once more slowly.
+        """
+        hold_s = self.robot.limits.hold_s
+        # Whoever simulates the clock does so in one thread.
+        if hold_s is None or self._crowded or self.clock is not WALL_CLOCK:
+            return False
+        return self.look_s > _LOOK_SHARE * hold_s and self.robot.rest.connection.request_rate is None
+
+    @contextmanager
+    def renewing(self, command: Command) -> Iterator[Renewing]:
+        """Renew a command beside all that is done in the context, and record the renewals at its end."""
+        paced = Renewing(self.robot, command)
+        try:
+            with paced:
+                yield paced
+        finally:
+            self.trace = replace(self.trace, commands=(*self.trace.commands, *paced.commands))
+            self._crowded = self._crowded or paced.is_crowded
+
     def refresh(self, velocity: Velocity) -> None:
         """Command a velocity again, and wait until the robot reaches it if it had ended in the meantime."""
         self.command(velocity)
@@ -117,19 +152,28 @@ class Drive:
         self.trace = self.trace.looked(Turn(odometry, at, velocity, exchange, *self.robot.linear()))
         return velocity, exchange
 
-    def _glance(self) -> None:
+    def glance(self) -> None:
         """GET the velocity alone, which is faster than a whole look."""
         at = self.clock.now()
         velocity, exchange = self.robot.velocity()
         self.trace = self.trace.looked(Turn(None, at, velocity, exchange, None, exchange))
 
     def stop(self, moving: Velocity) -> bool:
-        """Renew a velocity, then command zero; return whether the command stops the robot, and not its watchdog."""
-        if not self.command(moving) or not self.command(STILL):
-            return False
+        """Renew a velocity, then command zero; return whether the command stops the robot, and not its watchdog.
+
+        The time counts from sending. Where the response is late, the request may have been late on its way as well: so
+        again.
+        """
         hold_s, settle_s = self.robot.limits.hold_s, self.robot.limits.settle_s
         within = max(1.1 * settle_s, 0.9 * hold_s) if hold_s is not None else self.robot.settle_s
-        return self.reach(STILL, "safety/stop", within=within)
+        for _ in range(_STOPS):
+            if not self.command(moving) or not self.command(STILL):
+                return False
+            last = self.trace.commands[-1]
+            if not self.robot.is_late(last.exchange):
+                break
+        since = self.robot.arrived_by(last.exchange, last.answered)
+        return self.reach(STILL, "safety/stop", within=within, since=since)
 
     def reach(
         self, wanted: Velocity, *ids: str, part: slice = ALL, within: float | None = None, since: float | None = None
@@ -146,7 +190,9 @@ class Drive:
             within: time allowed, s; by default the settle time.
             since: start of that time, s of the run's clock; by default the response to the last command.
         """
-        limits = self.robot.limits
+        limits, last = self.robot.limits, self.trace.last_command
+        if wanted != STILL and last is not None and self.paces:
+            return self._reach_paced(wanted, ids, part, last)
         patience = min(self.robot.settle_s, within or self.robot.settle_s)
         begun = self.trace.answered if since is None else since
         first = len(self.trace.turns)
@@ -178,7 +224,41 @@ class Drive:
             if there or (now > until and decided) or now > until + _LONGER_S:
                 break
         counted = settled if not there and windows.newest(late) else begun
-        outlasted = not there and wanted != STILL and self._outlasts_hold
+        if wanted == STILL:
+            # By the time of such a response the watchdog may have stopped the robot, and the command did not.
+            outlasted = bool(there) and within is not None and self.trace.answered > begun + patience
+        else:
+            outlasted = not there and self._outlasts_hold
+        reach = Reach(ids, wanted, part, counted, len(self.trace.turns), bool(there), outlasted)
+        self.trace = replace(self.trace, reaches=(*self.trace.reaches, reach))
+        return bool(there)
+
+    def _reach_paced(self, wanted: Velocity, ids: tuple[str, ...], part: slice, last: Command) -> bool:
+        """Look as reach() does, while the last command is renewed beside the looks; begin anew where that was too late.
+
+        A velocity that is reached shows that it was renewed in time. One that is not reached proves nothing where a
+        renewal may have come too late.
+        """
+        limits, count, begun = self.robot.limits, SEVERAL if ids else 1, last.answered
+        for _ in range(1 + _LAPSES):
+            until, first = begun + self.robot.settle_s, len(self.trace.turns)
+            settled = min(until, begun + limits.settle_s + self.robot.sample_s)
+            with self.renewing(last) as renewing:
+                while True:
+                    self.look()
+                    turns = self.trace.turns[first:]
+                    there = windows.shown(limits, turns, wanted, part=part, count=count)
+                    late = [turn for turn in turns if turn.at >= settled]
+                    decided = windows.shown(limits, late, wanted, part=part, count=count) is not None
+                    now = self.clock.now()
+                    if there or (now > until and decided) or now > until + _LONGER_S:
+                        break
+            lasted = renewing.lasted(self.trace.turns[-1].at)
+            if there or lasted:
+                break
+            begun = self.clock.now()
+            last = replace(last, sent=begun, answered=begun)
+        counted, outlasted = begun if there else settled, not there and not lasted
         reach = Reach(ids, wanted, part, counted, len(self.trace.turns), bool(there), outlasted)
         self.trace = replace(self.trace, reaches=(*self.trace.reaches, reach))
         return bool(there)
@@ -201,7 +281,7 @@ class Drive:
         first = len(self.trace.turns)
         last = self.clock.now() + _LONGER_S
         while True:
-            self._glance() if alone else self.look()
+            self.glance() if alone else self.look()
             turns, now = self.trace.turns[first:], self.clock.now()
             holds = windows.verdict(self.robot.limits, turns, wanted, factor, part)
             if not holds and now > until:
@@ -231,7 +311,7 @@ class Drive:
     @property
     def whole(self) -> Trace:
         """Return the trace of a finished drive in which the pose is to be judged as well."""
-        return replace(self.trace, outlasted=self._outlasts_hold)
+        return replace(self.trace, outlasted=self._outlasts_hold and not self.paces)
 
 
 def _renewed_s(hold_s: float, settle_s: float) -> float:

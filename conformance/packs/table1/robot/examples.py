@@ -4,9 +4,10 @@ from collections.abc import Callable
 from typing import Any
 
 from conformance.api.rest.interface import RestInterface
+from conformance.packs.table1.robot.abilities import drivable
 from conformance.packs.table1.robot.geometry import Pose, quaternion_of
 from conformance.packs.table1.robot.plan import reachable
-from conformance.packs.table1.robot.robot import Robot
+from conformance.packs.table1.robot.robot import Robot, Velocity
 from conformance.packs.table1.statement import Statement
 
 # Far enough to be on the way for a while, near enough to be inside every room; nearer where there is no room.
@@ -44,14 +45,18 @@ class Examples:
 
     def _velocity(self, _: RestInterface, value: dict[str, Any]) -> dict[str, Any]:
         sign = self._direction()
-        return {part: self._slow(part, axes, sign) for part, axes in value.items()}
+        slow = {part: self._slow(part, axes, sign) for part, axes in value.items()}
+        return Velocity(*drivable(self._statement.limits, self._statement.motion, Velocity.of(slow))).twist
 
     def _linear(self, _: RestInterface, value: dict[str, Any]) -> dict[str, Any]:
-        return self._slow("linear", value, self._direction())
+        slow = {"linear": self._slow("linear", value, self._direction()), "angular": dict.fromkeys("xyz", 0.0)}
+        return Velocity(*drivable(self._statement.limits, self._statement.motion, Velocity.of(slow))).linear
 
     def _slow(self, part: str, axes: dict[str, float], sign: int) -> dict[str, float]:
         limits = self._statement.limits
-        most = min(_SLOW_M_S, (limits.linear_m_s if part == "linear" else limits.angular_rad_s) / 2)
+        # Half of the limit also in the direction in which it is lower, if there is any.
+        ranges = [limits.range_of(index) for index in ((0, 1, 2) if part == "linear" else (3, 4, 5))]
+        most = min(_SLOW_M_S, *(min(filter(None, map(abs, each)), default=0.0) / 2 for each in ranges))
         actuated = self._statement.motion.actuated
         return {
             axis: sign * max(-most, min(most, float(speed))) if f"{part}.{axis}" in actuated and speed else 0.0

@@ -39,8 +39,10 @@ class Pose(NamedTuple):
 
 
 def middle_of(poses: Sequence[Pose]) -> Pose:
-    """Return the medians of x and y with the last heading, so that a few wrong readings do not count."""
-    return Pose(median(one.x for one in poses), median(one.y for one in poses), poses[-1].yaw)
+    """Return the medians of x, y and heading, so that a few wrong readings do not count."""
+    yaw = poses[-1].yaw
+    turned = median(wrapped(one.yaw - yaw) for one in poses)
+    return Pose(median(one.x for one in poses), median(one.y for one in poses), wrapped(yaw + turned))
 
 
 def wrapped(angle: float) -> float:

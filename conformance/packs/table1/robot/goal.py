@@ -4,10 +4,10 @@ import math
 from http import HTTPStatus
 from typing import Any, Final
 
-from conformance.documents.json_text import shown
+from conformance.documents.json_text import read_json, shown
 from conformance.observe.polling import poll
 from conformance.packs.table1.robot.geometry import Pose, quaternion_of
-from conformance.packs.table1.robot.message_shapes import STATUS
+from conformance.packs.table1.robot.message_shapes import LAST_GOAL, STATUS
 from conformance.packs.table1.robot.robot import GOAL_PATH, Robot
 from conformance.transport.exchange import Exchange
 
@@ -17,10 +17,13 @@ REPEATED: Final = frozenset({200, 202, 204})
 CANCELLED: Final = frozenset({200, 202, 204})
 # A media type that a client prefers: whatever that is, a goal is cancelled.
 RATHER_XML: Final = ("Accept", "application/xml, */*;q=0.1")
+SUCCEEDED: Final = 4
+CANCELED: Final = 5
 ACTIVE: Final = frozenset({1, 2, 3})
 _STEP_S: Final = 0.02
 _CLOSE: Final = 1e-6
-_ARRIVED_M: Final = 0.35
+# A robot so near its goal may end the goal while the suite asks: its tolerance, and what it drives in the meantime, m.
+_ARRIVED_M: Final = 0.1
 
 
 def goal_body(pose: Pose, frame: str, id_: str | None = None, *, length: float = 1.0) -> dict[str, Any]:
@@ -79,6 +82,24 @@ def status_fault(goal: Any) -> str:
     return "" if code in ACTIVE else f"status.code {code:g}"
 
 
+def outcome_fault(exchange: Exchange, code: int, id_: str | None = None) -> str:
+    """Return what is wrong with the last goal in a problem document, or an empty text.
+
+    Args:
+        exchange: a GET of the goal that was answered 404.
+        code: the status with which the goal ended (action_msgs/GoalStatus).
+        id_: the goal's id; None: any.
+    """
+    problem = read_json(exchange.response.body).value
+    last: Any = problem.get("last_goal") if isinstance(problem, dict) else None
+    wrong = "no member last_goal" if last is None else LAST_GOAL.problem(last, "last_goal")
+    if wrong:
+        return wrong
+    if id_ not in {None, last["goal_id"]["id"]}:
+        return f"last_goal.goal_id.id {shown(last['goal_id']['id'])}"
+    return "" if last["status"]["code"] == code else f"last_goal.status.code {last['status']['code']:g}"
+
+
 def await_goal(robot: Robot, *put: dict[str, Any]) -> tuple[Any, str, Exchange]:
     """GET the active goal until it is one of those that were PUT, for at most the time the robot has to apply commands.
 
@@ -107,7 +128,7 @@ def await_none(robot: Robot, seconds: float | None = None) -> Exchange:
 def arrived(robot: Robot, pose: Pose) -> bool:
     """Return whether the robot is so near a goal that the goal may have ended."""
     here = robot.map_pose()
-    return here is None or here.distance(pose) < _ARRIVED_M
+    return here is None or here.distance(pose) < robot.limits.arrival[0] + _ARRIVED_M
 
 
 def put_goal(robot: Robot, body: dict[str, Any]) -> Exchange:

@@ -66,12 +66,14 @@ class Cancelled:
         read: the last GET of the goal.
         gone: whether the robot had no goal in the end.
         drive: the readings while the suite waited for the robot to stand still.
+        late: whether the response to the DELETE took longer than usual.
     """
 
     exchange: Exchange
     read: Exchange
     gone: bool
     drive: Trace
+    late: bool = False
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,7 @@ class GoalLife:
         second: the PUT of another goal without an id.
         renamed: whether the robot accepted the second goal only with an id; None: it accepted it without one.
         cancelled: DELETEs of the active goal; empty: the goal had ended before.
+        cancels: all DELETEs that were sent while a goal was active, also where the goal had ended when they arrived.
     """
 
     none: tuple[NoGoal, ...] = ()
@@ -101,6 +104,7 @@ class GoalLife:
     second: Put | None = None
     renamed: bool | None = None
     cancelled: tuple[Cancelled, ...] = ()
+    cancels: tuple[Exchange, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -113,10 +117,12 @@ class GoalReached:
         here: the robot's last pose.
         way_m: distance driven, m; has_to_m: least distance that counts as driving, m.
         left_m: distance left to the target, m; reached_m: distance that counts as reached, m.
+        off_rad: difference left to the target's heading, rad; reached_rad: difference that counts as reached, rad, or
+            None if the robot cannot turn.
         drive: all readings on the way.
         read: the last GET of the goal.
         ended: whether the robot had no goal any more.
-        undecided: whether the robot was still driving when the time was over.
+        undecided: whether the robot still made progress when the time was over.
         turned: a drive after the goal that shows whether the robot resumes a velocity from before it; or None.
         start: where a plan begins after the goal; or None.
         again: the PUT of the same goal after it had ended; or None.
@@ -129,6 +135,8 @@ class GoalReached:
     has_to_m: float = 0.0
     left_m: float = 0.0
     reached_m: float = 0.0
+    off_rad: float = 0.0
+    reached_rad: float | None = None
     drive: Trace | None = None
     read: Exchange | None = None
     ended: bool = False
@@ -136,6 +144,11 @@ class GoalReached:
     turned: Trace | None = None
     start: Start | None = None
     again: Exchange | None = None
+
+    @property
+    def arrived(self) -> bool:
+        """Return whether the robot's last pose is within the tolerances of the target."""
+        return self.left_m < self.reached_m and (self.reached_rad is None or abs(self.off_rad) < self.reached_rad)
 
 
 @dataclass(frozen=True)

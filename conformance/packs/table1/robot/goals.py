@@ -9,11 +9,14 @@ from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import await_none, goal_body, put_goal
 from conformance.packs.table1.robot.plan import EXACT, ask, reachable
 from conformance.packs.table1.robot.robot import Robot
-from conformance.scenarios.scenario import NotPossibleError
+from conformance.scenarios.scenario import NoOccasionError
 
 # How far velocities may take a robot: aside, and straight ahead, m.
 _NEAR_M: Final = 0.4
 _FAR_M: Final = 0.7
+# Who cannot drive back needs so many times the room ahead; in a circle, so many radii aside.
+_ONE_WAY: Final = 2.0
+_CIRCLE: Final = 2.2
 _PLACES: Final = 8
 # How far away open places are looked for: the nearest first, for the way there takes time.
 _DISTANCES_M: Final = (0.3, 0.5, 0.8, 1.5, 2.5)
@@ -38,7 +41,7 @@ def choose_goals(robot: Robot, distance: float, count: int) -> list[Pose]:
         goals = [here.ahead(reach)]
         _, _, exchange = ask(robot, goals[0])
         if HTTPStatus.BAD_REQUEST <= exchange.response.status < HTTPStatus.INTERNAL_SERVER_ERROR:
-            raise NotPossibleError("the robot has no plan to any pose around it")
+            raise NoOccasionError("the robot has no plan to any pose around it")
     for part in range(1, count):
         if len(goals) < count:
             goals.append(_on_the_way(robot, here, goals[0], 1 - part / (count + 1)) or _turned(goals[0], part))
@@ -75,7 +78,7 @@ def meanwhile(robot: Robot, id_: str, act: Callable[[dict[str, Any], Pose, dict[
     for number in range(_ATTEMPTS):
         try:
             pose, other = choose_goals(robot, _FARTHEST_M, 2)
-        except NotPossibleError:
+        except NoOccasionError:
             return False  # what was judged before stays judged
         body, against = (goal_body(one, frame, f"{id_} {number}") for one in (pose, other))
         if not put_goal(robot, body).response.ok:
@@ -97,11 +100,12 @@ def make_room(robot: Robot, ahead_m: float = _FAR_M) -> None:
         ahead_m: how far checks will drive it ahead or back, m; sideways they need only a few decimetres.
     """
     here = robot.map_pose()
-    if here is None or _is_open(robot, here, min(max(ahead_m, _NEAR_M), _FAR_M)):
+    far = _FAR_M if robot.reverses else _ONE_WAY * _FAR_M
+    if here is None or _is_open(robot, here, min(max(ahead_m, _NEAR_M), _FAR_M) if robot.reverses else far):
         return
     for distance in _DISTANCES_M:
         for pose in reachable(robot, here, distance, _PLACES):
-            if _is_open(robot, pose, _FAR_M):
+            if _is_open(robot, pose, far):
                 exchange = put_goal(robot, goal_body(pose, robot.statement.motion.frame))
                 if exchange.response.ok:
                     await_none(robot, _ARRIVES_S)
@@ -112,7 +116,9 @@ def make_room(robot: Robot, ahead_m: float = _FAR_M) -> None:
 
 def _is_open(robot: Robot, pose: Pose, ahead_m: float) -> bool:
     """Return whether the robot has straight plans from a pose in all directions, ``ahead_m`` long ahead and back."""
-    around = [pose.ahead(_NEAR_M, math.radians(angle)) for angle in range(60, 360, 60)]
+    # In a circle a robot comes twice its radius aside.
+    aside = max(_NEAR_M, _CIRCLE * (robot.statement.motion.min_radius_m or 0.0))
+    around = [pose.ahead(aside, math.radians(angle)) for angle in range(60, 360, 60)]
     for there in (pose.ahead(ahead_m), pose.ahead(-ahead_m), *around):
         _, plan, _ = ask(robot, there, pose)
         if plan is None or plan.length > 1.2 * pose.distance(there) + 0.1 or not robot.in_arena(there):

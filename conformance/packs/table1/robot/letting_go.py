@@ -50,6 +50,8 @@ class LetGo:
         answered: when its response arrived.
         turns: the readings since.
         resumed: the first reading after a pause without requests; None: there was no pause.
+        due: when the pause was to end, s of the run's clock; None: there was no pause.
+        by_linear: whether the last command was a PUT of the linear part.
     """
 
     velocity: Velocity
@@ -57,6 +59,13 @@ class LetGo:
     answered: float
     turns: tuple[Turn, ...]
     resumed: int | None = None
+    due: float | None = None
+    by_linear: bool = False
+
+    @property
+    def command(self) -> str:
+        """Return what commanded the velocity, as a noun phrase."""
+        return "a PUT of its linear part" if self.by_linear else "a PUT of the velocity"
 
     def holds_by(self, limits: Limits, count: int) -> bool | None:
         """Return whether the first ``count`` readings end with the velocity; None where they are too few to tell."""
@@ -75,6 +84,12 @@ class LetGo:
     def rests(self, limits: Limits) -> bool:
         """Return whether the newest samples show the robot at rest."""
         return bool(windows.shown(limits, self.turns[-_LOOKED_AT:], STILL))
+
+    def is_decided(self, limits: Limits, ends: float) -> bool:
+        """Return whether the robot rests, or several samples from after ``ends`` (s of the run's clock) can tell."""
+        samples = windows.newest([turn for turn in self.turns if turn.at > ends])
+        lasts = self.turns[-1].at > ends + windows.SEVERAL * windows.LONGEST_SAMPLE_S
+        return self.rests(limits) or lasts or len(samples) >= windows.SEVERAL
 
     def early(self, limits: Limits) -> Turn | None:
         """Return the first reading in which the velocity ended before its hold time, or None.
@@ -112,9 +127,9 @@ class LetGo:
         return hold + max(0.4 * hold, 0.5 * limits.settle_s, windows.LONGEST_SAMPLE_S) + 2 * period
 
     def is_void(self, limits: Limits) -> bool:
-        """Return whether a response was so slow that the readings prove nothing about the hold time."""
+        """Return whether a response, or the suite, was so slow that the readings prove nothing about the hold time."""
         gap = _GAP * (limits.hold_s or 0.0)
         before, behind = self.turns[: self.resumed], self.turns[len(self.turns[: self.resumed]) :]
         times = [self.full, self.answered, *(turn.at for turn in before)]
-        seen = (times, [turn.at for turn in behind])
+        seen = (times, [*([] if self.due is None else [self.due]), *(turn.at for turn in behind)])
         return any(two - one > gap for part in seen for one, two in itertools.pairwise(part))

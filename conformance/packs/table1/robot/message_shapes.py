@@ -55,6 +55,14 @@ DELIVERIES: Final = Shape(_answer_of("getDeliveries"))
 GOAL: Final = Shape(_without(_GOAL, "status"))
 STATUS: Final = Shape(_GOAL["properties"]["status"])
 GOAL_AND_STATUS: Final = Shape(_GOAL)
+# What is told of a goal that has ended (contract.md#goals).
+LAST_GOAL: Final = Shape(
+    {
+        "type": "object",
+        "required": ["goal_id", "status"],
+        "properties": {name: _GOAL["properties"][name] for name in ("goal_id", "status")},
+    }
+)
 SENSORS: Final = Shape(_with_any_type(_SENSORS))
 SERVICES: Final = Shape(_with_any_type(_SERVICES))
 MESSAGE_TYPE: Final = Shape(_SENSORS["items"]["properties"]["type"])

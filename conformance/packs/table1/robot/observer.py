@@ -175,6 +175,7 @@ class Observer(Listener):
                 cause="old",
             )
         self._clock.take(now - elapsed_ms / 2000, stamp[0] + stamp[1] / 1e9)
+        self._clock.dated(stamp[0] + stamp[1] / 1e9, exchange.response.header("date") or "")
         self._last_stamp = max(stamp, self._last_stamp) if self._last_stamp else stamp
         self._last_received = max(self._last_received, now)
 
@@ -184,8 +185,8 @@ class Observer(Listener):
         samples.add(twist, self._last_stamp)
         linear, angular = limits.tolerance_linear_m_s, limits.tolerance_angular_rad_s
         for part, limit, absolute, noise in (
-            ("linear", limits.linear_m_s, linear, limits.noise.linear_m_s),
-            ("angular", limits.angular_rad_s, angular, limits.noise.angular_rad_s),
+            ("linear", limits.navigation_m_s, linear, limits.noise.linear_m_s),
+            ("angular", limits.navigation_rad_s, angular, limits.noise.angular_rad_s),
         ):
             declared = limits.linear_declared if part == "linear" else limits.angular_declared
             if part not in twist or not declared:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
 from conformance.api.rest.calls import JSON
@@ -15,9 +16,11 @@ from conformance.documents.representation import projected
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.observe.polling import Patience
 from conformance.packs.table1.limits import Limits
+from conformance.packs.table1.robot import abilities
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, body_of, read_as
 from conformance.packs.table1.statement import said_of
+from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
 
 POSE: Final = "/robot/pose/"
@@ -128,6 +131,13 @@ class Robot:
         # How long what must not happen is watched for, in relation to standard effort.
         self.watchfulness = 0.5 if api.run.effort.name == "quick" else 1.0
 
+    def apart(self) -> Robot:
+        """Return the robot for another thread, with connections of its own and without listeners; to be closed."""
+        other = copy(self)
+        settings = replace(self.rest.connection, listeners=[], request_rate=None, resent=0)
+        other.rest = HttpClient(self.rest.base_url, settings)
+        return other
+
     @property
     def limits_declared(self) -> bool:
         """Return whether the statement declares all velocity limits, so that requests beyond them can be made."""
@@ -145,6 +155,19 @@ class Robot:
     def sample_s(self) -> float:
         """Return the longest time between odometry samples, by which two interfaces may differ, s."""
         return 1 / (self.limits.odometry_hz or _SELDOM_HZ)
+
+    def is_late(self, exchange: Exchange) -> bool:
+        """Return whether a response took so much longer than usual that the request may have been late as well."""
+        return self.rest.connection.pace.is_late(exchange.response.elapsed_ms / 1000)
+
+    def arrived_by(self, exchange: Exchange, answered: float) -> float:
+        """Return when a request must have arrived: a usual response time after it was sent, s of the run's clock.
+
+        Args:
+            exchange: the request and its response.
+            answered: when the response came, s of the run's clock. The request did not arrive later than that.
+        """
+        return answered - max(0.0, exchange.response.elapsed_ms / 1000 - self.usual_s)
 
     def patience(self, seconds: float) -> Patience:
         """Return a wait of ``seconds``, not counting the time that the robot's responses take."""
@@ -242,15 +265,20 @@ class Robot:
         return is_near(self.limits, measured, wanted, factor)
 
     def share_of_limits(self, linear: float, angular: float) -> Velocity:
-        """Return a velocity of given shares of the limits; zero in components that the robot cannot move in."""
-        return Velocity(
-            linear_x=linear * self.limits.linear_m_s if self.actuated(0) else 0.0,
-            angular_z=angular * self.limits.angular_rad_s if self.actuated(5) else 0.0,
-        )
+        """Return a velocity of given shares of the limits, as far as the robot can drive it."""
+        return self.drivable(Velocity(linear_x=self._share(0, linear), angular_z=self._share(5, angular)))
 
-    def limit_of(self, component: int) -> float:
-        """Return the limit of a component (index into Velocity), declared or assumed, m/s or rad/s."""
-        return self.limits.linear_m_s if component < len("xyz") else self.limits.angular_rad_s
+    def _share(self, component: int, share: float) -> float:
+        least, greatest = self.limits.range_of(component)
+        return share * ((greatest or -least) if share > 0 else (-least or greatest))
+
+    def drivable(self, velocity: Velocity) -> Velocity:
+        """Return a velocity that the robot can drive by its statement, like this one or instead of it."""
+        return Velocity(*abilities.drivable(self.limits, self.statement.motion, velocity))
+
+    def only(self, component: int, value: float) -> Velocity:
+        """Return a velocity in one component, m/s or rad/s, with what the robot needs beside it to drive it."""
+        return self.drivable(Velocity(*(value if index == component else 0.0 for index in range(6))))
 
     def limit_declared(self, component: int) -> bool:
         """Return whether the statement declares the limit of a component."""
@@ -258,4 +286,9 @@ class Robot:
 
     def actuated(self, component: int) -> bool:
         """Return whether the statement says that the robot can move in a component."""
-        return Velocity._fields[component].replace("_", ".") in self.statement.motion.actuated
+        return abilities.actuated(self.statement.motion, component)
+
+    @property
+    def reverses(self) -> bool:
+        """Return whether the robot can drive back."""
+        return self.limits.range_of(0)[0] < 0

@@ -17,9 +17,6 @@ from conformance.packs.table1.robot.robot import GOAL_PATH, STILL, Robot
 from conformance.packs.table1.robot.standstill_trace import Attempt, Rest, Standing
 from conformance.packs.table1.robot.stopping import bring_to_rest, halt
 
-# How many times the tolerance a robot at rest may be off.
-_OFF = 2
-
 
 @dataclass(frozen=True)
 class _Waiting:
@@ -137,7 +134,7 @@ class Standstill:
 
 def read_rest(drive: Drive, after: str, *, goal: bool = False) -> Rest:
     """Read whether the robot is at rest, and with ``goal`` also whether it has a goal."""
-    still, seen = drive.sees(STILL, _OFF)
+    still, seen = drive.sees(STILL)
     exchange = drive.trace.turns[-1].velocity_exchange
     if still is False:
         return Rest(after, exchange, f"the velocity ({seen})")
@@ -158,4 +155,4 @@ def watch_rest(drive: Drive, after: str, seconds: float, *, goal: bool = False) 
 
 
 def _stays(drive: Drive) -> bool | None:
-    return drive.sees(STILL, _OFF)[0]
+    return drive.sees(STILL)[0]

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from conformance.scenarios.rule import Case
+from conformance.scenarios.rule import Case, NotTested
 from conformance.transport.exchange import Exchange
 
 
@@ -57,16 +57,24 @@ class Standing:
     attempts: tuple[Attempt, ...]
 
 
-def stays(trace: tuple[Standing, ...], requirement: str) -> Iterator[Case]:
+def stays(trace: tuple[Standing, ...], requirement: str) -> Iterator[Case | NotTested]:
     """Yield the cases of a requirement: the robot stays at rest after the attempts for that requirement.
 
     Where the robot moved in the common watch, and no attempt moved it when repeated, any of the attempts may have
-    caused the motion: all of them fail.
+    caused the motion, and so may a push. That is one failure: it counts for the first attempt, and the others are not
+    tested.
     """
     for one in trace:
         mine = [attempt for attempt in one.attempts if attempt.requirement == requirement]
         for attempt in mine:
             yield from (rest.case for rest in attempt.alone)
         if not any(rest.found for attempt in one.attempts for rest in attempt.alone):
-            rest = one.rest
-            yield from (Rest(attempt.after, rest.exchange, rest.found).case for attempt in mine)
+            rest, first = one.rest, one.attempts[0]
+            if not rest.found or first.requirement == requirement:
+                after = " and after ".join(dict.fromkeys(one.after for one in one.attempts)) if rest.found else ""
+                yield from (Rest(after or attempt.after, rest.exchange, rest.found).case for attempt in mine)
+            elif mine:
+                yield NotTested(
+                    "the robot moved once after several attempts, and none of them moved it when repeated alone: "
+                    f"this counts for {first.requirement}"
+                )

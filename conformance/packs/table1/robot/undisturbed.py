@@ -51,10 +51,14 @@ def renewed(robot: Robot, drive: Drive, turning: Velocity) -> bool:
     for _ in range(_RENEWED_TRIES):
         drive.command(STILL)
         takes_s = robot.limits.settle_s + robot.sample_s
-        if robot.usual_s > _QUICK_S and takes_s < times.seen_s:
+        if drive.paces or (robot.usual_s > _QUICK_S and takes_s < times.seen_s):
             # Reached while it is renewed: who looks for it first, at three slow answers a look, renews it too late.
             drive.command(turning)
-            lasts, found = _renew(robot, drive, turning, times, (), drive.trace.answered + takes_s)
+            reached = drive.trace.answered + takes_s
+            if drive.paces:
+                lasts, found = _renew_beside(drive, turning, max(drive.trace.sent + times.seen_s, reached))
+            else:
+                lasts, found = _renew(robot, drive, turning, times, (), reached)
         else:
             drive.refresh(turning)
             lasts, found = _renew(robot, drive, turning, times, ())
@@ -130,6 +134,16 @@ def _renew(
     return lasts, found
 
 
+def _renew_beside(drive: Drive, turning: Velocity, seen: float) -> tuple[bool | None, str]:
+    """Renew the last command beside a look at the time ``seen``, s of the run's clock; return what _renew() returns."""
+    with drive.renewing(drive.trace.commands[-1]) as renewing:
+        drive.clock.sleep(seen - drive.clock.now())
+        lasts, found = drive.sees(turning, 2, alone=True)
+    if not lasts and not renewing.lasted(drive.trace.turns[-1].at):
+        lasts = None
+    return lasts, found
+
+
 def _refused(robot: Robot, drive: Drive, turning: Velocity) -> None:
     """Send velocities that the robot must reject, and record whether it turns as before."""
     for bad in _BAD:
@@ -144,17 +158,18 @@ def _refused(robot: Robot, drive: Drive, turning: Velocity) -> None:
     drive.saw("safety/refused-keeps", expected, found, "changed", holds=keeps)
 
 
-def arc(robot: Robot, drive: Drive, bent: Velocity) -> None:
-    """PUT the linear part, ahead and then back, and record whether the angular part stays.
+def arc(robot: Robot, drive: Drive, bent: Velocity, before: Velocity) -> None:
+    """PUT two linear parts, one after the other, and record whether the angular part stays.
 
     Args:
         robot: the robot.
         drive: a drive of that robot.
         bent: the velocity at the end.
+        before: the first linear part.
     """
     back = bent._replace(angular_z=0.0)
     drive.refresh(bent)
-    if not drive.command_linear(Velocity(linear_x=-back.linear_x)):
+    if not drive.command_linear(before):
         return
     for attempt in range(_TRIES):
         if attempt or robot.usual_s > _QUICK_S:

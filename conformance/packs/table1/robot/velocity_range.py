@@ -2,40 +2,74 @@
 
 from typing import Final
 
+from conformance.packs.table1.robot.abilities import ABOUT, AHEAD, handiest
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import FARTHEST, Robot, Velocity
 
 # Where no limits are declared the robot may be slower than the figures that it is judged by.
 _UNDECLARED: Final = 0.6
+# A drive needs more room than a turn: so much of the share.
+_SLOWER: Final = 0.5
 # So many times as fast as what may still be rest, by its tolerance and its noise, a robot does not rest.
 _MOVES: Final = 1.6
 
 
 def slowest(robot: Robot) -> Velocity:
     """Return a velocity ahead and to the left that just differs from rest, at most half of the limits."""
-    limits = robot.limits
-    linear = _MOVES * (limits.tolerance_linear_m_s + FARTHEST * limits.noise.linear_m_s)
-    angular = _MOVES * (limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s)
-    return Velocity(
-        linear_x=min(linear, 0.5 * fastest(robot, 0)) if robot.actuated(0) else 0.0,
-        angular_z=min(angular, 0.5 * fastest(robot, 5)) if robot.actuated(5) else 0.0,
-    )
+    return robot.drivable(Velocity(linear_x=_slowest(robot, AHEAD), angular_z=_slowest(robot, ABOUT)))
 
 
-def fastest(robot: Robot, component: int) -> float:
-    """Return the highest speed that the suite commands in one component, m/s or rad/s."""
-    return robot.limit_of(component) * (1.0 if robot.limit_declared(component) else _UNDECLARED)
+def slowest_along(robot: Robot, component: int) -> Velocity:
+    """Return a velocity in one component that just differs from rest, at most half of its limit."""
+    return robot.only(component, _slowest(robot, component))
 
 
-def reach(drive: Drive, velocity: Velocity) -> bool:
-    """Command a velocity in the declared range; return whether the robot accepts and reaches it."""
+def _slowest(robot: Robot, component: int) -> float:
+    limits, noise = robot.limits, robot.limits.noise
+    linear = component < len("xyz")
+    tolerance = limits.tolerance_linear_m_s if linear else limits.tolerance_angular_rad_s
+    off = tolerance + FARTHEST * (noise.linear_m_s if linear else noise.angular_rad_s)
+    return min(_MOVES * off, 0.5 * fastest(robot, component))
+
+
+def fastest(robot: Robot, component: int, sign: int = 1) -> float:
+    """Return the extreme velocity that the suite commands in one component and direction, m/s or rad/s.
+
+    It is 0 where the robot does not move in that direction.
+    """
+    least, greatest = robot.limits.range_of(component)
+    return (greatest if sign > 0 else least) * (1.0 if robot.limit_declared(component) else _UNDECLARED)
+
+
+def handy(robot: Robot, share: float) -> Velocity:
+    """Return a velocity by which a robot moves with little room: a share of the limit of turning, or else of driving.
+
+    A robot that cannot turn without driving turns in its narrowest circle.
+    """
+    component = handiest(robot.statement.motion)
+    least, greatest = robot.limits.range_of(component)
+    part = 1.0 if component >= len("xyz") else _SLOWER
+    return robot.only(component, part * share * ((greatest or -least) if share > 0 else (-least or greatest)))
+
+
+def both(robot: Robot) -> Velocity:
+    """Return the fastest turn to the left beside the fastest drive, as far as the statement says how they depend."""
+    return robot.drivable(Velocity(linear_x=fastest(robot, AHEAD, direction(robot)), angular_z=fastest(robot, ABOUT)))
+
+
+def reach(drive: Drive, velocity: Velocity, *ids: str) -> bool:
+    """Command a velocity in the declared range; return whether the robot accepts and reaches it.
+
+    ``ids`` are the requirements that say so; by default those on every velocity that the robot can drive.
+    """
     if not drive.command(velocity):
-        drive.refused("rest-resources/velocity-range", f"2xx for {velocity}, which is within the declared limits")
+        expected = f"2xx for {velocity}, which is within the declared limits"
+        drive.refused(ids[0] if ids else "rest-resources/velocity-range", expected)
         return False
-    return drive.reach(velocity, "rest-resources/velocity-converges", "rest-resources/velocity-range")
+    return drive.reach(velocity, *(ids or ("rest-resources/velocity-converges", "rest-resources/velocity-range")))
 
 
 def direction(robot: Robot) -> int:
-    """Return 1 (ahead) where the arena has room ahead, else -1 (back)."""
+    """Return 1 (ahead) where the arena has room ahead or the robot has no reverse gear, else -1 (back)."""
     pose = robot.map_pose()
-    return 1 if pose is None or robot.in_arena(pose.ahead(robot.limits.linear_m_s)) else -1
+    return 1 if pose is None or not robot.reverses or robot.in_arena(pose.ahead(robot.limits.linear_m_s)) else -1

@@ -46,43 +46,48 @@ class VelocityMachine(RuleBasedStateMachine):
     @rule(forward=st.booleans(), left=st.booleans(), linear=_SHARES, angular=_SHARES, which=st.sampled_from("ab2"))
     def command(self, *, forward: bool, left: bool, linear: float, angular: float, which: str) -> None:
         """Command a velocity within the limits, which the robot must reach."""
-        ahead = self._ahead(linear, forward=forward) if which in "a2" else 0.0
-        turn = angular * _ANGULAR_SHARE * self._robot.limits.angular_rad_s * (1 if left else -1) if which in "b2" else 0
-        self._walk.step(lambda: self._full(Velocity(linear_x=ahead, angular_z=turn if self._robot.actuated(5) else 0)))
+        robot = self._robot
+        turn = robot.share_of_limits(0.0, angular * _ANGULAR_SHARE * (1 if left else -1)).angular_z
+        in_circles = bool(robot.statement.motion.min_radius_m)
+        ahead = self._ahead(linear, forward=forward) if which in "a2" or in_circles else 0.0
+        wanted = Velocity(linear_x=ahead, angular_z=turn if which in "b2" and (ahead or not in_circles) else 0.0)
+        self._walk.command(lambda: self._full(robot.drivable(wanted)))
 
     @rule()
     def stop(self) -> None:
         """Command zero velocity."""
-        self._walk.step(lambda: self._full(STILL))
+        self._walk.command(lambda: self._full(STILL))
 
     @rule(forward=st.booleans(), linear=_SHARES)
     def command_linear(self, *, forward: bool, linear: float) -> None:
         """PUT a linear part; the robot must keep the angular part."""
-        self._walk.step(lambda: self._linear(self._ahead(linear, forward=forward)))
+        self._walk.command(lambda: self._linear(self._ahead(linear, forward=forward)))
 
     @precondition(lambda self: self._wanted != STILL)
     @rule(component=st.integers(0, 5), times=st.sampled_from((1.0, -1.0)))
     def refused(self, component: int, times: float) -> None:
         """PUT a velocity beyond the limits; the robot must reject it and drive on as before."""
-        self._walk.step(lambda: self._refuse(component, times))
+        self._walk.command(lambda: self._refuse(component, times))
 
     def _ahead(self, share: float, *, forward: bool) -> float:
-        if not self._robot.actuated(0):
-            return 0.0
-        trace = self._drive.trace.odometry
-        sign = 1 if forward else -1
+        trace, robot = self._drive.trace.odometry, self._robot
+        sign = 1 if forward or not robot.reverses else -1
         if trace and trace[0].pose.distance(trace[-1].pose) > _LEASH_M:
             step = trace[-1].pose.ahead(0.1 * sign)
-            sign = sign if step.distance(trace[0].pose) < trace[-1].pose.distance(trace[0].pose) else -sign
-        return sign * share * _LINEAR_SHARE * self._robot.limits.linear_m_s
+            if step.distance(trace[0].pose) >= trace[-1].pose.distance(trace[0].pose):
+                # Whoever cannot drive back has to turn first.
+                sign = -sign if robot.reverses else 0
+        return robot.share_of_limits(sign * share * _LINEAR_SHARE, 0.0).linear_x
 
     def _full(self, wanted: Velocity) -> bool:
         self._wanted = wanted
         return self._drive.command(wanted) and self._drive.reach(wanted, "rest-resources/velocity-converges")
 
     def _linear(self, ahead: float) -> bool:
-        self._drive.refresh(self._wanted)
         wanted = self._wanted._replace(linear_x=ahead)
+        if self._robot.drivable(wanted) != wanted:
+            return True  # too narrow a circle for the angular part, or too fast a curve
+        self._drive.refresh(self._wanted)
         if not self._drive.command_linear(wanted):
             return False
         self._wanted = wanted

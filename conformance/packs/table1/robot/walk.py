@@ -1,4 +1,4 @@
-"""State shared by the random walks of a check: they end by a failure, an unreachable robot, or a deadline."""
+"""State shared by the random walks of a check: they end by a failure, an unreachable robot, or when all is done."""
 
 from collections.abc import Callable
 
@@ -7,8 +7,13 @@ from conformance.packs.table1.robot.drive_trace import Trace
 from conformance.packs.table1.robot.robot import Robot
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import NoAnswerError
+from conformance.verdict.effort import Effort
 
 _TIME_IS_UP = "the time is up"
+_ENOUGH = "all steps that were planned are done"
+# A command takes about this long to be reached, at least; and this part of the settle time of a robot that is slow.
+_COMMAND_S = 0.4
+_OF_SETTLE = 0.25
 
 
 class Walk:
@@ -17,19 +22,31 @@ class Walk:
     Attributes:
         robot: the robot.
         drive: its velocity commands and readings.
-        ended: why no further step is made: a requirement failed, the time is up, or the robot is busy.
+        ended: why no further step is made: a requirement failed, the planned steps are done, the time is up, or the
+            robot is busy.
         unreachable: the request without a response that ended the walk, if any.
         left_out: number of steps left out because the time was up.
     """
 
-    def __init__(self, robot: Robot, budget_s: float, trace: Trace | None = None) -> None:
+    def __init__(self, robot: Robot, effort: Effort, share: float, trace: Trace | None = None) -> None:
+        """Plan a walk that takes about ``share`` of the effort's budget: its steps are counted, not timed."""
         self.robot = robot
         self.drive = Drive(robot)
         self.drive.trace = trace or self.drive.trace
         self.ended = ""
         self.unreachable: NoAnswerError | None = None
         self.left_out = 0
-        self._until = robot.clock.now() + budget_s
+        self._until = robot.clock.now() + share * effort.longest_s
+        self._commands_left = max(
+            1, round(share * effort.budget_s / max(_COMMAND_S, _OF_SETTLE * robot.limits.settle_s))
+        )
+
+    def command(self, act: Callable[[], bool]) -> None:
+        """Make one step that commands a velocity and waits for it; there are so many of them as time is planned for."""
+        if not self.ended and self._commands_left == 0:
+            self.ended = _ENOUGH
+        self._commands_left -= not self.ended
+        self.step(act)
 
     def step(self, act: Callable[[], bool]) -> None:
         """Make one step unless the walk has ended; ``act`` returns whether all was well."""

@@ -20,7 +20,7 @@ from conformance.packs.table1.robot.goal import await_goal, await_none, goal_bod
 from conformance.packs.table1.robot.goals import choose_goals, make_room
 from conformance.packs.table1.robot.plan import reachable
 from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, PLAN, POSE, STILL, VELOCITY, Robot, Velocity
-from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
@@ -71,7 +71,7 @@ def formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> tuple
     suspects: dict[tuple[str, bool], Found] = {}
     for change in range(_CHANGES):
         # There and back, which needs no more room.
-        moving = Velocity(*(-part if change % 2 else part for part in arc))
+        moving = robot.drivable(Velocity(*(-part if change % 2 else part for part in arc)))
         for wanted in (moving, STILL):
             drive.command(wanted)
             drive.reach(wanted)
@@ -127,7 +127,7 @@ def goal_as_text(api: RestInterface, robot: Robot) -> tuple[Exchange, ...]:
             robot.delete_goal()
             await_none(robot)
             return (exchange,)
-    raise NotPossibleError(f"a goal with the id {DIGITS} was never there when it was read")
+    raise NoOccasionError(f"a goal with the id {DIGITS} was never there when it was read")
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.RESTING)

@@ -145,12 +145,16 @@ class _Player:
         self.life = replace(self.life, second=second, renamed=renamed)
 
     def _cancel(self, pose: Pose) -> bool:
-        """Cancel the active goal; return whether there was one, as it may have ended at its ``pose``."""
+        """Cancel the active goal; return whether there was one, as it may have ended at its ``pose``.
+
+        A response that is late counts as none: a stop of the network looks like a late stop of the robot.
+        """
         cancelled = cancel(self.robot)
+        self.life = replace(self.life, cancels=(*self.life.cancels, cancelled.exchange))
         if cancelled.exchange.response.status == HTTPStatus.NOT_FOUND and arrived(self.robot, pose):
             return False
         self.life = replace(self.life, cancelled=(*self.life.cancelled, cancelled))
-        return True
+        return not cancelled.late
 
 
 def put_new(robot: Robot, body: dict[str, Any], pose: Pose) -> Put:
@@ -167,8 +171,9 @@ def cancel(robot: Robot) -> Cancelled:
     drive = Drive(robot)
     exchange = robot.delete_goal(RATHER_XML)
     answered = robot.clock.now()
+    late = robot.is_late(exchange)
     if exchange.response.status == HTTPStatus.NOT_FOUND:
-        return Cancelled(exchange, exchange, gone=True, drive=drive.trace)
+        return Cancelled(exchange, exchange, gone=True, drive=drive.trace, late=late)
     goal, read = robot.goal()
     # 202 says that it will be done; and status.code has a word for a goal that is being cancelled.
     accepted = exchange.response.status == HTTPStatus.ACCEPTED
@@ -176,12 +181,12 @@ def cancel(robot: Robot) -> Cancelled:
     if gone:
         read = await_none(robot)
         gone = read.response.status == HTTPStatus.NOT_FOUND
-    drive.reach(STILL, "safety/cancel", since=answered)
-    rests = [turn.velocity is None or robot.near(turn.velocity, STILL, 2) for turn in drive.trace.turns]
+    drive.reach(STILL, "safety/cancel", since=robot.arrived_by(exchange, answered))
+    rests = [turn.velocity is None or robot.near(turn.velocity, STILL) for turn in drive.trace.turns]
     if all(rests) or not rests[-1]:
         # It may yet begin what the goal had commanded, or be about to turn the other way: until it has had its time.
         robot.clock.sleep(answered + robot.settle_s - robot.clock.now())
-    return Cancelled(exchange, read, gone, drive.trace)
+    return Cancelled(exchange, read, gone, drive.trace, late)
 
 
 def _cancel_again(robot: Robot, body: dict[str, Any]) -> Rest:
@@ -195,7 +200,7 @@ def _cancel_again(robot: Robot, body: dict[str, Any]) -> Rest:
 
 def slow_turn(robot: Robot) -> Velocity:
     """Return a slow turn; zero where the robot cannot turn."""
-    return Velocity(angular_z=0.1 * robot.limits.angular_rad_s if robot.actuated(5) else 0.0)
+    return robot.share_of_limits(0.0, 0.1)
 
 
 def await_motion(robot: Robot) -> None:

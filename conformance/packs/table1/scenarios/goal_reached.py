@@ -1,34 +1,33 @@
 """A goal that the robot reaches: it ends there, is then no longer active, and its id can be used again."""
 
+import math
 from dataclasses import dataclass, replace
 from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import Command
-from conformance.packs.table1.robot.geometry import Pose, middle_of
+from conformance.packs.table1.robot.geometry import Pose, middle_of, wrapped
 from conformance.packs.table1.robot.goal import NEW, await_none, goal_body, put_goal
 from conformance.packs.table1.robot.goal_trace import GoalReached
 from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.message_shapes import ODOMETRY
 from conformance.packs.table1.robot.plan import ask, start_of
-from conformance.packs.table1.robot.robot import FARTHEST, POSE, Robot, Velocity
+from conformance.packs.table1.robot.robot import FARTHEST, POSE, Robot
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 
-# A robot that comes no nearer for so long does not drive, s; and how long one that does is waited for, by effort.
-_NO_PROGRESS_S: Final = 5.0
-_LONGEST_S: Final = {"quick": 12.0}
-_LONGEST_DEFAULT_S: Final = 30.0
-# A robot may take a goal for reached a quarter of a metre before it (Nav2 does, unless told otherwise), m.
-_REACHED_M: Final = 0.3
-# Twice as far away is a goal, so that one that is given up on the way is not taken for reached, m.
+# How long a robot that comes nearer is waited for, at 0.01 m/s and with hindrances on the way, s.
+_LONGEST_S: Final = 120.0
+# How far away a goal is: this, m, or twice the tolerance, so that a goal given up on the way is not taken for reached.
 _AWAY_M: Final = 0.6
-# So far the robot has to come from where it was, where the goal is farther than that, m.
+# So far the robot has to come from where it was, where the goal is that much beyond the tolerance, m.
 _MOVED_M: Final = 0.15
-_FAR_M: Final = 0.35
+# The heading of a goal differs by so much from the direction of the way there: more than any declared tolerance, rad.
+_TURN_RAD: Final = 1.0
+_DETOUR: Final = 1.3
 _LOOKED_S: Final = 1.0
 # What counts as progress.
 _NEARER_M: Final = 0.02
@@ -41,7 +40,8 @@ def goal_reached(robot: Robot, effort: Effort, _prepared: None) -> GoalReached:
     here = robot.map_pose()
     if here is None:
         raise NotPossibleError("the robot's pose cannot be read")
-    there, other = choose_goals(robot, _AWAY_M, 2)
+    there, other = choose_goals(robot, max(_AWAY_M, 2 * robot.limits.arrival[0]), 2)
+    there = _turned(robot, here, there)
     before = _turning_before(robot, effort)
     # Displaced at once: it is not taken up again when the robot has arrived where it was sent last.
     put_goal(robot, goal_body(other, robot.statement.motion.frame, "displaced"))
@@ -51,19 +51,29 @@ def goal_reached(robot: Robot, effort: Effort, _prepared: None) -> GoalReached:
         return trace
     way = _Way(robot, Drive(robot), trace)
     try:
-        way.drive_to(there, here, _LONGEST_S.get(effort.name, _LONGEST_DEFAULT_S))
+        way.drive_to(there, here)
         way.look_back(here, before, body)
     except Exception as error:
         raise PartialTraceError(way.recorded) from error
     return way.recorded
 
 
+def _turned(robot: Robot, here: Pose, there: Pose) -> Pose:
+    """Return a goal with a heading across the way there, if the robot has a plan to it that is hardly longer."""
+    ahead = math.atan2(there.y - here.y, there.x - here.x)
+    if not robot.actuated(5) or abs(wrapped(there.yaw - ahead)) >= _TURN_RAD:
+        return there
+    turned = Pose(there.x, there.y, wrapped(ahead + math.copysign(_TURN_RAD, there.yaw)))
+    _, plan, _ = ask(robot, turned)
+    return turned if plan is not None and plan.length <= _DETOUR * here.distance(there) + 0.1 else there
+
+
 def _turning_before(robot: Robot, effort: Effort) -> Command | None:
     """Command a velocity just before the goal; return None if that shows nothing or takes too much time."""
     limits = robot.limits
-    turning = Velocity(angular_z=0.4 * limits.angular_rad_s)
+    turning = robot.share_of_limits(0.0, 0.4)
     seen_from_rest = limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s
-    if effort.name == "quick" or limits.hold_s is None or not robot.actuated(5):
+    if effort.name == "quick" or limits.hold_s is None:
         return None
     if turning.angular_z < 4 * seen_from_rest:
         return None
@@ -84,6 +94,12 @@ def _put(robot: Robot, there: Pose) -> tuple[dict[str, Any], Exchange]:
     return body, put_goal(robot, body)
 
 
+def _arrived(trace: GoalReached, here: Pose) -> GoalReached:
+    """Return the record with the robot's last pose."""
+    there = trace.there or here
+    return replace(trace, here=here, left_m=here.distance(there), off_rad=wrapped(here.yaw - there.yaw))
+
+
 @dataclass
 class _Way:
     """The robot's way to its goal."""
@@ -97,9 +113,12 @@ class _Way:
         """Return the record so far."""
         return replace(self.trace, drive=self.drive.whole)
 
-    def drive_to(self, there: Pose, start: Pose, longest_s: float) -> None:
+    def drive_to(self, there: Pose, start: Pose) -> None:
         """Watch until the goal has ended, or the robot makes no progress."""
         robot, drive, clock = self.robot, self.drive, self.drive.clock
+        limits, longest_s = robot.limits, max(_LONGEST_S, 2 * robot.limits.goal_s)
+        turned_rad = max(_TURNED_RAD, 2 * FARTHEST * limits.noise.heading_rad)
+        reached_m, reached_rad = limits.arrival
         began = progress = clock.now()
         nearest, yaw, here = start.distance(there), start.yaw, start
         while True:
@@ -111,36 +130,37 @@ class _Way:
             if drive.trace.odometry:
                 here = robot.in_map(drive.trace.odometry[-1].pose)
             now = clock.now()
-            if here.distance(there) < nearest - _NEARER_M or abs(here.yaw - yaw) > _TURNED_RAD:
+            if here.distance(there) < nearest - _NEARER_M or abs(wrapped(here.yaw - yaw)) > turned_rad:
                 progress, nearest, yaw = now, min(nearest, here.distance(there)), here.yaw
-            if goal is None or now > progress + _NO_PROGRESS_S or now > began + longest_s:
+            if goal is None or now > progress + limits.goal_s or now > began + longest_s:
                 break
         driven = drive.whole
-        moved = _MOVED_M if start.distance(there) > _FAR_M else 0.0
-        if here.distance(there) >= _REACHED_M or start.distance(here) <= moved:
-            # One sample may be wrong, or from before the end: those of a second say where the robot is.
+        moved = max(0.0, min(_MOVED_M, start.distance(there) - reached_m))
+        trace = replace(self.trace, has_to_m=moved, reached_m=reached_m)
+        if robot.actuated(5):
+            trace = replace(trace, reached_rad=reached_rad)
+        trace = _arrived(trace, here)
+        if not trace.arrived or start.distance(here) <= moved:
+            # It may yet be coming to rest. Then, as one sample may be wrong, those of a second say where the robot is.
+            drive.keep(robot.settle_s)
             first = len(drive.trace.odometry)
             drive.keep(_LOOKED_S)
             here = middle_of([robot.in_map(one.pose) for one in drive.trace.odometry[first:]] or [here])
-        left = here.distance(there)
+            trace = _arrived(trace, here)
         # Likewise where it was at first.
         begins = (start, *(robot.in_map(one.pose) for one in driven.odometry[:1]))
         self.trace = replace(
-            self.trace,
-            here=here,
+            trace,
             way_m=max(one.distance(here) for one in begins),
-            has_to_m=moved,
-            left_m=left,
-            reached_m=_REACHED_M,
             read=exchange,
             ended=goal is None,
-            undecided=goal is not None and left > _REACHED_M and now <= progress + _NO_PROGRESS_S,
+            undecided=goal is not None and now <= progress + limits.goal_s,
         )
 
     def look_back(self, start: Pose, before: Command | None, body: dict[str, Any]) -> None:
         """Watch, after a goal was reached, for the velocity from before it; request a plan back; PUT the goal again."""
         trace, robot = self.trace, self.robot
-        if trace.undecided or not trace.ended or trace.left_m >= trace.reached_m or trace.way_m <= trace.has_to_m:
+        if trace.undecided or not trace.ended or not trace.arrived or trace.way_m <= trace.has_to_m:
             return
         if before is not None:
             self._watch_for(before)

@@ -35,7 +35,7 @@ _WHICH: Final = st.integers(0, 1)
 @scenario(needs={Need.REST, Need.MOTION})
 def goal_walk(robot: Robot, effort: Effort, explore: Explorer) -> tuple[GoalStep, ...]:
     """Send goal requests in random order: after each sequence the goal sent last must be the active one."""
-    walk = Walk(robot, 0.4 * effort.budget_s)
+    walk = Walk(robot, effort, 0.4)
     poses = choose_goals(robot, 1.5, 2)
     steps: list[GoalStep] = []
     explore.machine(lambda: _Goals(walk, poses, steps), cases=20, steps=effort.cases(12))

@@ -46,7 +46,7 @@ def interfaces_in_motion(robot: Robot, subscribers: SoapService) -> tuple[StateR
     }
     for change in range(_CHANGES):
         # There and back, which needs no more room.
-        moving = Velocity(*(-part if change % 2 else part for part in arc))
+        moving = robot.drivable(Velocity(*(-part if change % 2 else part for part in arc)))
         for wanted in (moving, STILL):
             drive.command(wanted)
             drive.reach(wanted)

@@ -60,6 +60,6 @@ def _read(drive: Drive, sent: list[tuple[str, Exchange]]) -> Rest:
     accepted = [one for one in sent if one[1].response.status < HTTPStatus.BAD_REQUEST]
     what, exchange = (accepted or sent)[-1]
     velocity, _ = drive.robot.velocity()
-    at_rest = velocity is None or drive.robot.near(velocity, STILL, 2)
+    at_rest = velocity is None or drive.robot.near(velocity, STILL)
     found = "" if at_rest else read_rest(drive, what).found
     return Rest(what, exchange, found, what)

@@ -15,7 +15,7 @@ from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, re
 from conformance.packs.table1.robot.plan import ask, plan_of, query, reachable, start_of
 from conformance.packs.table1.robot.plan_trace import DefaultPlan, FramePlan, PlanRead, PlansFromRobot, PlansFromStart
 from conformance.packs.table1.robot.robot import POSE, Robot
-from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.explorer import Explorer
@@ -66,7 +66,7 @@ def plans_from_start(robot: Robot, explore: Explorer) -> PlansFromStart:
     """Request plans from a start in the request, also without the parameters that have a default."""
     starts = reachable(robot, _here(robot), max(1.0, robot.statement.motion.radius_m), 3)
     if len(starts) < 2:  # noqa: PLR2004 - a start and a goal
-        raise NotPossibleError("the robot has no plan to two poses around it")
+        raise NoOccasionError("the robot has no plan to two poses around it")
     reads: list[PlanRead] = []
 
     def request(case: tuple[int, int, float]) -> None:

@@ -20,6 +20,8 @@ from conformance.verdict.effort import Effort
 _BEYOND_ANY: Final = 1e3
 _FARTHER: Final = (1e6, 1e308)
 _REACHED: Final = 0.1
+# A slow velocity in a direction that the robot does not have, as a share of its range.
+_SLOW: Final = 0.1
 _AFTER: Final = "refused velocities"
 
 
@@ -111,7 +113,7 @@ class _Player:
                 robot.put_velocity(STILL)
         seen, read = robot.velocity()
         after = f"a refused velocity, {velocity}"
-        rest = Rest(after, read, "") if seen is None or robot.near(seen, STILL, 2) else read_rest(Drive(robot), after)
+        rest = Rest(after, read, "") if seen is None or robot.near(seen, STILL) else read_rest(Drive(robot), after)
         self.trace = replace(self.trace, rests=(*self.trace.rests, rest))
 
     def _actuate(self, component: int) -> None:
@@ -139,9 +141,12 @@ def _beyond(robot: Robot) -> Iterator[Velocity]:
     for component in range(6):
         if not robot.actuated(component):
             continue
-        limit = robot.limit_of(component)
-        sizes = [1.001 * limit, 1.5 * limit, _BEYOND_ANY] if robot.limit_declared(component) else [_BEYOND_ANY]
-        for size in (*sizes, *_FARTHER):
+        least, greatest = robot.limits.range_of(component)
+        for times in (1.001, 1.5) if robot.limit_declared(component) else ():
+            for sign, limit in ((1, greatest), (-1, least)):
+                # A robot without a reverse gear does not drive back slowly either.
+                yield _only(component, times * (limit or sign * _SLOW * (greatest - least)))
+        for size in (_BEYOND_ANY, *_FARTHER):
             yield from (_only(component, size), _only(component, -size))
 
 
@@ -149,7 +154,7 @@ def _reaches(robot: Robot, wanted: Velocity) -> bool:
     """Return whether the robot reaches an accepted velocity; stop it then."""
     for _ in poll_for(robot.clock, 0.02, robot.settle_s):
         velocity, _ = robot.velocity()
-        if velocity is not None and not robot.near(velocity, STILL, 2) and robot.near(velocity, wanted):
+        if velocity is not None and not robot.near(velocity, STILL) and robot.near(velocity, wanted):
             robot.put_velocity(STILL)
             return True
     return False

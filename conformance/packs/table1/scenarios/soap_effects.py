@@ -7,6 +7,7 @@ from typing import Final
 
 from conformance.api.interfaces import Interfaces
 from conformance.api.soap import content
+from conformance.api.soap.calls import SoapResponse
 from conformance.api.soap.valid_messages import call_valid
 from conformance.contract.interfaces import Interface
 from conformance.documents.xml_names import ENVELOPE, clark
@@ -47,6 +48,19 @@ class Misunderstood:
     answers: tuple[tuple[Exchange, int | None], ...] = ()
 
 
+@dataclass(frozen=True)
+class GoalBySoap:
+    """A goal that GetGoal was to show.
+
+    Attributes:
+        shown: the last GetGoal while the goal was active, and the id that it showed; or None.
+        after: a GetGoal after the goal was cancelled; or None.
+    """
+
+    shown: tuple[Exchange, str | None] | None = None
+    after: Exchange | None = None
+
+
 @scenario(needs={Need.PUBLISHERS, Need.MOTION}, leaves=Leaves.UNTOUCHED, stage=Stage.ACTING)
 def misunderstood(interfaces: Interfaces, effort: Effort) -> Misunderstood:
     """Send deliveries with a header block that no robot understands, and read the list of deliveries."""
@@ -71,26 +85,29 @@ def misunderstood(interfaces: Interfaces, effort: Effort) -> Misunderstood:
 
 # Without permission to move the robot, GetGoal is judged elsewhere, by whatever goal the robot has.
 @scenario(needs={Need.SUBSCRIBERS})
-def goal_by_soap(interfaces: Interfaces) -> tuple[tuple[Exchange, str | None], ...]:
-    """PUT a goal over REST; record the last GetGoal, and the id that it shows.
+def goal_by_soap(interfaces: Interfaces) -> GoalBySoap:
+    """PUT a goal over REST, record the last GetGoal and the id that it shows, and GetGoal after the goal.
 
     Empty where no goal could be PUT, or the goal has ended before it could be seen.
     """
     service, api = interfaces.soap.subscribers, interfaces.rest
     if service is None or api is None or not api.run.allow_motion or Interface.REST in api.run.unreachable:
-        return ()
+        return GoalBySoap()
     bring_to_rest(api)
     robot = Robot(api)
     here = robot.map_pose()
     if here is None:
-        return ()
+        return GoalBySoap()
     body = goal_body(here._replace(yaw=here.yaw + _TURN), robot.statement.motion.frame, GOAL_ID)
     if put_goal(robot, body).response.status not in NEW:
-        return ()
+        return GoalBySoap()
     reads: list[tuple[Exchange, str | None]] = []
 
+    def ask_goal() -> SoapResponse:
+        return call_valid(service, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
+
     def shows() -> bool:
-        answer = call_valid(service, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
+        answer = ask_goal()
         first = answer.first if answer.accepted else None
         shown = content.text_at(first, "goal_id", "id") if first is not None else None
         reads.append((answer.exchange, shown))
@@ -99,7 +116,7 @@ def goal_by_soap(interfaces: Interfaces) -> tuple[tuple[Exchange, str | None], .
     # A short goal may have ended before anybody could see it; then REST does not show it either.
     known = _until(shows, robot.patience(robot.settle_s), robot) or robot.goal()[0] is not None
     bring_to_rest(api)
-    return tuple(reads[-1:]) if known else ()
+    return GoalBySoap(reads[-1], ask_goal().exchange) if known else GoalBySoap()
 
 
 def _listed(robot: Robot, depot_x: float) -> int | None:

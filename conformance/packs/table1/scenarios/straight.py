@@ -1,5 +1,6 @@
 """Driving straight ahead and back: very slowly, and at the highest declared speed."""
 
+from conformance.packs.table1.robot.abilities import AHEAD
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.goals import make_room
 from conformance.packs.table1.robot.robot import Robot, Velocity
@@ -26,10 +27,15 @@ def straight(robot: Robot) -> Driven:
 def _play(robot: Robot, drive: Drive) -> None:
     drive.look()
     reach(drive, slowest(robot))
-    ahead = Velocity(linear_x=direction(robot) * fastest(robot, 0))
+    sign = direction(robot)
+    ahead = Velocity(linear_x=fastest(robot, AHEAD, sign))
     reached = reach(drive, ahead)
     drive.keep(0.2 if reached else 0.0)
-    back = Velocity(linear_x=-ahead.linear_x)
-    if reach(drive, back):
+    back = Velocity(linear_x=fastest(robot, AHEAD, -sign))
+    if not any(back):
+        # It has no reverse gear: it stops where it is.
+        back = ahead
+    elif reached := reach(drive, back):
         drive.keep(0.2)
+    if reached:
         drive.stop(back)

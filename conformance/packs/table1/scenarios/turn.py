@@ -5,63 +5,74 @@ import random
 from dataclasses import dataclass, field
 from typing import Final
 
+from conformance.packs.table1.robot.abilities import ABOUT, AHEAD, turn_beside
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART
 from conformance.packs.table1.robot.goals import make_room
 from conformance.packs.table1.robot.letting_go import LetGo, ends_by
 from conformance.packs.table1.robot.robot import FARTHEST, STILL, Robot, Velocity
 from conformance.packs.table1.robot.undisturbed import arc, renewed
-from conformance.packs.table1.robot.velocity_range import direction, fastest, reach
+from conformance.packs.table1.robot.velocity_range import both, fastest, handy, reach, slowest_along
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S, SEVERAL
 from conformance.packs.table1.scenarios.trace import Driven
-from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
+from conformance.scenarios.scenario import PartialTraceError, scenario
 from conformance.scenarios.stage import Need
 from conformance.verdict.run import Run
 
 # Of the hold time: so long after a command it is given again, and holds from then on.
 _AGAIN: Final = 0.25
-# How often it is tried to see how long a velocity holds.
+# How often a measurement of how long a velocity holds is tried that a stall of the suite or a late response spoilt.
 _ATTEMPTS: Final = 3
 # The only whole number of rad/s below the limits of most robots.
 _WHOLE: Final = 1.0
+# Of the limit: how fast the robot drives along an arc.
+_ASIDE: Final = 0.3
 # In this time several samples come, from any robot, s.
 _SAMPLES_S: Final = (SEVERAL + 1) * LONGEST_SAMPLE_S
 
 
 @scenario(needs={Need.REST, Need.MOTION})
 def turn(robot: Robot, run: Run) -> Driven:
-    """Turn for about four seconds, in several ways, and let the last velocity end by itself."""
-    if not robot.actuated(5):
-        raise NotPossibleError("the statement says that the robot cannot turn on the spot")
+    """Turn for about four seconds, in several ways, and let the last velocity end by itself.
+
+    A robot that cannot turn on the spot turns in its narrowest circle; one that cannot turn at all drives.
+    """
     make_room(robot)
     turning = _Turning(robot, Drive(robot))
     try:
         turning.play()
-        for velocity in _further(robot, run):
+        for velocity in _further(turning, run):
             turning.let_go(velocity)
     except Exception as error:
         raise PartialTraceError(turning.recorded) from error
     return turning.recorded
 
 
-def _further(robot: Robot, run: Run) -> list[Velocity]:
+@scenario(needs={Need.REST, Need.MOTION})
+def further_axes(robot: Robot) -> Driven:
+    """Drive along each axis that the robot has beside those of a robot on two wheels; without any, do nothing."""
+    further = [axis for axis in range(len(STILL)) if axis not in {AHEAD, ABOUT} and robot.actuated(axis)]
+    driving = _Turning(robot, Drive(robot))
+    if further:
+        make_room(robot)
+    try:
+        for axis in further:
+            driving.along(axis)
+    except Exception as error:
+        raise PartialTraceError(driving.recorded) from error
+    return driving.recorded
+
+
+def _further(turning: "_Turning", run: Run) -> list[Velocity]:
     """Return velocities at the limits, which must hold as long as others: one chosen by the seed, or both."""
-    limits = robot.limits
-    if limits.hold_s is None:
+    robot, limits = turning.robot, turning.robot.limits
+    if limits.hold_s is None or not robot.actuated(ABOUT):
         return []
     told_from_rest = 4 * (limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s)
-    slow = Velocity(angular_z=min(max(0.2 * limits.angular_rad_s, told_from_rest), 0.6 * limits.angular_rad_s))
-    choices = [slow, _fast_left(robot)]
+    slow = robot.only(ABOUT, min(max(0.2 * limits.angular_rad_s, told_from_rest), 0.6 * limits.angular_rad_s))
+    choices = [slow, turning.fastest]
     number = {"quick": 0, "standard": 1}.get(run.effort.name, len(choices))
     return random.Random(f"{run.seed}/let go").sample(choices, number)  # noqa: S311 - no secret
-
-
-def _fast_left(robot: Robot) -> Velocity:
-    """Return the fastest turn to the left, combined with the fastest drive where limits are declared for both."""
-    ahead = 0.0
-    if robot.actuated(0) and robot.limit_declared(0) and robot.limit_declared(5):
-        ahead = direction(robot) * fastest(robot, 0)
-    return Velocity(linear_x=ahead, angular_z=fastest(robot, 5))
 
 
 @dataclass
@@ -72,6 +83,7 @@ class _Turning:
     drive: Drive
     tries: list[tuple[LetGo, ...]] = field(default_factory=list)
     not_tested: list[tuple[str, str]] = field(default_factory=list)
+    fastest: Velocity = STILL  # the fastest turn to the left that the robot has reached
 
     @property
     def _ends_s(self) -> float:
@@ -84,38 +96,92 @@ class _Turning:
 
     def play(self) -> None:
         """Turn left by whole numbers, as fast as the robot can, renewed, along an arc, and straight on."""
-        robot, drive, limit = self.robot, self.drive, self.robot.limits.angular_rad_s
+        robot, drive = self.robot, self.drive
         drive.look()
-        left = Velocity(angular_z=_WHOLE if limit > 1.1 * _WHOLE else 0.0)
+        left = robot.only(ABOUT, _WHOLE if fastest(robot, ABOUT) > 1.1 * _WHOLE else 0.0)
+        if not all(map(float.is_integer, left)):
+            left = STILL  # whoever turns in a circle drives by no whole number
         if drive.command(left, integers=True):
             drive.reach(left, "rest-resources/velocity-integers", "rest-resources/velocity-converges")
-        if not left.angular_z:
-            left = Velocity(angular_z=0.6 * limit)
+        if left == STILL:
+            left = handy(robot, 0.6)
             drive.command(left)
             drive.reach(left, "rest-resources/velocity-converges")
-        fast = self._fast()
+        fast = self._fast() if robot.actuated(ABOUT) else None
         if fast is None:
             drive.refresh(left)
         if not renewed(robot, drive, fast or left):
             reason = "responses came too late to renew a velocity within its hold time"
             self.not_tested.append(("safety/renewal", reason))
-        bent = Velocity(angular_z=-left.angular_z)
-        if robot.actuated(0):
+        bent = robot.drivable(Velocity(*(-part for part in left)))
+        if robot.actuated(AHEAD) and robot.actuated(ABOUT):
             # A small circle: either part has to end. The linear part is commanded last, and ends as well.
-            bent = bent._replace(linear_x=-0.3 * robot.limits.linear_m_s)
-            arc(robot, drive, bent)
-        self.let_go(bent)
-        if robot.actuated(0):
+            bent, before = self._bent(bent)
+            arc(robot, drive, bent, before)
+        for velocity, by_linear in self._ways(bent):
+            self.let_go(velocity, by_linear=by_linear)
+        if robot.actuated(AHEAD) and robot.actuated(ABOUT):
             self._ahead_from_rest()
 
+    def _ways(self, bent: Velocity) -> list[tuple[Velocity, bool]]:
+        """Return velocities that are not renewed, and whether a PUT of the linear part commands them last.
+
+        A robot may keep a watchdog for each path, and one for each sign. Without a declared hold time one is enough.
+        """
+        if self.robot.limits.hold_s is None:
+            return [(bent, False)]
+        ahead = self.robot.drivable(Velocity(*(-one for one in bent)))
+        ways = [(bent, bool(bent.linear_x)), (ahead, False), (bent, False), (ahead, bool(ahead.linear_x))]
+        return [way for way in dict.fromkeys(ways) if any(way[0])]
+
+    def along(self, component: int) -> None:
+        """Drive along one more axis, slowly and as fast as the robot can, there and back, and let it go."""
+        robot, drive = self.robot, self.drive
+        ends = [robot.only(component, fastest(robot, component, sign)) for sign in (1, -1)]
+        for velocity in (slowest_along(robot, component), *ends):
+            if any(velocity):
+                reach(drive, velocity)
+        drive.stop(ends[0])
+        self.let_go(robot.drivable(Velocity(*(_ASIDE * part for part in ends[0]))))
+
+    def _bent(self, turning: Velocity) -> tuple[Velocity, Velocity]:
+        """Return a turn along an arc, and another linear part beside which the robot can turn as fast.
+
+        The robot drives back and then ahead, unless it hardly drives back: then it drives ahead at two speeds.
+        """
+        limits, motion = self.robot.limits, self.robot.statement.motion
+        least, greatest = limits.range_of(AHEAD)
+        aside, other = (-_ASIDE, _ASIDE) if -least >= greatest / 2 else (_ASIDE, _ASIDE / 2)
+        parts = [self.robot.share_of_limits(share, 0.0).linear_x for share in (aside, other)]
+        turn = turning.angular_z
+        for part in parts:
+            turn = turn_beside(limits, motion, part, turn)
+        return Velocity(linear_x=parts[0], angular_z=turn), Velocity(linear_x=parts[1])
+
     def _fast(self) -> Velocity | None:
-        """Turn left, and right on the spot, both at the highest speed; return the second velocity if it is reached."""
-        right = Velocity(angular_z=-fastest(self.robot, 5))
-        return right if reach(self.drive, _fast_left(self.robot)) and reach(self.drive, right) else None
+        """Turn left and right, both at the highest speed; return the second velocity if it is reached.
+
+        At first the robot also drives as fast as it can. Where the statement does not say how the two depend on each
+        other, it need not reach both limits at once.
+        """
+        robot, drive = self.robot, self.drive
+        left, right = (robot.only(ABOUT, fastest(robot, ABOUT, sign)) for sign in (1, -1))
+        beside = both(robot)
+        declared = robot.statement.motion.wheel_separation_m is not None
+        if not (robot.actuated(AHEAD) and robot.limit_declared(AHEAD) and robot.limit_declared(ABOUT)):
+            beside = left
+        ids = () if declared or beside == left else ("rest-resources/velocity-both",)
+        reached = reach(drive, beside, *ids)
+        self.fastest = beside if reached else left
+        if not reached and not ids:
+            return None
+        if ids and not reach(drive, left):
+            return None
+        return right if reach(drive, right) else None
 
     def _ahead_from_rest(self) -> None:
         """Command a linear part after the angular part has ended by itself: the angular part must stay zero."""
-        drive, ahead = self.drive, Velocity(linear_x=0.3 * self.robot.limits.linear_m_s)
+        drive, ahead = self.drive, self.robot.share_of_limits(_ASIDE, 0.0)
         if not drive.command_linear(ahead):
             return
         drive.reach(ahead, "rest-resources/linear-put", part=LINEAR_PART)
@@ -124,26 +190,31 @@ class _Turning:
         expected = f"no angular part beside {ahead}: the one before it had ended"
         drive.saw("rest-resources/linear-keeps-angular", expected, seen, "came back", holds=keeps)
 
-    def let_go(self, turning: Velocity) -> None:
-        """Stop renewing a velocity, and watch how it ends.
+    def let_go(self, turning: Velocity, *, by_linear: bool = False) -> None:
+        """Stop renewing a velocity, and watch how it ends; ``by_linear``: a PUT of the linear part commands it last.
 
-        An apparent failure is measured again: a late response, or a busy machine, is no failure of the robot.
+        A measurement that a stall of the suite or a late response spoilt is made again. One that shows a robot that
+        does
+        not come to rest is never made again: a watchdog that stops most velocities is none.
         """
         limits, tries = self.robot.limits, []
         for _ in range(_ATTEMPTS if limits.hold_s else 1):
-            let_go = self._watch(turning)
+            let_go = self._watch(turning, by_linear=by_linear)
             if let_go is None:
                 break
             tries.append(let_go)
-            rests = let_go.rests(limits)
-            if not rests:
+            if not let_go.rests(limits):
                 self.robot.put_velocity(STILL)
-            if rests and let_go.early(limits) is None and let_go.late(limits) is None:
+                break
+            if let_go.early(limits) or let_go.late(limits):
+                if not let_go.is_void(limits):
+                    break
+            elif limits.hold_s is None or let_go.was_held(limits):
                 break
         if tries:
             self.tries.append(tuple(tries))
 
-    def _watch(self, turning: Velocity) -> LetGo | None:
+    def _watch(self, turning: Velocity, *, by_linear: bool) -> LetGo | None:
         """Command a velocity, and look until the robot rests or its time is over; return None if it is rejected.
 
         With a declared hold time, the suite does not read the robot around the end of that time, because a velocity
@@ -160,19 +231,20 @@ class _Turning:
         if not drive.command(turning):
             return None
         full = drive.trace.sent
-        if turning.linear_x and limits.hold_s is not None:
+        if by_linear:
             drive.command_linear(turning)
         answered = drive.trace.answered
-        first, resumed = len(drive.trace.turns), None
+        first, resumed, due = len(drive.trace.turns), None, None
         ends = answered + self._ends_s
         silent_from = math.inf if limits.hold_s is None else full + 0.95 * limits.hold_s
         while True:
-            drive.look()
-            let_go = LetGo(turning, full, answered, drive.trace.turns[first:], resumed)
-            if let_go.rests(limits) or drive.trace.turns[-1].at > ends:
+            drive.glance() if drive.paces and resumed is None else drive.look()
+            let_go = LetGo(turning, full, answered, drive.trace.turns[first:], resumed, due, by_linear)
+            if let_go.is_decided(limits, ends):
                 return let_go
             if resumed is None and clock.now() > silent_from:
                 robot.put_velocity(Velocity(angular_z=1e4))
-                clock.sleep(answered + let_go.longest(limits) - clock.now())
+                due = max(clock.now(), answered + let_go.longest(limits))
+                clock.sleep(due - clock.now())
                 resumed = len(let_go.turns)
                 ends = max(ends, clock.now() + _SAMPLES_S)

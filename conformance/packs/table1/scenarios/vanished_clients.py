@@ -5,7 +5,7 @@ from typing import Final
 
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.message_shapes import body_of
-from conformance.packs.table1.robot.robot import LINEAR, VELOCITY, Robot, Velocity
+from conformance.packs.table1.robot.robot import LINEAR, VELOCITY, Robot
 from conformance.packs.table1.robot.standstill import Standstill, watch_rest
 from conformance.packs.table1.robot.standstill_trace import Rest
 from conformance.scenarios.scenario import scenario
@@ -41,7 +41,7 @@ def _repeat(robot: Robot) -> list[Rest]:
 def _vanish(drive: Drive) -> tuple[Rest, ...]:
     """Begin requests and close the connection before they end; return the readings, up to the first with motion."""
     robot = drive.robot
-    fast = Velocity(linear_x=0.3 * robot.limits.linear_m_s, angular_z=0.5 * robot.limits.angular_rad_s)
+    fast = robot.share_of_limits(0.3, 0.5)
     body, linear = body_of(fast.twist), body_of(fast.linear)
     rests: list[Rest] = []
     for path, sent, promised, reset in (

@@ -5,14 +5,15 @@ from typing import Final
 
 from conformance.observe.polling import poll_for
 from conformance.packs.table1.limits import Limits
-from conformance.packs.table1.robot.probe.client import Probe, ProbeError, RosProbe
+from conformance.packs.table1.robot.probe.client import ARRIVES_S, Probe, ProbeError, RosProbe
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity, is_near
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 
-_ARRIVES_S: Final = 2.0
+# Of no declared hold time: what it is taken to be when a velocity is renewed, s.
+_RENEWED_S: Final = 2.0
 
 
 @dataclass(frozen=True)
@@ -57,10 +58,10 @@ def velocities_on_ros(robot: Robot, probe: RosProbe, effort: Effort) -> tuple[On
 
 def _seen(robot: Robot, seeing: Probe, wanted: Velocity) -> tuple[Velocity, ...]:
     """Return the messages on the velocity topic until one has the wanted velocity; renew it meanwhile."""
-    every_s = 0.4 * (robot.limits.hold_s or _ARRIVES_S)
+    every_s = 0.4 * (robot.limits.hold_s or _RENEWED_S)
     renew_at = robot.clock.now() + every_s
     seen: list[Velocity] = []
-    for _ in poll_for(robot.clock, 0.005, max(_ARRIVES_S, robot.settle_s)):
+    for _ in poll_for(robot.clock, 0.005, max(ARRIVES_S, robot.settle_s)):
         seen += seeing.velocities()
         if any(robot.near(one, wanted) for one in seen):
             break

@@ -19,7 +19,7 @@ def velocity_walk(robot: Robot, effort: Effort, explore: Explorer) -> Driven:
     # Zero is not a value that can be refused, however it is signed.
     zero = Drive(robot)
     zero.command(Velocity(-0.0, -0.0, -0.0, -0.0, -0.0, -0.0))
-    walk = Walk(robot, 0.8 * effort.budget_s, zero.trace)
+    walk = Walk(robot, effort, 0.8, zero.trace)
     explore.machine(lambda: VelocityMachine(walk), cases=10, steps=effort.cases(12))
     explore.left_out(walk.left_out)
     if walk.unreachable:

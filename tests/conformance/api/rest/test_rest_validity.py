@@ -21,7 +21,13 @@ from conformance.verdict.run import Run
 CONTRACT = Contract.load()
 TWIST = b'{"linear": {"x": 0.1, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0}}'
 PLAN = "/robot/navigation/service/plan"
+GOAL = "/robot/navigation/action/goal/"
 DELIVERY = "/robot/app/delivery/{}/depot_x/{}/depot_y/1/dest_x/1/dest_y/1/source_x/1/source_y/1"
+
+
+def _goal(**members):
+    pose = {"position": {"x": 1, "y": 2, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
+    return json.dumps({"goal": {"target_pose": {"header": {"frame_id": "map"}, "pose": pose}}, **members}).encode()
 
 
 @pytest.mark.parametrize(
@@ -40,6 +46,9 @@ DELIVERY = "/robot/app/delivery/{}/depot_x/{}/depot_y/1/dest_x/1/dest_y/1/source
         ("PUT", "/robot/velocity/", "application/json", TWIST.replace(b"0.1", b'"0.1"'), "invalid", "json-type"),
         ("PUT", "/robot/velocity/", "application/json", TWIST.replace(b"0.1", b"NaN"), "invalid", "json-non-finite"),
         ("PUT", "/robot/velocity/", "application/json", TWIST[:-1], "invalid", "json-malformed"),
+        ("PUT", GOAL, "application/json", _goal(), "valid", ""),
+        ("PUT", GOAL, "application/json", _goal(status={"code": 2, "text": ""}), "unclear", ""),
+        ("PUT", GOAL, "application/json", _goal(status={"code": 2, "text": ""}, w=1), "invalid", "json-unknown"),
         ("PUT", "/robot/velocity/", "application/xml", b"<Vector3/>", "invalid", "xml-body"),
         ("PUT", "/robot/velocity/", "application/xml", b"<Twist><linear/></Twist>", "invalid", "xml-body"),
         ("GET", f"{PLAN}?x=1&y=-2.5e1", "", b"", "valid", ""),

@@ -104,7 +104,7 @@ class Drive(drive.Drive):
     def _renew(self) -> None:
         self.tell(renewal=True)
 
-    def _glance(self) -> None:
+    def glance(self) -> None:
         clock = self.body.clock
         at = clock.time_s
         clock.time_s += max(_LOOK_S, self.robot.usual_s)

@@ -43,6 +43,14 @@ def test_a_simulation_may_declare_another_scale():
     assert not clock(1.0, 10.0, 1).is_right(2.0)
 
 
+def test_how_far_a_clock_is_ahead_of_date():
+    told = Clock()
+    assert told.ahead_s is None
+    for seconds, date in ((9.5, "Thu, 01 Jan 1970 00:00:02 GMT"), (0.0, "yesterday"), (0.0, ""), (9.0, "two, dates")):
+        told.dated(seconds, date)
+    assert told.ahead_s == 7.5
+
+
 def test_too_short_a_time_says_nothing():
     assert Clock().rate is None
     assert clock(1.0, 4.5, 1).rate is None

@@ -52,11 +52,11 @@ def test_a_reading_that_is_out_again_is_judged_from_the_second_on():
 
 
 def test_readings_over_soap_are_judged_by_a_requirement_of_their_own():
-    run = _Run(requirement="equivalence/velocity")
+    run = _Run(requirement="equivalence/pose")
     run.turns(60)
     run.turns(3, velocity=_FAST)
     run.turns(2)
-    assert run.judge.refuted() == {"equivalence/velocity": 2}
+    assert run.judge.refuted() == {"equivalence/pose": 2}
 
 
 @pytest.mark.parametrize("sample_s", [0.02, 0.05, 0.2])

@@ -9,8 +9,9 @@ from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.robot.standstill import Standstill, watch_rest
 from conformance.packs.table1.robot.standstill_trace import Rest, stays
+from conformance.scenarios.rule import Case, NotTested, Outcome
 
-_CANCEL, _REFUSED = "safety/cancel-stays", "safety/refused-keeps"
+_CANCEL, _REFUSED = "safety/cancel", "safety/refused-keeps"
 _WATCH_S = 0.3
 _LATER_S = 0.15
 
@@ -78,8 +79,12 @@ def _counts(standstill: Standstill) -> dict[str, int]:
     return {id_: len(list(stays(standstill.watched, id_))) for id_ in (_CANCEL, _REFUSED)}
 
 
+def _is_failure(outcome: Outcome) -> bool:
+    return isinstance(outcome, Case) and not outcome.holds
+
+
 def _failures(standstill: Standstill) -> set[str]:
-    return {id_ for id_ in (_CANCEL, _REFUSED) if not all(case.holds for case in stays(standstill.watched, id_))}
+    return {id_ for id_ in (_CANCEL, _REFUSED) if any(map(_is_failure, stays(standstill.watched, id_)))}
 
 
 def test_nothing_is_judged_where_nothing_was_tried(body, standstill):
@@ -113,13 +118,14 @@ def test_of_what_was_tried_the_one_that_moves_the_robot_is_found(body, api, stan
     assert len(innocent.repeated_at) == len(guilty.repeated_at) == 1
 
 
-def test_what_moves_the_robot_once_is_anybodys_fault(body, api, standstill):
+def test_one_push_is_one_failure(body, api, standstill):
     trials = [Trial(api, _CANCEL), Trial(api, _REFUSED)]
     for trial in trials:
         trial.attempt(standstill)
     body.drive()
     standstill.watch()
-    assert _failures(standstill) == {_CANCEL, _REFUSED}
+    assert _failures(standstill) == {_CANCEL}
+    assert [type(one) for one in stays(standstill.watched, _REFUSED)] == [Case, NotTested]
     assert all(len(trial.repeated_at) == 1 for trial in trials)
 
 

@@ -1,14 +1,25 @@
 """Rules on goals, by traces made by hand."""
 
+import json
+from dataclasses import replace
+
 import pytest
 from toy_messages import exchange
 
-from conformance.packs.table1.robot.goal_trace import FarGoal, GoalStep, Put, RefusedGoals, SpecialGoal
+from conformance.packs.table1.robot.geometry import Pose
+from conformance.packs.table1.robot.goal import SUCCEEDED, outcome_fault
+from conformance.packs.table1.robot.goal_trace import FarGoal, GoalReached, GoalStep, Put, RefusedGoals, SpecialGoal
+from conformance.packs.table1.rules.rest_resources import test_goal_drives as drives
 from conformance.packs.table1.rules.rest_resources import test_goal_ids as ids
 from conformance.packs.table1.rules.rest_resources import test_goal_refused as rules
 from conformance.packs.table1.rules.rest_resources import test_goal_walk as walk
 from conformance.packs.table1.rules.strict_input import test_refused_state as refused
 from conformance.packs.table1.scenarios.invalid_goals import InvalidGoal
+
+
+def _last(id_, code):
+    stamp = {"sec": 1, "nanosec": 0}
+    return {"goal_id": {"id": id_, "stamp": stamp}, "status": {"code": code, "text": ""}}
 
 
 def _holds(rule, trace):
@@ -31,11 +42,11 @@ def test_a_special_goal_is_refused_or_accepted(status, refused, accepted):
         (422, None, True, "status 422"),
         (500, None, False, "status 500"),
         (202, 404, True, "status 202"),
-        (202, 200, False, "a goal that is active 10 s later"),
+        (202, 200, False, "a goal that is active 60 s later"),
     ],
 )
 def test_a_goal_outside_every_map_is_refused_or_ends(status, read, holds, observed):
-    far = FarGoal(exchange(status), None if read is None else exchange(read), 10.0)
+    far = FarGoal(exchange(status), None if read is None else exchange(read), 60.0)
     (case,) = rules.goal_unreachable.outcomes(RefusedGoals(far=(far,)), {}.__getitem__)
     assert (case.holds, case.observed) == (holds, observed)
 
@@ -67,6 +78,42 @@ def test_a_goal_is_accepted_and_shown_under_its_id_unless_it_has_ended():
 
     assert _holds(ids.goal_id, (put(201), put(400), put(202, "goal_id.id b for a"))) == [True, False, True, True, False]
     assert _holds(ids.goal_preempt, (put(201, "status 404", ended=True), put(422), put(201))) == [True]
+
+
+@pytest.mark.parametrize(
+    ("left_m", "off_rad", "reached_rad", "way_m", "holds"),
+    [
+        (0.25, 0.25, 0.27, 0.5, True),
+        (0.29, 0.0, 0.27, 0.5, False),
+        (0.1, -0.6, 0.27, 0.5, False),
+        (0.1, -0.6, None, 0.5, True),
+        (0.1, 0.0, 0.27, 0.1, False),
+    ],
+)
+def test_a_goal_is_reached_within_its_tolerances(left_m, off_rad, reached_rad, way_m, holds):
+    trace = GoalReached(
+        exchange(201), Pose(1.0, 0.0, 0.0), way_m=way_m, has_to_m=0.15, left_m=left_m, reached_m=0.27, off_rad=off_rad
+    )
+    trace = replace(trace, reached_rad=reached_rad, read=exchange(404), ended=True)
+    assert _holds(drives.goal_drives, trace) == [holds]
+    assert _holds(drives.goal_drives, replace(trace, undecided=True)) == []
+
+
+@pytest.mark.parametrize(
+    ("last", "fault"),
+    [
+        (None, "no member last_goal"),
+        ({"goal_id": {"id": "a"}}, "last_goal"),
+        (_last("b", 4), "last_goal.goal_id.id"),
+        (_last("a", 6), "last_goal.status.code 6"),
+        (_last("a", 4), ""),
+    ],
+)
+def test_how_a_goal_ended_is_told_with_its_id(last, fault):
+    body = json.dumps({"status": 404, "detail": "none", "last_goal": last}).encode()
+    found = outcome_fault(exchange(404, body), SUCCEEDED, "a")
+    assert found.startswith(fault)
+    assert bool(found) == bool(fault)
 
 
 @pytest.mark.parametrize(

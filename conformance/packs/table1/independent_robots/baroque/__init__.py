@@ -38,13 +38,15 @@ BUILD = Build(
 )
 
 
-def serve(rest_port: int, soap_port: int, kind: type[Body] = Body) -> tuple[str, str, Callable[[], None]]:
-    """Start the robot; ``kind`` may be a body with a fault.
+def serve(
+    rest_port: int, soap_port: int, kind: type[Body] = Body, build: Build = BUILD
+) -> tuple[str, str, Callable[[], None]]:
+    """Start the robot; ``kind`` may be a body with a fault, and ``build`` another robot.
 
     Returns:
         REST's base URL, the publishers' WSDL, and a function that stops the robot.
     """
-    body = kind(BUILD, yields=True)
+    body = kind(build, yields=True)
     loop = Loop()
     rest_at = loop.listen(Rest(body).answer, rest_port)
     soap = Soap(body)

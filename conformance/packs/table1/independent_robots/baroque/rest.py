@@ -109,9 +109,9 @@ class Rest:
         value = _input(ask, "Twist" if whole else "Vector3")
         twist = value if whole else {"linear": value, "angular": dict.fromkeys("xyz", 0)}
         for part, axis in _UNACTUATED:
-            if twist[part][axis] != 0:
-                name = f"{part}.{axis}" if whole else axis
-                raise NotTakenError(422, f"{name} = {twist[part][axis]} should be 0: this robot has two wheels")
+            name, most = f"{part}.{axis}" if whole else axis, self._body.further_axes
+            if abs(twist[part][axis]) > most:
+                raise NotTakenError(422, f"{name} = {twist[part][axis]} exceeds {most}: this robot has two wheels")
         v, w = float(twist["linear"]["x"]), float(twist["angular"]["z"])
         for name, given, limit in (
             ("linear.x" if whole else "x", v, self._body.build.linear_m_s),

@@ -2,13 +2,18 @@
 
 import math
 import threading
+from typing import Final
 
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.robot import Velocity
 from conformance.packs.table1.ros_process import ProbeError, RosProcess
 from conformance.packs.table1.statement import Ros
 
-__all__ = ["Probe", "ProbeError", "RosProbe"]
+#: How long the robot's messages are waited for, s. DDS sends a lost sample again after its writer's next heartbeat, and
+#: Fast DDS has one every 3 s: on Wi-Fi a message may come so late.
+ARRIVES_S: Final = 5.0
+
+__all__ = ["ARRIVES_S", "Probe", "ProbeError", "RosProbe"]
 
 
 class Probe(RosProcess):

@@ -40,7 +40,9 @@ def test_pose_and_velocity(robot: Robot, subscribers: SoapService, judge: Judge,
     """Compare pose and velocity over REST and SOAP, whatever the robot is doing."""
     for turn in range(effort.cases(_POSES)):
         for name in STATES if turn < effort.cases(50) else ("pose",):
-            if f"equivalence/{name}" not in judge.refuted():  # it costs three tries each time
+            if (
+                evidence := judge.of(f"equivalence/{name}")
+            ) is None or not evidence.findings:  # it costs three tries each time
                 outcomes = (case for read in compare(robot, subscribers, name) for case in read.cases)
                 record(judge, f"equivalence/{name}", outcomes)
 

@@ -75,8 +75,9 @@ def test_numbers_in_any_form(api: RestInterface, judge: Judge, explore: Explorer
 
 
 @pytest.mark.requirement("rest-delivery/put-body")
-def test_a_body_is_ignored(rest: HttpClient, judge: Judge, effort: Effort) -> None:
+def test_a_body_is_ignored(api: RestInterface, rest: HttpClient, judge: Judge, effort: Effort) -> None:
     """PUT deliveries with bodies of any media type, which the robot must ignore."""
+    put_delivery(api, _PAPER.rest_path)
     for media_type, body in _BODIES * effort.cases(1):
         exchange = rest.send("PUT", _PAPER.rest_path, headers=(("Content-Type", media_type),), body=body)
         judge.check(

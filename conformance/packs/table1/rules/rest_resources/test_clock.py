@@ -10,15 +10,27 @@ from conformance.verdict.evidence import Judge
 # Late in a run: the longer it has lasted, the better its stamps tell.
 pytestmark = [pytest.mark.phase("acting"), pytest.mark.needs("rest")]
 _STEP_S = 0.1
+# How far the clock may be off, and how old the odometry may be; a Date has no part of a second.
+_OFF_S, _OLD_S, _UNIT_S = 5.0, 1.0, 1.0
 
 
-@pytest.mark.requirement("rest-resources/pose-clock")
+@pytest.mark.requirement("rest-resources/pose-clock", "rest-resources/pose-clock-offset")
 def test_clock(robot: Robot, judge: Judge, clock: Clock) -> None:
     """Check that the stamps advance as fast as local time."""
     for _ in poll_for(robot.clock, _STEP_S, SPAN_S + 1):
         robot.odometry()  # which is kept when the last reading is a while ago
         if clock.rate is not None:
             break
+    if clock.ahead_s is not None and robot.limits.time_scale == 1:
+        ahead, declared = clock.ahead_s, robot.limits.clock_offset_s
+        judge.check(
+            "rest-resources/pose-clock-offset",
+            -_OFF_S - _OLD_S <= ahead - declared <= _OFF_S + _UNIT_S,
+            robot.get(POSE),
+            f"a stamp within {_OFF_S:g} s of Date, or ahead of it by the declared clock_offset_s, {declared:g} s",
+            found=f"a stamp {ahead:.1f} s ahead of Date",
+            cause="another time",
+        )
     rate, scale = clock.rate, robot.limits.time_scale
     if rate is None:
         judge.skip("rest-resources/pose-clock", f"no odometry could be read for {SPAN_S:g} s")

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from conformance.packs.table1.robot.drive_rules import outcomes
 from conformance.packs.table1.scenarios.straight import straight
 from conformance.packs.table1.scenarios.trace import Driven
-from conformance.packs.table1.scenarios.turn import turn
+from conformance.packs.table1.scenarios.turn import further_axes, turn
 from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
-from conformance.scenarios.rule import Outcome, Rule, rule
+from conformance.scenarios.rule import NotClaimed, Outcome, Rule, rule
 from conformance.scenarios.scenario import Scenario
 from conformance.verdict.run import Run
 
@@ -25,11 +25,24 @@ def _shown(name: str, *scenarios: Scenario) -> Rule:
 
 velocity_put = _shown("velocity-put", straight, velocity_walk)
 velocity_integers = _shown("velocity-integers", turn)
-velocity_converges = _shown("velocity-converges", straight, turn, velocity_walk)
-velocity_range = _shown("velocity-range", straight, turn)
+velocity_converges = _shown("velocity-converges", straight, turn, further_axes, velocity_walk)
+velocity_range = _shown("velocity-range", straight, turn, further_axes)
+
+
+@rule("rest-resources/velocity-both", on=(turn,))
+def velocity_both(trace: Driven, run: Run) -> Iterator[Outcome]:
+    """Judge that the robot reaches both limits at once, where its statement does not say that it cannot."""
+    statement = said_of(run)
+    found = list(outcomes("rest-resources/velocity-both", trace.drive, statement.limits))
+    if not found:
+        # Either the statement declares how the two depend on each other, or there are no two limits.
+        yield NotClaimed("does not apply: by its statement the robot need not, or velocity-range judges it")
+    yield from found
+
+
 velocity_odometry = _shown("velocity-odometry", straight, turn, velocity_walk)
 linear_put = _shown("linear-put", turn, velocity_walk)
 linear_keeps_angular = _shown("linear-keeps-angular", turn, velocity_walk)
 linear_agrees = _shown("linear-agrees", straight, turn, velocity_walk)
-pose_motion = _shown("pose-motion", straight, turn, velocity_walk)
+pose_motion = _shown("pose-motion", straight, turn, further_axes, velocity_walk)
 pose_rotation = _shown("pose-rotation", turn, velocity_walk)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from conformance.packs.table1.robot.drive_rules import outcomes
-from conformance.packs.table1.robot.goal import NEW
+from conformance.packs.table1.robot.goal import NEW, SUCCEEDED, outcome_fault
 from conformance.packs.table1.robot.goal_trace import GoalReached
 from conformance.packs.table1.scenarios.goal_reached import goal_reached
 from conformance.packs.table1.statement import said_of
@@ -19,16 +19,18 @@ def goal_put(trace: GoalReached) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-drives", on=(goal_reached,))
 def goal_drives(trace: GoalReached) -> Iterator[Outcome]:
-    """Judge that the robot drove, and to the target."""
+    """Judge that the robot drove, and to the target's position and heading."""
     if trace.there is None or trace.read is None or trace.undecided:
         return  # refused, or slow but on its way: nothing to be said against it
-    far = trace.way_m > trace.has_to_m
+    far, there = trace.way_m > trace.has_to_m, trace.left_m < trace.reached_m
+    heading = "" if trace.reached_rad is None else f", with a heading within {trace.reached_rad:.2f} rad of its heading"
+    turned = "" if trace.reached_rad is None else f" and {abs(trace.off_rad):.2f} rad off its heading"
     yield Case(
-        trace.left_m < trace.reached_m and far,
+        trace.arrived and far,
         trace.read,
-        f"the robot at ({trace.there.x:.2f}, {trace.there.y:.2f}), where its goal was",
-        f"the robot {trace.left_m:.2f} m away from it, having moved {trace.way_m:.2f} m",
-        "not reached" if far else "not driven",
+        f"the robot within {trace.reached_m:.2f} m of its goal at ({trace.there.x:.2f}, {trace.there.y:.2f}){heading}",
+        f"the robot {trace.left_m:.2f} m away from it{turned}, having moved {trace.way_m:.2f} m",
+        "not driven" if not far else "another heading" if there else "not reached",
     )
 
 
@@ -39,6 +41,14 @@ def goal_ended(trace: GoalReached) -> Iterator[Outcome]:
         holds = trace.ended and trace.read.response.status == 404
         observed = "" if trace.ended else "a goal that is still active"
         yield Case(holds, trace.read, "404 when the goal has been reached", observed)
+
+
+@rule("rest-resources/goal-outcome", on=(goal_reached,))
+def goal_outcome(trace: GoalReached) -> Iterator[Outcome]:
+    """Judge that the 404 after the goal says that the goal was reached."""
+    if trace.read is not None and trace.ended and trace.arrived:
+        wrong = outcome_fault(trace.read, SUCCEEDED, "reached")
+        yield Case(not wrong, trace.read, "a 404 with last_goal {goal_id, status}, which succeeded (code 4)", wrong)
 
 
 @rule("rest-resources/goal-id-again", on=(goal_reached,))

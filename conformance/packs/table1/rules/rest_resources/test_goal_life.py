@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from conformance.packs.table1.robot.drive_rules import outcomes
-from conformance.packs.table1.robot.goal import CANCELLED, NEW, REPEATED, status_fault
+from conformance.packs.table1.robot.goal import CANCELED, CANCELLED, NEW, REPEATED, outcome_fault, status_fault
 from conformance.packs.table1.robot.goal_trace import GoalLife, Put
 from conformance.packs.table1.scenarios.goal_life import ID, goal_life
 from conformance.packs.table1.statement import said_of
@@ -149,3 +149,14 @@ def goal_delete(trace: GoalLife) -> Iterator[Outcome]:
             "204 for DELETE, then 404 for GET",
             f"{one.read.came} for GET" if accepted else "",
         )
+
+
+@rule("rest-resources/goal-outcome", on=(goal_life,))
+def goal_outcome(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge that the 404 after a DELETE says that the goal was cancelled."""
+    for one in trace.cancelled:
+        if one.exchange.response.status in CANCELLED and one.gone:
+            wrong = outcome_fault(one.read, CANCELED)
+            yield Case(
+                not wrong, one.read, "a 404 with last_goal {goal_id, status}, which was canceled (code 5)", wrong
+            )

@@ -39,7 +39,7 @@ def limits_hold(trace: RefusedVelocities) -> Iterator[Outcome]:
 def unactuated_refused(trace: RefusedVelocities) -> Iterator[Outcome]:
     """Judge that a velocity in a component that the robot does not actuate is rejected with 4xx."""
     if trace.all_actuated:
-        yield NotClaimed("the statement says that the robot actuates all components")
+        yield NotClaimed("does not apply: by its statement the robot actuates all six components, so each is driven")
     for one in trace.unactuated:
         expected = f"422 (another 4xx conforms) for {one.velocity}, which the robot cannot actuate"
         holds = is_refused(one.exchange) or one.reached

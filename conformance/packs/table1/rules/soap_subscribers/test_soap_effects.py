@@ -2,9 +2,20 @@
 
 from collections.abc import Iterator
 
-from conformance.packs.table1.scenarios.soap_effects import GOAL_ID, Misunderstood, goal_by_soap, misunderstood
+from conformance.api.soap.calls import read_exchange
+from conformance.api.soap.content import text_at
+from conformance.packs.table1.scenarios.soap_effects import (
+    GOAL_ID,
+    GoalBySoap,
+    Misunderstood,
+    goal_by_soap,
+    misunderstood,
+)
 from conformance.scenarios.rule import Case, Note, Outcome, rule
-from conformance.transport.exchange import Exchange
+
+_LAST = ("detail", "last_goal")
+# The goal has succeeded, or was cancelled.
+_ENDED = frozenset({"4", "5"})
 
 
 @rule("soap-basic-profile/R1025", on=(misunderstood,))
@@ -25,11 +36,23 @@ def fault_ends_processing(trace: Misunderstood) -> Iterator[Outcome]:
 
 
 @rule("soap-subscribers/goal", on=(goal_by_soap,))
-def goal_is_shown(trace: tuple[tuple[Exchange, str | None], ...]) -> Iterator[Outcome]:
+def goal_is_shown(trace: GoalBySoap) -> Iterator[Outcome]:
     """Judge that GetGoal shows the active goal."""
-    for exchange, shown in trace:
+    if trace.shown is not None:
+        exchange, shown = trace.shown
         expected = f"the active goal, with goal_id.id {GOAL_ID!r}"
         yield Case(shown == GOAL_ID, exchange, expected, f"goal_id.id {shown!r}")
+
+
+@rule("soap-subscribers/goal-outcome", on=(goal_by_soap,))
+def outcome_is_told(trace: GoalBySoap) -> Iterator[Outcome]:
+    """Judge that a fault of GetGoal after a goal says which goal has ended, and how."""
+    fault = None if trace.after is None else read_exchange(trace.after).fault
+    if fault is not None:
+        id_ = text_at(fault.element, *_LAST, "goal_id", "id")
+        code = text_at(fault.element, *_LAST, "status", "code")
+        expected = f"a detail with last_goal: goal_id.id {GOAL_ID!r}, and status.code 4 or 5"
+        yield Case(id_ == GOAL_ID and code in _ENDED, trace.after, expected, f"id {id_!r} and code {code!r}")
 
 
 def _no_effect(trace: Misunderstood) -> Iterator[Case]:

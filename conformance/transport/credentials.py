@@ -1,0 +1,161 @@
+"""Credentials that requests carry: where each goes, and what findings show in place of its secret.
+
+A secret never leaves this module but in a request: ``str()`` and ``repr()`` of a credential show none, and a result has
+the name of a shell variable (``$ROAAS_TOKEN``) where the secret was.
+"""
+
+import base64
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any, Final
+from urllib.parse import quote
+
+# A shorter secret is not looked for in responses: it would be found everywhere.
+_SHORTEST: Final = 4
+_VARIABLE: Final = re.compile(r"\$ROAAS_[A-Z0-9_]+")
+_WRONG: Final = "roaas-not-this-one"
+
+
+class Kind(StrEnum):
+    """Where a credential goes."""
+
+    BEARER = "bearer"
+    BASIC = "basic"
+    HEADER = "header"
+    QUERY = "query"
+    COOKIE = "cookie"
+
+
+@dataclass(frozen=True)
+class Credential:
+    """One credential.
+
+    Attributes:
+        kind: where it goes.
+        secret: the token, the key, the header's value, or ``user:password`` for ``basic``.
+        name: of the header, the query parameter or the cookie; empty for ``bearer`` and ``basic``.
+    """
+
+    kind: Kind
+    secret: str = field(repr=False)
+    name: str = ""
+
+    @property
+    def variable(self) -> str:
+        """The shell variable that stands for the sent text, with its dollar sign."""
+        own = {Kind.BEARER: "TOKEN", Kind.BASIC: "BASIC"}.get(self.kind)
+        return f"$ROAAS_{own or re.sub('[^A-Z0-9]', '_', f'{self.kind}_{self.name}'.upper())}"
+
+    @property
+    def sent(self) -> str:
+        """The secret as it stands in a request."""
+        if self.kind is Kind.BASIC:
+            return base64.b64encode(self.secret.encode()).decode()
+        return quote(self.secret, safe="") if self.kind is Kind.QUERY else self.secret
+
+    @property
+    def header(self) -> str:
+        """Name of the header that it goes into; empty for a query parameter."""
+        named = {Kind.HEADER: self.name, Kind.COOKIE: "Cookie", Kind.QUERY: ""}
+        return named.get(self.kind, "Authorization")
+
+    def value(self, text: str) -> str:
+        """Return the header's value, or the query, with ``text`` for the secret."""
+        forms = {Kind.BEARER: f"Bearer {text}", Kind.BASIC: f"Basic {text}", Kind.HEADER: text}
+        return forms.get(self.kind, f"{self.name}={text}")
+
+    @property
+    def wrong(self) -> "Credential":
+        """The same credential with a secret that no robot knows."""
+        return Credential(self.kind, f"{_WRONG}:x" if self.kind is Kind.BASIC else _WRONG, self.name)
+
+
+@dataclass(frozen=True)
+class Credentials:
+    """All credentials of a run.
+
+    Attributes:
+        items: each goes into every request.
+    """
+
+    items: tuple[Credential, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.items)
+
+    def fields(self, given: Iterable[str] = (), *, shown: bool = False) -> list[tuple[str, str]]:
+        """Return the headers to add to a request.
+
+        Args:
+            given: names of headers that the request has already: they are left as they are.
+            shown: with variables in place of the secrets.
+        """
+        there = {name.lower() for name in given}
+        found: dict[str, str] = {}
+        for item in self.items:
+            if item.header and item.header.lower() not in there:
+                value = item.value(item.variable if shown else item.sent)
+                # Cookies share one header (RFC 6265 5.4); of two others the last one is meant.
+                together = item.kind is Kind.COOKIE and item.header in found
+                found[item.header] = f"{found[item.header]}; {value}" if together else value
+        return list(found.items())
+
+    def target(self, target: str, *, shown: bool = False) -> str:
+        """Return a request target with the credentials that go into the query."""
+        queries = [item.value(item.variable if shown else item.sent) for item in self.items if not item.header]
+        return target + "".join(f"{'&' if '?' in target or number else '?'}{one}" for number, one in enumerate(queries))
+
+    def hidden(self, text: str) -> str:
+        """Return a text with variables in place of secrets, for whatever a robot repeats of them."""
+        for item in self.items:
+            for secret in {item.sent, item.secret, *item.secret.split(":", 1)[1:]}:
+                if len(secret) >= _SHORTEST:
+                    text = text.replace(secret, item.variable)
+        return text
+
+    def hidden_bytes(self, octets: bytes) -> bytes:
+        """Return bytes with variables in place of secrets."""
+        return self.hidden(octets.decode("latin-1")).encode("latin-1", "replace") if self.items else octets
+
+    def revealed(self, octets: bytes) -> bytes:
+        """Return bytes with the secrets in place of variables, to send a recorded request again."""
+        for item in self.items:
+            octets = octets.replace(item.variable.encode(), item.sent.encode("latin-1"))
+        return octets
+
+    def hidden_in(self, value: Any) -> Any:
+        """Return JSON with variables in place of secrets in all of its texts."""
+        if not self.items:
+            return value
+        if isinstance(value, str):
+            return self.hidden(value)
+        if isinstance(value, dict):
+            return {key: self.hidden_in(item) for key, item in value.items()}
+        return [self.hidden_in(item) for item in value] if isinstance(value, list | tuple) else value
+
+    @property
+    def wrong(self) -> "Credentials":
+        """The same credentials with secrets that no robot knows."""
+        return Credentials(tuple(item.wrong for item in self.items))
+
+
+def bearer(token: str) -> Credential:
+    """Return the credential for a bearer token (RFC 6750)."""
+    return Credential(Kind.BEARER, token)
+
+
+def is_shown(value: str) -> bool:
+    """Return whether a header's value in a recorded request stands for a credential."""
+    return _VARIABLE.search(value) is not None
+
+
+def quoted(word: str) -> str | None:
+    """Return a shell word in which credentials' variables are expanded; None if it has none."""
+    if not is_shown(word):
+        return None
+    parts = re.split(f"({_VARIABLE.pattern})", word)
+    return (
+        '"' + "".join(part if odd % 2 else re.sub(r'([\\"$`])', r"\\\1", part) for odd, part in enumerate(parts)) + '"'
+    )

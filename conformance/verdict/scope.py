@@ -1,0 +1,32 @@
+"""The verdict's first line: to what a robot conforms, how that was seen, and on how many of the cases."""
+
+from collections.abc import Collection, Iterable
+
+from conformance.contract.pack import Contract
+from conformance.verdict.run import Run
+from conformance.verdict.verdicts import Overall, Verdict, View, views
+
+_WORDS = {
+    Overall.CONFORMANT: "conformant to",
+    Overall.NOT_CONFORMANT: "not conformant to",
+    Overall.INCONCLUSIVE: "inconclusive for",
+}
+
+
+def claimed(contract: Contract, claims: Collection[str]) -> str:
+    """Return the claimed classes in words: a profile's name, or the classes' names and "only"."""
+    profile = next((name for name, classes in contract.profiles.items() if set(classes) == set(claims)), "")
+    return profile or f"{', '.join(claims) or 'nothing'} only"
+
+
+def view_of(verdicts: Iterable[Verdict]) -> View:
+    """Return how the robot was seen: on ROS if a probe observed every class that it could observe."""
+    found = set(views(verdicts).values())
+    return View.ON_ROS if found == {View.ON_ROS} else View.BLACK_BOX
+
+
+def verdict_line(run: Run, value: Overall, verdicts: Iterable[Verdict]) -> str:
+    """Return the verdict in a line, such as "conformant to full (contract 1.2), seen on ROS"."""
+    contract = f" (contract {run.contract.label})" if run.contract.label else ""
+    said = f"{_WORDS[value]} {claimed(run.contract, run.claims)}{contract}, {view_of(verdicts)}"
+    return f"{said}, {run.less}" if run.less else said
