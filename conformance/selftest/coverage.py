@@ -116,7 +116,7 @@ def disagreements(contract: Contract) -> list[str]:
         if mutants and item.id in shown and not binding.mutants and item.level != Level.MAY:
             problems.append(f"{item.id} is {item.level}, and no mutant shows that it is judged")
     for id_, checks in checks_by_requirement(contract).items():
-        if id_ not in known:
+        if id_ not in known and id_ not in generic_ledger():
             problems.append(f"{checks[0]} judges {id_!r}, which the ledger does not have")
     return list(dict.fromkeys([*problems, *_misnamed(mutants, known)]))
 

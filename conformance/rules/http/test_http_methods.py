@@ -125,8 +125,8 @@ def _judge_agreement(api: RestInterface, judge: Judge, seen: list[tuple[Resource
         is_refused = exchange.response.status == HTTPStatus.METHOD_NOT_ALLOWED
         refused = {exchange.request.method} - _ALWAYS_ALLOWED if is_refused else set()
         besides = sorted(named - wanted - _ALWAYS_ALLOWED)
-        declared = f"Allow with declared methods only: {', '.join(sorted(wanted))}"
-        expect(judge, "description/allow", exchange).that(not besides, declared, f"{besides} besides", cause=str(besides))
+        declared, found = f"Allow: {', '.join(sorted(wanted))}, as declared", f"{', '.join(besides)} besides"
+        expect(judge, "description/allow", exchange).that(not besides, declared, found, cause=found)
         if wanted <= named and not refused & named:
             expect(judge, "http/allow-agrees", exchange).that(holds=True, expected="Allow with all methods")
         else:
