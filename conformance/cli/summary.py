@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 _MARKS = {"pass": "pass", "fail": "FAIL", "inconclusive": "inconclusive", "not-claimed": "not claimed"}
 # A device that is judged by its own description conforms to no contract.
-_OF_DESCRIBED = {"conformant": "keeps its own description", "not-conformant": "does not keep its own description"}
 _SHOWN_CURL = 1000
 _SHOWN_BLOCKED = 5
 
@@ -45,14 +44,12 @@ def print_summary(outcome: Certification) -> None:
             _print_cause(cause, requirement)
     counts = Counter(requirement["verdict"] for requirement in document["requirements"])
     told = ", ".join(f"{count} {value}" for value, count in sorted(counts.items()))
-    verdict = document["verdict"]
     if "api" in document:
-        verdict = _OF_DESCRIBED.get(verdict, verdict)
         called, described = document["api"]["coverage"]["operations"]
         told = f"{called} of {described} operations called; {told}"
     accepted = f", accepted by the baseline until {document['accepted_until']}" if "accepted_until" in document else ""
     click.echo(
-        f"\n{verdict}{accepted}: {told}; "
+        f"\n{document['verdict_line']}{accepted}: {told}; "
         f"{document['requests']} requests in {document['duration_s']:.1f} s, seed {document['seed']}"
     )
     click.echo(f"result: {outcome.path}")

@@ -11,6 +11,12 @@ _WORDS = {
     Overall.NOT_CONFORMANT: "not conformant to",
     Overall.INCONCLUSIVE: "inconclusive for",
 }
+# An API that is judged by its own description conforms to no contract.
+_OF_DESCRIBED = {
+    Overall.CONFORMANT: "keeps its own description",
+    Overall.NOT_CONFORMANT: "does not keep its own description",
+    Overall.INCONCLUSIVE: "inconclusive",
+}
 
 
 def claimed(contract: Contract, claims: Collection[str]) -> str:
@@ -27,6 +33,9 @@ def view_of(verdicts: Iterable[Verdict]) -> View:
 
 def verdict_line(run: Run, value: Overall, verdicts: Iterable[Verdict]) -> str:
     """Return the verdict in a line, such as "conformant to full (contract 1.2), seen on ROS"."""
+    if run.contract.described:
+        said = _OF_DESCRIBED[value]
+        return f"{said}, {run.less}" if run.less else said
     contract = f" (contract {run.contract.label})" if run.contract.label else ""
     said = f"{_WORDS[value]} {claimed(run.contract, run.claims)}{contract}, {view_of(verdicts)}"
     return f"{said}, {run.less}" if run.less else said

@@ -135,7 +135,7 @@ class Certificate:
     @property
     def verdict_line(self) -> str:
         """Return the verdict and what it is about, such as "conformant to full (contract 1.2), seen on ROS"."""
-        return str(self.result.get("verdict_line") or VERDICT_WORDS[self.result["verdict"]])
+        return str(self.result.get("verdict_line") or verdict_words(self.result)[self.result["verdict"]])
 
     @property
     def title(self) -> str:

@@ -89,7 +89,10 @@ def test_a_pack_that_does_not_say_how_its_device_starts_is_told_what_it_needs(tm
     (tmp_path / "openapi.yaml").write_text(Path(LAMP, "openapi.yaml").read_text())
     done = run(selftest, "--contract", str(tmp_path), "--generated", "1")
     assert (done.exit_code, "selftest.py" in done.output) == (2, True), done.output
-    assert "status:GET /lamp:answer-418" in run(selftest, "--contract", str(tmp_path), "--generated", "900", "--list").output
+    assert (
+        "status:GET /lamp:answer-418"
+        in run(selftest, "--contract", str(tmp_path), "--generated", "900", "--list").output
+    )
 
 
 def test_requirements_are_listed():
