@@ -1,4 +1,7 @@
-"""The judge, which collects the evidence of checks and observers for each requirement."""
+"""The judge, which collects the evidence of checks and observers for each requirement.
+
+Over 300 lines because the judge is one class, and what it records is read together with it.
+"""
 
 import re
 import threading

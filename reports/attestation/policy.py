@@ -60,7 +60,7 @@ class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     profile: str = "full"
     classes: tuple[str, ...] | None = None
     suites: tuple[str, ...] = (OWN,)
-    requirement_sets: tuple[str, ...] = ("1.1",)
+    requirement_sets: tuple[str, ...] = ("1.2",)
     efforts: tuple[str, ...] = ("standard", "deep")
     motion: bool = True
     ros: bool = False

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from conformance.cli.selftest import selftest
 
-_DEVICES = Path(__file__).parents[2] / "described_devices"
+_DEVICES = Path(__file__).parents[1] / "described_devices"
 _START_S = 60.0
 
 

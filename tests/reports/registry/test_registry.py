@@ -53,7 +53,7 @@ def test_a_robot_has_a_row_and_a_page(host):
     assert index(host) == {"Courier 7": ("conformant", {"http": "good", "safety": "good", "describe": "quiet"})}
     row = page_of(host.site / "index.html").xpath("//tbody/tr")[0]
     text = row.text_content()
-    for told in ("Example Robotics", "2.4", "RoAAS 1.1.0", "set 1.1", "standard effort", "key "):
+    for told in ("Example Robotics", "2.4", "RoAAS 1.1.0", "set 1.2", "standard effort", "key "):
         assert told in text
     assert row.get("data-may") == "0 1"
     robot = host.site / row.xpath("string(th/a/@href)")
@@ -69,8 +69,8 @@ NOT_GREEN = [
     ({"days_ago": 366}, "expired"),
     ({"days_ago": -1}, "dated in the future"),
     ({"requirement_set": None}, "another requirement set"),
-    ({"requirement_set": {"name": "1.1", "digest": "sha256:" + "8" * 64}}, "another requirement set"),
-    ({"requirement_set": {"name": "1.2", "digest": "sha256:" + "7" * 64}}, "another requirement set"),
+    ({"requirement_set": {"name": "1.2", "digest": "sha256:" + "8" * 64}}, "another requirement set"),
+    ({"requirement_set": {"name": "1.1", "digest": "sha256:" + "7" * 64}}, "another requirement set"),
     ({"suite__digest": "sha256:" + "6" * 64}, "an unknown suite"),
     ({"effort": "quick"}, "too little effort"),
     ({"statement__motion_allowed": False}, "was not allowed to move"),
