@@ -46,6 +46,14 @@ def _one_host() -> None:
         raise BadRequest("Host is not there once")
 
 
+@application.before_request
+def _whole() -> None:
+    """Reject a request whose client vanished before its content was complete: WSGI servers hand on what there is."""
+    request = flask.request
+    if request.content_length is not None and len(request.get_data()) < request.content_length:
+        raise BadRequest("the content ends before its Content-Length")
+
+
 @application.errorhandler(HTTPException)
 def _refused(error: HTTPException) -> flask.Response:
     """Turn Flask's own errors into problems, and keep their header fields."""
