@@ -1,0 +1,51 @@
+"""Reads that require credentials by the description: who is asked, and how the responses are judged."""
+
+import pytest
+from toy_messages import exchange
+from toy_server import serving
+
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.values import Values
+from conformance.contract.described import write_described_pack
+from conformance.contract.pack import Contract
+from conformance.rules.description.test_security import security
+from conformance.scenarios.anonymous import anonymous_reads
+from conformance.statement.statement import Endpoints, Statement
+from conformance.transport.client import Connection, HttpClient
+from conformance.verdict.run import Run
+
+_ANSWERS = {"responses": {"200": {"description": "done"}}}
+_DOCUMENT = {
+    "openapi": "3.1.0",
+    "info": {"title": "Gate", "version": "1"},
+    "components": {"securitySchemes": {"key": {"type": "http", "scheme": "bearer"}}},
+    "security": [{"key": []}],
+    "paths": {
+        "/closed": {"get": _ANSWERS, "post": _ANSWERS},
+        "/open": {"get": {**_ANSWERS, "security": []}},
+        "/either": {"get": {**_ANSWERS, "security": [{"key": []}, {}]}},
+    },
+}
+
+
+def test_reads_that_require_credentials_are_sent_without_them(tmp_path):
+    seen = []
+
+    def answer(method, path, _content):
+        seen.append((method, path))
+        return 401, None
+
+    contract = Contract.load(write_described_pack(tmp_path, _DOCUMENT, _DOCUMENT))
+    with serving(answer) as url:
+        run = Run(statement=Statement(endpoints=Endpoints(rest=url)), contract=contract)
+        client = HttpClient(url, Connection(token="roaas"))  # noqa: S106 - no secret
+        trace = anonymous_reads.play(RestInterface(run, client), Values())
+        client.close()
+    assert seen == [("GET", "/closed")]
+    assert not any(name == "Authorization" for one in trace for name, _ in one.request.headers)
+
+
+@pytest.mark.parametrize(("status", "holds"), [(401, True), (403, True), (404, True), (200, False), (204, False)])
+def test_a_read_without_credentials_must_be_refused(status, holds):
+    (case,) = security.outcomes((exchange(status),), {}.__getitem__)
+    assert case.holds is holds
