@@ -139,6 +139,7 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
 def _leave_out(seen: Mapping[str, Evidence]) -> None:
     """Leave out what no permitted request shows: an API that is judged by its description has claimed nothing else."""
     for evidence in seen.values():
+        evidence.parts = {part: cases for part, cases in evidence.parts.items() if cases}
         if not (evidence.cases or evidence.errors or evidence.because or evidence.unclaimed):
             evidence.unclaimed = (evidence.skips or ["nothing that may be called shows it"])[0]
 
