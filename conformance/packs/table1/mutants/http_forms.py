@@ -104,6 +104,9 @@ def _and_rubbish(response: Response) -> None:
     response.raw = response.octets() + b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n"
 
 
+_HOST = re.compile(rb"(?i)\r\nHost:[ \t]*([^\r\n]+)")
+
+
 def _mended(pattern: bytes) -> Callable[[Request], Request | None]:
     """Return a function that makes a plain GET of a malformed request, or returns None for other requests."""
     compiled = re.compile(pattern)
@@ -112,7 +115,9 @@ def _mended(pattern: bytes) -> Callable[[Request], Request | None]:
         if request.side != "rest" or request.raw is None or not compiled.search(request.raw):
             return None
         line = request.raw.split(b"\r\n", 1)[0].decode("latin-1").split(" ")
-        return Request("rest", "GET", line[1], fields=[("Host", "robot")])
+        # A robot may know its own names, and answer no other.
+        host = _HOST.search(request.raw)
+        return Request("rest", "GET", line[1], fields=[("Host", host[1].decode("latin-1") if host else "robot")])
 
     return mend
 
