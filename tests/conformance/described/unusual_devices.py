@@ -215,7 +215,9 @@ class _Guarded(Handler):
 
     def answer(self) -> None:
         path, _, query = self.path.removeprefix(f"http://{self.headers.get('Host')}").partition("?")
-        if len(self.headers.get_all("Host", [])) != 1 or len(self.headers.get_all("Content-Length", [])) > 1:
+        lengths, coding = self.headers.get_all("Content-Length", []), self.headers.get("Transfer-Encoding")
+        spaced = any(name != name.rstrip() for name in self.headers)
+        if len(self.headers.get_all("Host", [])) != 1 or len(lengths) > 1 or coding or spaced:
             self.close_connection = True
             self.send(400)
         elif path == "/openapi.json":

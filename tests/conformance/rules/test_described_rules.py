@@ -1,6 +1,7 @@
 """The rules of the classes `description` and `robustness` by traces made by hand: right devices, and one fault each."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -65,6 +66,11 @@ def _probe(
     return Probe(operation, kind, exchange=Exchange(request, Response(status, fields, content, 1.0)), **more)
 
 
+def _conditional(probe):
+    request = replace(probe.exchange.request, headers=(("If-None-Match", '"a"'),))
+    return replace(probe, exchange=replace(probe.exchange, request=request))
+
+
 def _silent(kind_of_silence, kind=Kind.ODD, operation=_LABEL):
     unanswered = Unanswered(Request("GET", "http://h/a/1", (), b""), "nothing came", kind_of_silence)
     return Probe(operation, kind, unanswered=unanswered)
@@ -81,7 +87,7 @@ _RIGHT = [
     _probe(404, {"detail": ""}, Kind.UNKNOWN, **_PROBLEM),
     _probe(body={"n": 1, "at": "2026-01-31T12:00:00Z", "more": 1}),
     _probe(body={"n": 1, "at": None}),
-    _probe(304, b""),
+    _conditional(_probe(304, b"")),
     _probe(401, b"", x_n=""),
     _probe(429, b"", x_n=""),
     _page(400, kind=Kind.ODD),

@@ -5,14 +5,9 @@ import json
 import pytest
 
 from conformance.api.rest.inputs import NOTHING, Inputs, usual_inputs, written
+from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.values import Values, fits
-from conformance.api.rest.variations import (
-    Kind,
-    invalid_variations,
-    odd_variations,
-    unknown_variations,
-    valid_variations,
-)
+from conformance.api.rest.variations import Kind, odd_variations, unknown_variations, valid_variations
 from conformance.documents.openapi import read_operations
 
 _POSE = {
