@@ -24,7 +24,8 @@ def _free_port() -> int:
         return int(sock.getsockname()[1])
 
 
-@pytest.fixture(name="device", params=["rig.py", "feeder.js"])
+# Express comes by npm, which not every machine with Node.js has.
+@pytest.fixture(name="device", params=["rig.py", *(["feeder.js"] if shutil.which("npm") else [])])
 def device_fixture(request, tmp_path):
     """Start a clean device; yield the URL of its description."""
     port, environment = _free_port(), dict(os.environ)
@@ -32,8 +33,6 @@ def device_fixture(request, tmp_path):
     if request.param == "feeder.js":
         command = [shutil.which("node") or "node", str(_DEVICES / "feeder.js"), str(port)]
         environment["NODE_PATH"] = str(tmp_path / "node_modules")
-        if shutil.which("npm") is None:
-            pytest.skip("Express needs npm, which is not installed")
         subprocess.run(["npm", "install", "--prefix", str(tmp_path), "express@5"], check=True, capture_output=True)
     with subprocess.Popen(command, env=environment) as process:
         try:
