@@ -20,7 +20,7 @@ from starlette.routing import BaseRoute, Route
 def serving_app(app: Any, **settings: Any) -> Iterator[str]:
     """Serve an app with uvicorn on h11, which refuses a request without Host; yields the base URL."""
     with socket.create_server(("127.0.0.1", 0)) as listening:
-        app = _in_origin_form(app)
+        app = _to_the_letter(app)
         config = uvicorn.Config(app, http="h11", log_level="critical", timeout_graceful_shutdown=1, **settings)
         server = uvicorn.Server(config)
         thread = threading.Thread(target=server.run, args=([listening],), daemon=True)
@@ -32,14 +32,20 @@ def serving_app(app: Any, **settings: Any) -> Iterator[str]:
         thread.join(10)
 
 
-def _in_origin_form(app: Any) -> Any:
-    """Return an app that takes targets in absolute form too (RFC 9112 3.2.2), which uvicorn hands on as they are."""
+def _to_the_letter(app: Any) -> Any:
+    """Return an app that does what uvicorn does not: absolute targets, closing at two lengths (RFC 9112 3.2.2, 6.1)."""
 
     async def wrapped(scope: Any, receive: Any, send: Any) -> None:
+        async def closing(message: Any) -> None:
+            if message["type"] == "http.response.start":
+                message = {**message, "headers": [*message.get("headers", ()), (b"connection", b"close")]}
+            await send(message)
+
         if scope["type"] == "http" and scope["path"].startswith("http://"):
             path = urlsplit(scope["path"]).path or "/"
             scope = {**scope, "path": path, "raw_path": path.encode()}
-        await app(scope, receive, send)
+        both = {b"content-length", b"transfer-encoding"} <= {name for name, _ in scope.get("headers", ())}
+        await app(scope, receive, closing if both else send)
 
     return wrapped
 

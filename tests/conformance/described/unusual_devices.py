@@ -216,8 +216,7 @@ class _Guarded(Handler):
     def answer(self) -> None:
         path, _, query = self.path.removeprefix(f"http://{self.headers.get('Host')}").partition("?")
         lengths, coding = self.headers.get_all("Content-Length", []), self.headers.get("Transfer-Encoding")
-        spaced = any(name != name.rstrip() for name in self.headers)
-        if len(self.headers.get_all("Host", [])) != 1 or len(lengths) > 1 or coding or spaced:
+        if len(self.headers.get_all("Host", [])) != 1 or len(lengths) > 1 or coding or self.headers.defects:
             self.close_connection = True
             self.send(400)
         elif path == "/openapi.json":

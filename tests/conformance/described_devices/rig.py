@@ -164,16 +164,23 @@ def tell(request: Request, error: StarletteHTTPException) -> JSONResponse:
 
 
 async def whole(scope: dict[str, Any], receive: Any, send: Any) -> None:
-    """Serve a request; of a target in absolute form uvicorn makes a path (RFC 9112 3.2.2), which is put right here."""
+    """Serve a request; do what uvicorn does not: absolute targets, closing after two lengths (RFC 9112 3.2.2, 6.1)."""
+
+    async def closing(message: dict[str, Any]) -> None:
+        if message["type"] == "http.response.start":
+            message = {**message, "headers": [*message["headers"], (b"connection", b"close")]}
+        await send(message)
+
     if scope["type"] == "http" and "://" in scope["path"]:
         path = "/" + scope["path"].split("://", 1)[1].partition("/")[2]
         scope = {**scope, "path": path, "raw_path": path.encode()}
-    await app(scope, receive, send)
+    both = {b"content-length", b"transfer-encoding"} <= {name for name, _ in scope.get("headers", ())}
+    await app(scope, receive, closing if both else send)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--port", type=int, default=8000)
-    # uvicorn's own refusal of longer fields has no Date.
-    port, longest = parser.parse_args().port, 1 << 20
-    uvicorn.run(whole, host="127.0.0.1", port=port, log_level="warning", h11_max_incomplete_event_size=longest)
+    # On httptools uvicorn takes a request without Host; on h11 its own refusal of longer fields has no Date.
+    settings = {"http": "h11", "h11_max_incomplete_event_size": 1 << 20, "log_level": "warning"}
+    uvicorn.run(whole, host="127.0.0.1", port=parser.parse_args().port, **settings)
