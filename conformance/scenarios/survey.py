@@ -134,7 +134,7 @@ class _Surveyor:
         request = request or written(operation, variation.inputs)
         exchange, unanswered = None, None
         try:
-            exchange = request.send(self.api)
+            exchange = self._recorded(request)
         except NoAnswerError as none:
             unanswered = none.unanswered
             if none.kind in {NoAnswer.TIMEOUT, NoAnswer.CIRCUIT_OPEN}:
@@ -152,6 +152,18 @@ class _Surveyor:
         if exchange.response.ok:
             self.values.learn(operation, exchange)
         return self.probes[-1]
+
+    def _recorded(self, request: GeneratedRequest) -> Exchange:
+        """Send a request whose exchange becomes a probe, so that no observer judges it as well.
+
+        Raises:
+            NoAnswerError: no HTTP response was received.
+        """
+        self.api.is_recorded = True
+        try:
+            return request.send(self.api)
+        finally:
+            self.api.is_recorded = False
 
     def record(self, probe: Probe) -> None:
         """Add a probe to the survey."""

@@ -26,6 +26,7 @@ class RestInterface:
         waits: how many more deferred reads may be repeated.
         working: requests that the survey of a described API found to be answered 2xx, by operation.
         streams: operations whose responses do not end.
+        is_recorded: whether the present exchange is recorded by a scenario, whose rules judge it.
     """
 
     run: Run
@@ -35,6 +36,7 @@ class RestInterface:
     waits: int = 5
     working: dict[str, Any] = field(default_factory=dict)
     streams: set[str] = field(default_factory=set)
+    is_recorded: bool = False
     device: Device = field(init=False)
 
     def __post_init__(self) -> None:

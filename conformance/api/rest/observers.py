@@ -13,10 +13,10 @@ from conformance.api.expectation import expect
 from conformance.api.rest import declared, problem
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.request_context import RequestContext
-from conformance.api.rest.statuses import is_cut_off
+from conformance.api.rest.statuses import CRASHES, is_cut_off
 from conformance.api.rest.validity import INVALID, VALID, validity
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import is_json, is_xml
+from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.documents.traceback import inside_shown
 from conformance.transport.exchange import Exchange, Listener, NoAnswer, Request, Response, Unanswered
 
@@ -69,9 +69,24 @@ class Observer(Listener):
             expect(api.run.judge, "http/no-traceback", exchange).that(not inside, expected, found, cause="traceback")
             problem.judge(api, exchange, answer, context)
         if context.operation is not None:
+            self._judge_crash(exchange, context.operation)
             if answer.status >= HTTPStatus.BAD_REQUEST and context.usual and not is_cut_off(exchange):
                 self._judge_input(exchange, answer, context)
             declared.judge(api, exchange, answer, context)
+
+    def _judge_crash(self, exchange: Exchange, operation: Operation) -> None:
+        """Judge whether the device failed, whatever check met it: one crash in sixty may meet none of a survey's."""
+        status = exchange.response.status
+        if status in CRASHES and not self._api.is_recorded:
+            self._api.run.judge.check(
+                "robustness/no-server-error",
+                False,  # noqa: FBT003 - the condition of check()
+                exchange,
+                "a status below 500",
+                cause=f"{operation.label} {status}",
+                subject=operation.label,
+                operations=(operation.label,),
+            )
 
     def unanswered(self, request: Unanswered) -> None:
         """Judge a response that is not HTTP, unless the request was malformed itself."""

@@ -5,6 +5,8 @@ from http import HTTPStatus
 from conformance.contract.sizes import LIMIT_OCTETS
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Unanswered
 
+#: By these a server says that it, or one behind it, has failed; 503 says that it cannot now, 501 that it never can.
+CRASHES = frozenset({500, 502, 504})
 # Statuses that refuse a request for another reason than its content.
 _NO_REFUSALS = frozenset({401, 405, 406, 408, 429})
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import jsonschema_rs
 
+from conformance.api.rest.statuses import CRASHES
 from conformance.api.rest.variations import Kind
 from conformance.documents.json_schema import Schema, kinds_of, shape_of
 from conformance.documents.json_text import read_json, shown
@@ -29,7 +30,6 @@ _OF_REQUEST = frozenset({405, 406, 415, 501})
 # Of these, HTTP knows these only as responses to requests with one of these fields (RFC 9110 13, 14).
 _ASKED_FOR = frozenset({206, 304})
 _ASKING = frozenset({"range", "if-range", "if-match", "if-none-match", "if-modified-since", "if-unmodified-since"})
-_CRASHES = frozenset({500, 502, 504})
 _FORMAT = re.compile(r'"format": "([^"]+)"')
 _BAD_REQUEST, _NO_CONTENT = 400, 204
 _PLAIN = frozenset({Kind.USUAL, Kind.AGAIN, Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL})
@@ -68,7 +68,7 @@ def status_declared(trace: Survey, run: Run) -> Iterable[Outcome]:
     judged = {
         id(probe): (operation, answer)
         for probe, operation, answer in _answered(trace, run)
-        if _in_question(probe, answer.status) and answer.status not in _CRASHES and probe.operation not in lacking
+        if _in_question(probe, answer.status) and answer.status not in CRASHES and probe.operation not in lacking
     }
 
     def fault(probe: Probe) -> Fault | None:
@@ -90,7 +90,7 @@ def media_type(trace: Survey, run: Run) -> Iterable[Outcome]:
     judged: dict[int, tuple[dict[str, Schema], Response]] = {}
     for probe, operation, answer in _answered(trace, run):
         content = operation.declared(answer.status)
-        if content and answer.body and answer.status not in _CRASHES and _in_question(probe, answer.status):
+        if content and answer.body and answer.status not in CRASHES and _in_question(probe, answer.status):
             judged[id(probe)] = content, answer
 
     def fault(probe: Probe) -> Fault | None:
@@ -202,7 +202,7 @@ def headers(trace: Survey, run: Run) -> Iterable[Outcome]:
     judged: dict[int, tuple[dict[str, tuple[bool, Schema]], Response]] = {}
     for probe, operation, answer in _answered(trace, run):
         key = operation.response_key(answer.status)
-        if key is not None and operation.headers.get(key) and answer.status not in _CRASHES:
+        if key is not None and operation.headers.get(key) and answer.status not in CRASHES:
             judged[id(probe)] = operation.headers[key], answer
 
     def fault(probe: Probe) -> Fault | None:

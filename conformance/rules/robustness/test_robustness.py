@@ -5,8 +5,8 @@ from __future__ import annotations
 import statistics
 from collections.abc import Iterable
 from http import HTTPStatus
-from typing import Final
 
+from conformance.api.rest.statuses import CRASHES
 from conformance.api.rest.variations import Kind
 from conformance.documents.traceback import inside_shown, path_shown
 from conformance.rules.told_once import Fault, told_once
@@ -15,8 +15,6 @@ from conformance.scenarios.survey import Probe, Survey, generated_requests, surv
 from conformance.transport.exchange import NoAnswer
 
 _ON = (survey, generated_requests)
-# A status by which a server says that it, or one behind it, has failed; 503 says that it cannot now, 501 never.
-_CRASHES: Final = frozenset({500, 502, 504})
 # A response time has grown when its median is so many times, and so many ms, above that of the first requests.
 _TIMES, _MS, _FEWEST = 3.0, 50.0, 15
 
@@ -26,7 +24,7 @@ def no_server_error(trace: Survey) -> Iterable[Outcome]:
     """Judge whether any request makes the device fail with 500, 502 or 504."""
 
     def fault(probe: Probe) -> Fault | None:
-        return Fault(str(probe.status), f"status {probe.status}") if probe.status in _CRASHES else None
+        return Fault(str(probe.status), f"status {probe.status}") if probe.status in CRASHES else None
 
     yield from told_once(trace.probes, "a status below 500", fault, apart=True)
 
