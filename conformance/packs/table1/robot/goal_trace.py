@@ -122,7 +122,8 @@ class GoalReached:
         drive: all readings on the way.
         read: the last GET of the goal.
         ended: whether the robot had no goal any more.
-        undecided: whether the robot still made progress when the time was over.
+        other: whether another client's goal became active on the way, or after it.
+        undecided: whether the robot still made progress when the time was over, or another client's goal ended it.
         turned: a drive after the goal that shows whether the robot resumes a velocity from before it; or None.
         start: where a plan begins after the goal; or None.
         again: the PUT of the same goal after it had ended; or None.
@@ -140,6 +141,7 @@ class GoalReached:
     drive: Trace | None = None
     read: Exchange | None = None
     ended: bool = False
+    other: bool = False
     undecided: bool = False
     turned: Trace | None = None
     start: Start | None = None

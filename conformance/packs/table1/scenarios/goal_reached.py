@@ -29,6 +29,8 @@ _MOVED_M: Final = 0.15
 _TURN_RAD: Final = 1.0
 _DETOUR: Final = 1.3
 _LOOKED_S: Final = 1.0
+_DISPLACED: Final = "displaced"
+_REACHED: Final = "reached"
 # What counts as progress.
 _NEARER_M: Final = 0.02
 _TURNED_RAD: Final = 0.05
@@ -36,7 +38,16 @@ _TURNED_RAD: Final = 0.05
 
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.DRIVE)
 def goal_reached(robot: Robot, effort: Effort, _prepared: None) -> GoalReached:
-    """PUT a goal nearby, wait until the robot is there, and PUT the same goal again."""
+    """PUT a goal nearby, wait until the robot is there, and PUT the same goal again.
+
+    A robot that goes on with another client's goal, for example a delivery that has waited, is sent once more.
+    """
+    trace = _sent(robot, effort)
+    return _sent(robot, effort) if trace.other else trace
+
+
+def _sent(robot: Robot, effort: Effort) -> GoalReached:
+    """Return the record of one goal."""
     here = robot.map_pose()
     if here is None:
         raise NotPossibleError("the robot's pose cannot be read")
@@ -44,7 +55,7 @@ def goal_reached(robot: Robot, effort: Effort, _prepared: None) -> GoalReached:
     there = _turned(robot, here, there)
     before = _turning_before(robot, effort)
     # Displaced at once: it is not taken up again when the robot has arrived where it was sent last.
-    put_goal(robot, goal_body(other, robot.statement.motion.frame, "displaced"))
+    put_goal(robot, goal_body(other, robot.statement.motion.frame, _DISPLACED))
     body, put = _put(robot, there)
     trace = GoalReached(put, there)
     if put.response.status not in NEW:
@@ -86,11 +97,11 @@ def _put(robot: Robot, there: Pose) -> tuple[dict[str, Any], Exchange]:
     """Put a goal: where the statement says that the frames differ, in the odometry's, if the robot takes that."""
     odometry, _ = robot.read(POSE, ODOMETRY)
     if odometry is not None and any(robot.statement.motion.odom_to_map):
-        body = goal_body(robot.in_odometry(there), odometry["header"]["frame_id"], "reached")
+        body = goal_body(robot.in_odometry(there), odometry["header"]["frame_id"], _REACHED)
         exchange = put_goal(robot, body)
         if exchange.response.status in NEW:
             return body, exchange
-    body = goal_body(there, robot.statement.motion.frame, "reached")
+    body = goal_body(there, robot.statement.motion.frame, _REACHED)
     return body, put_goal(robot, body)
 
 
@@ -132,7 +143,9 @@ class _Way:
             now = clock.now()
             if here.distance(there) < nearest - _NEARER_M or abs(wrapped(here.yaw - yaw)) > turned_rad:
                 progress, nearest, yaw = now, min(nearest, here.distance(there)), here.yaw
-            if goal is None or now > progress + limits.goal_s or now > began + longest_s:
+            # A robot that delivers may go on with a delivery of another client's as soon as it has arrived.
+            other = goal is not None and goal["goal_id"]["id"] not in {_DISPLACED, _REACHED}
+            if goal is None or other or now > progress + limits.goal_s or now > began + longest_s:
                 break
         driven = drive.whole
         moved = max(0.0, min(_MOVED_M, start.distance(there) - reached_m))
@@ -140,7 +153,9 @@ class _Way:
         if robot.actuated(5):
             trace = replace(trace, reached_rad=reached_rad)
         trace = _arrived(trace, here)
-        if not trace.arrived or start.distance(here) <= moved:
+        if other:
+            robot.delete_goal()
+        elif not trace.arrived or start.distance(here) <= moved:
             # It may yet be coming to rest. Then, as one sample may be wrong, those of a second say where the robot is.
             drive.keep(robot.settle_s)
             first = len(drive.trace.odometry)
@@ -154,13 +169,14 @@ class _Way:
             way_m=max(one.distance(here) for one in begins),
             read=exchange,
             ended=goal is None,
-            undecided=goal is not None and now <= progress + limits.goal_s,
+            other=other,
+            undecided=not trace.arrived if other else goal is not None and now <= progress + limits.goal_s,
         )
 
     def look_back(self, start: Pose, before: Command | None, body: dict[str, Any]) -> None:
         """Watch, after a goal was reached, for the velocity from before it; request a plan back; PUT the goal again."""
         trace, robot = self.trace, self.robot
-        if trace.undecided or not trace.ended or not trace.arrived or trace.way_m <= trace.has_to_m:
+        if trace.undecided or not (trace.ended or trace.other) or not trace.arrived or trace.way_m <= trace.has_to_m:
             return
         if before is not None:
             self._watch_for(before)

@@ -127,3 +127,13 @@ def test_an_invalid_goal_changes_nothing(during, differs, expected):
     trace = (InvalidGoal("an empty id", during, exchange(400), differs),)
     (case,) = refused.goal_refused.outcomes(trace, {}.__getitem__)
     assert (case.holds, case.expected) == (not differs, expected)
+
+
+@pytest.mark.parametrize(("left_m", "drives_judged"), [(0.1, [True]), (9.0, [])])
+def test_another_clients_goal_after_the_own_one_is_no_fault(left_m, drives_judged):
+    trace = GoalReached(
+        exchange(202), Pose(1.0, 0.0, 0.0), way_m=1.0, has_to_m=0.2, left_m=left_m, reached_m=0.3, read=exchange(200)
+    )
+    trace = replace(trace, other=True, undecided=not trace.arrived)
+    assert _holds(drives.goal_drives, trace) == drives_judged
+    assert _holds(drives.goal_ended, trace) == _holds(drives.goal_outcome, trace) == []

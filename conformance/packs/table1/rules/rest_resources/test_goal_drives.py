@@ -21,7 +21,7 @@ def goal_put(trace: GoalReached) -> Iterator[Outcome]:
 def goal_drives(trace: GoalReached) -> Iterator[Outcome]:
     """Judge that the robot drove, and to the target's position and heading."""
     if trace.there is None or trace.read is None or trace.undecided:
-        return  # refused, or slow but on its way: nothing to be said against it
+        return  # refused, slow but on its way, or sent elsewhere by another client: nothing to be said against it
     far, there = trace.way_m > trace.has_to_m, trace.left_m < trace.reached_m
     heading = "" if trace.reached_rad is None else f", with a heading within {trace.reached_rad:.2f} rad of its heading"
     turned = "" if trace.reached_rad is None else f" and {abs(trace.off_rad):.2f} rad off its heading"
@@ -37,7 +37,7 @@ def goal_drives(trace: GoalReached) -> Iterator[Outcome]:
 @rule("rest-resources/goal-ended", on=(goal_reached,))
 def goal_ended(trace: GoalReached) -> Iterator[Outcome]:
     """Judge that the goal ends when the robot has reached it."""
-    if trace.read is not None and not trace.undecided:
+    if trace.read is not None and not trace.undecided and not trace.other:
         holds = trace.ended and trace.read.response.status == 404
         observed = "" if trace.ended else "a goal that is still active"
         yield Case(holds, trace.read, "404 when the goal has been reached", observed)
