@@ -7,16 +7,16 @@ from typing import Final
 class Stage(StrEnum):
     """The stage of a run in which a scenario or check runs.
 
-    Reading comes first. Then come the longest drive, other drives, and the attempts that must leave the device at rest,
-    which share one observation. Requests with late effects are sent late, and other checks run while the suite waits
-    for
-    further effects.
+    Reading comes first. Then come the longest drive, other drives, more reading while the device settles, and the
+    attempts that must leave the device at rest, which share one observation. Requests with late effects are sent late,
+    and other checks run while the suite waits for further effects.
     """
 
     REACH = "reach"
     READING = "reading"
     DRIVE = "drive"
     MOTION = "motion"
+    SETTLING = "settling"
     STANDSTILL = "standstill"
     RESTING = "resting"
     STAYS = "stays"

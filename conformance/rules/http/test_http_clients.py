@@ -15,7 +15,7 @@ from conformance.transport.exchange import Attempt, Unanswered
 from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 # So many rounds that a robot which fails one time in fifty fails several times.
 _ROUNDS = 40
 _IN_A_ROW = 6

@@ -9,7 +9,7 @@ from conformance.api.rest.applicable import answered
 from conformance.api.rest.interface import RestInterface
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _PRECONDITIONS = "http/preconditions"
 _RANGE = "http/range"
 # No response has this entity tag, and every response is newer than HTTP.

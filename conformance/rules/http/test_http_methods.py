@@ -15,7 +15,7 @@ from conformance.transport import raw
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 # Methods that a robot might take by mistake; where GET is not allowed, HEAD is not.
 _STANDARD = ("GET", "PUT", "POST", "DELETE", "PATCH", "HEAD")
 # A method of WebDAV, and one that does not exist: a server may refuse them before any resource sees them.

@@ -8,7 +8,7 @@ from conformance.api.rest.applicable import answered
 from conformance.api.rest.interface import RestInterface
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 # Formats that no robot has beside those of the contract.
 _NOTHING = ("image/png", "application/vnd.roaas-nobody-has-this", "audio/*;q=0.5, video/*")
 

@@ -16,7 +16,7 @@ from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _METHODS = ("GET", "HEAD", "PUT", "POST", "DELETE", "OPTIONS", "PATCH")
 _STRANGE = "roaas-nobody-has-this"
 _PATHS = 40

@@ -9,7 +9,7 @@ from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _Q = "rest-formats/q-values"
 _SPECIFIC = "rest-formats/specific-range"
 _DEFAULT = "rest-formats/json-default"

@@ -25,8 +25,8 @@ _LONGEST_S: Final = 120.0
 _AWAY_M: Final = 0.6
 # So far the robot has to come from where it was, where the goal is that much beyond the tolerance, m.
 _MOVED_M: Final = 0.15
-# The heading of a goal differs by so much from the direction of the way there: more than any declared tolerance, rad.
-_TURN_RAD: Final = 1.0
+# The heading of a goal differs by so much from the direction of the way there, rad, or by twice the tolerance.
+_TURN_RAD: Final = 0.6
 _DETOUR: Final = 1.3
 _LOOKED_S: Final = 1.0
 _DISPLACED: Final = "displaced"
@@ -54,6 +54,9 @@ def _sent(robot: Robot, effort: Effort) -> GoalReached:
     there, other = choose_goals(robot, max(_AWAY_M, 2 * robot.limits.arrival[0]), 2)
     there = _turned(robot, here, there)
     before = _turning_before(robot, effort)
+    # Cancelled: a robot that has deliveries to make drops them, and does not begin with them between two drives.
+    put_goal(robot, goal_body(other, robot.statement.motion.frame, "cancelled"))
+    robot.delete_goal()
     # Displaced at once: it is not taken up again when the robot has arrived where it was sent last.
     put_goal(robot, goal_body(other, robot.statement.motion.frame, _DISPLACED))
     body, put = _put(robot, there)
@@ -72,9 +75,10 @@ def _sent(robot: Robot, effort: Effort) -> GoalReached:
 def _turned(robot: Robot, here: Pose, there: Pose) -> Pose:
     """Return a goal with a heading across the way there, if the robot has a plan to it that is hardly longer."""
     ahead = math.atan2(there.y - here.y, there.x - here.x)
-    if not robot.actuated(5) or abs(wrapped(there.yaw - ahead)) >= _TURN_RAD:
+    turn = max(_TURN_RAD, 2 * robot.limits.arrival[1])
+    if not robot.actuated(5) or abs(wrapped(there.yaw - ahead)) >= turn:
         return there
-    turned = Pose(there.x, there.y, wrapped(ahead + math.copysign(_TURN_RAD, there.yaw)))
+    turned = Pose(there.x, there.y, wrapped(ahead + math.copysign(turn, there.yaw)))
     _, plan, _ = ask(robot, turned)
     return turned if plan is not None and plan.length <= _DETOUR * here.distance(there) + 0.1 else there
 
