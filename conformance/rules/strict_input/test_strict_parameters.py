@@ -25,7 +25,7 @@ def _has(where: str, operation: Operation) -> bool:
     return any(wrong_texts(item) for item in operation.parameter(where))
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("settling")
 @pytest.mark.requirement(_QUERY, "http/problem-detail", "http/problem-value")
 def test_query_parameters(api: RestInterface) -> None:
     """Send text, nothing, NaN, Infinity and 1e400 in place of a number in a query."""
@@ -34,7 +34,7 @@ def test_query_parameters(api: RestInterface) -> None:
             _try(api, call, item, _QUERY)
 
 
-@pytest.mark.phase("reading")
+@pytest.mark.phase("settling")
 @pytest.mark.requirement(_MISSING, "http/problem-detail")
 def test_missing_query_parameters(api: RestInterface) -> None:
     """Leave out each required parameter of a query."""

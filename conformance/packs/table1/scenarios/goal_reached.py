@@ -52,7 +52,8 @@ def _sent(robot: Robot, effort: Effort) -> GoalReached:
     if here is None:
         raise NotPossibleError("the robot's pose cannot be read")
     there, other = choose_goals(robot, max(_AWAY_M, 2 * robot.limits.arrival[0]), 2)
-    there = _turned(robot, here, there)
+    if effort.name != "quick":
+        there = _turned(robot, here, there)
     before = _turning_before(robot, effort)
     # Cancelled: a robot that has deliveries to make drops them, and does not begin with them between two drives.
     put_goal(robot, goal_body(other, robot.statement.motion.frame, "cancelled"))
