@@ -41,8 +41,6 @@ def turn(robot: Robot, run: Run) -> Driven:
     turning = _Turning(robot, Drive(robot))
     try:
         turning.play(run)
-        for velocity in _further(turning, run):
-            turning.let_go(velocity)
     except Exception as error:
         raise PartialTraceError(turning.recorded) from error
     return turning.recorded
@@ -61,18 +59,6 @@ def further_axes(robot: Robot) -> Driven:
     except Exception as error:
         raise PartialTraceError(driving.recorded) from error
     return driving.recorded
-
-
-def _further(turning: "_Turning", run: Run) -> list[Velocity]:
-    """Return velocities at the limits, which must hold as long as others: one chosen by the seed, or both."""
-    robot, limits = turning.robot, turning.robot.limits
-    if limits.hold_s is None or not robot.actuated(ABOUT):
-        return []
-    told_from_rest = 4 * (limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s)
-    slow = robot.only(ABOUT, min(max(0.2 * limits.angular_rad_s, told_from_rest), 0.6 * limits.angular_rad_s))
-    choices = [slow, turning.fastest]
-    number = {"quick": 0, "standard": 1}.get(run.effort.name, len(choices))
-    return random.Random(f"{run.seed}/let go").sample(choices, number)  # noqa: S311 - no secret
 
 
 @dataclass
@@ -126,16 +112,28 @@ class _Turning:
     def _ways(self, bent: Velocity, run: Run) -> list[tuple[Velocity, bool]]:
         """Return velocities that are not renewed, and whether a PUT of the linear part commands them last.
 
-        A robot may keep a watchdog for each path, and one for each sign. At the effort "quick" the seed says which is
-        tried. Without a declared hold time one velocity is enough.
+        A robot may keep a watchdog for each path, one for each sign, and one for velocities at its limits. At the
+        effort "quick" the seed says which is tried. Without a declared hold time one velocity is enough.
         """
-        if self.robot.limits.hold_s is None:
+        robot = self.robot
+        if robot.limits.hold_s is None:
             return [(bent, False)]
-        ahead = self.robot.drivable(Velocity(*(-one for one in bent)))
-        ways = [(bent, bool(bent.linear_x)), (ahead, False), (bent, False), (ahead, bool(ahead.linear_x))]
+        chance = random.Random(f"{run.seed}/ways")  # noqa: S311 - no secret
+        ahead = robot.drivable(Velocity(*(-one for one in bent)))
+        limits = chance.sample([self._slow(), self.fastest], 2) if robot.actuated(ABOUT) else [ahead]
+        ways = [(bent, bool(bent.linear_x)), (limits[0], False), (bent, False), (ahead, bool(ahead.linear_x))]
         if run.effort.name == "quick":
-            ways = [random.Random(f"{run.seed}/ways").choice(ways)]  # noqa: S311 - no secret
+            ways = [chance.choice(ways)]
+        elif run.effort.name != "standard":
+            ways += [(limits[-1], False), (ahead, False)]
         return [way for way in dict.fromkeys(ways) if any(way[0])]
+
+    def _slow(self) -> Velocity:
+        """Return a slow turn to the left that can be told from rest."""
+        limits = self.robot.limits
+        told_from_rest = 4 * (limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s)
+        slow = min(max(0.2 * limits.angular_rad_s, told_from_rest), 0.6 * limits.angular_rad_s)
+        return self.robot.only(ABOUT, slow)
 
     def along(self, component: int) -> None:
         """Drive along one more axis, slowly and as fast as the robot can, there and back, and let it go."""
@@ -197,8 +195,7 @@ class _Turning:
         """Stop renewing a velocity, and watch how it ends; ``by_linear``: a PUT of the linear part commands it last.
 
         A measurement that a stall of the suite or a late response spoilt is made again. One that shows a robot that
-        does
-        not come to rest is never made again: a watchdog that stops most velocities is none.
+        does not come to rest is never made again: a watchdog that stops most velocities is none.
         """
         limits, tries = self.robot.limits, []
         for _ in range(_ATTEMPTS if limits.hold_s else 1):
@@ -221,8 +218,7 @@ class _Turning:
         """Command a velocity, and look until the robot rests or its time is over; return None if it is rejected.
 
         With a declared hold time, the suite does not read the robot around the end of that time, because a velocity
-        must end by
-        time and not by a request. A rejected command meanwhile must not renew it.
+        must end by time and not by a request. A rejected command meanwhile must not renew it.
         """
         robot, drive, clock, limits = self.robot, self.drive, self.drive.clock, self.robot.limits
         last = drive.trace.last_full
