@@ -209,7 +209,7 @@ def _check_nonce(nonce: str) -> None:
 def _certify(chosen: Statement, options: dict[str, Any], contract: Contract, statement: Path | None) -> Certification:
     # Imported here: Schemathesis and its like cost a second that --help and wrong usage need not pay.
     from conformance.engine.certification import certify as judge  # noqa: PLC0415
-    from conformance.engine.pytest_run import connection_of  # noqa: PLC0415
+    from conformance.engine.connecting import connection_of  # noqa: PLC0415
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
     from conformance.engine.suite import file_digest  # noqa: PLC0415
     from conformance.verdict.baseline import BaselineError, load_baseline  # noqa: PLC0415

@@ -10,6 +10,7 @@ import click
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult
 from conformance.contract.pack import Contract
+from conformance.engine.connecting import connection_of
 from conformance.engine.describing import fetch_description
 from conformance.statement.statement import Api, Calls, Endpoints, Statement, StatementError
 
@@ -53,7 +54,6 @@ def init_described(path: Path | None, source: str, options: dict[str, Any]) -> C
         UnreachableError: the server of the description does not respond.
     """
     from conformance.engine.first_described import write_described_statement  # noqa: PLC0415 - only --init needs it
-    from conformance.engine.pytest_run import connection_of  # noqa: PLC0415 - as above
 
     path = _new_file(path, force=options["force"])
     given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) is not None}

@@ -10,6 +10,7 @@ import msgspec
 
 from conformance.contract.pack import Contract
 from conformance.documents.description import is_url
+from conformance.engine.connecting import connection_of, keyed
 from conformance.engine.describing import described_contract
 from conformance.statement.statement import (
     Api,
@@ -64,19 +65,19 @@ def _described(
         DescriptionError, StatementError, ContractError: one of them cannot be used.
         UnreachableError: the server of the description does not respond.
     """
-    from conformance.engine.pytest_run import connection_of  # noqa: PLC0415 - it loads pytest
-
     given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) is not None}
     where = msgspec.structs.replace(endpoints_of(statement) if statement else Endpoints(), **given)
     overlays = tuple(options["overlays"]) or (api.overlays if api else ())
     base_url = options["base_url"] or (api.base_url if api else None)
     try:
-        connection = connection_of(where)
+        # Where an API key goes, the description may say, so that it is read without one.
+        connection = connection_of(where if where.api_key else msgspec.structs.replace(where, api_key_file=None))
         contract, where, remarks = described_contract(source, overlays, base_url, where, connection, options["out"])
     except OSError as error:
         raise StatementError(str(error)) from error
     options["remarks"] = remarks
     declared = load_statement(statement, contract) if statement else empty_statement(contract)
+    where = keyed(where, contract.openapi)
     return _apply(msgspec.structs.replace(declared, endpoints=where), options, contract), contract
 
 
@@ -86,7 +87,7 @@ def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> 
     Raises:
         StatementError: an option has an invalid value.
     """
-    given = {key: options[key] for key in declared.endpoints.__struct_fields__ if options[key] is not None}
+    given = {key: options[key] for key in declared.endpoints.__struct_fields__ if options.get(key) is not None}
     where = msgspec.structs.replace(declared.endpoints, **given)
     for key in ("rest", "publishers_endpoint", "subscribers_endpoint"):
         url = getattr(where, key)

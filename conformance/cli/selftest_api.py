@@ -31,7 +31,7 @@ def described_device(options: dict[str, Any]) -> tuple[Contract, str]:
     Raises:
         click.UsageError: there is no usable description.
     """
-    from conformance.engine.pytest_run import connection_of  # noqa: PLC0415 - see selftest.py
+    from conformance.engine.connecting import connection_of  # noqa: PLC0415 - see selftest.py
 
     try:
         contract, where, _ = described_contract(

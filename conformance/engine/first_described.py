@@ -109,6 +109,12 @@ def _credentials(document: dict[str, Any]) -> Iterator[str]:
         how = [kind, *(str(scheme[key]) for key in ("scheme", "in", "name") if kind and key in scheme)]
         yield f"# The description names the security scheme {_one_line(name)}: {_one_line(' '.join(how))}."
     yield '# token_file = "token"       # holds a bearer token'
+    yield '# api_key_file = "key"       # holds an API key, sent where the description says'
+    yield ""
+    yield "# [auth]                     # a login before the run, whose token all requests carry"
+    yield '# login = "POST /login"'
+    yield '# body_file = "login.json"   # its content, for example a user name and a password'
+    yield '# token = "/access_token"    # where the response has the token'
 
 
 def _groups(operations: Sequence[Operation], rules: CallRules) -> Iterator[str]:

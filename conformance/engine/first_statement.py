@@ -8,7 +8,7 @@ from typing import Any
 from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import basic_string
-from conformance.engine.pytest_run import connection_of
+from conformance.engine.connecting import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.statement import Statement
 from conformance.transport.client import HttpClient

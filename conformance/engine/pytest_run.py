@@ -7,10 +7,9 @@ import pytest
 
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
+from conformance.engine.connecting import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.statement import Endpoints, StatementError, empty_statement, load_statement
-from conformance.transport.client import Connection
-from conformance.transport.credentials import Credential, Credentials, Kind
 from conformance.verdict.effort import EFFORTS, Effort
 from conformance.verdict.run import Run
 
@@ -59,56 +58,3 @@ def _endpoints(config: pytest.Config, declared: Endpoints) -> Endpoints:
     names = ("rest", "publishers_wsdl", "subscribers_wsdl", "timeout_s")
     options = {name: config.getoption(f"robot_{name}") for name in names}
     return msgspec.structs.replace(declared, **{key: value for key, value in options.items() if value is not None})
-
-
-def connection_of(where: Endpoints) -> Connection:
-    """Return connection settings with the statement's deadline, credentials and rate limit.
-
-    Raises:
-        OSError: a file with a credential cannot be read.
-        StatementError: a credential is malformed.
-    """
-    return Connection(
-        timeout_s=where.timeout_s,
-        ca_file=Path(where.ca_file) if where.ca_file else None,
-        token=_secret(where.token_file) if where.token_file else None,
-        credentials=_credentials(where),
-        certificate=_certificate(where),
-        request_rate=where.request_rate,
-    )
-
-
-def _secret(path: str) -> str:
-    return Path(path).read_text(encoding="utf-8").strip()
-
-
-def _certificate(where: Endpoints) -> tuple[Path, Path | None] | None:
-    if where.client_cert_file is None:
-        return None
-    return Path(where.client_cert_file), Path(where.client_key_file) if where.client_key_file else None
-
-
-def _credentials(where: Endpoints) -> Credentials:
-    """Return the credentials beside the bearer token; their secrets are in files.
-
-    Raises:
-        StatementError: one is malformed; the message shows no secret.
-        OSError: a file cannot be read.
-    """
-    found: list[Credential] = []
-    if where.basic_file:
-        pair = _secret(where.basic_file)
-        if ":" not in pair:
-            raise StatementError(f"{where.basic_file}: expected one line user:password")
-        found.append(Credential(Kind.BASIC, pair))
-    if where.api_key or where.api_key_file:
-        place, _, name = (where.api_key or "").partition(" ")
-        if place not in {Kind.HEADER, Kind.QUERY, Kind.COOKIE} or not name.strip() or not where.api_key_file:
-            raise StatementError("an API key needs api_key = 'header NAME' (or query, or cookie) and api_key_file")
-        found.append(Credential(Kind(place), _secret(where.api_key_file), name.strip()))
-    for number, line in enumerate(_secret(where.headers_file).splitlines() if where.headers_file else (), 1):
-        name, colon, value = line.partition(":")
-        if not colon or not name.strip():
-            raise StatementError(f"{where.headers_file}, line {number}: expected Name: value")
-        found.append(Credential(Kind.HEADER, value.strip(), name.strip()))
-    return Credentials(tuple(found))

@@ -13,7 +13,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.observers import Observer
 from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
-from conformance.engine.pytest_run import connection_of
+from conformance.engine.connecting import connection_of
 from conformance.engine.resending import is_same, read_request, send_again
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.statement import Statement, empty_statement

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from msgspec.structs import asdict
+from msgspec import to_builtins
 
 from conformance.commandline.atomic_write import write_atomically
 from conformance.contract.interfaces import Interface
@@ -59,7 +59,7 @@ def result_document(
         "target": _target(robot),
         "statement": {
             "robot": statement.robot,
-            "endpoints": {key: value for key, value in asdict(statement.endpoints).items() if value is not None},
+            "endpoints": {key: value for key, value in to_builtins(statement.endpoints).items() if value is not None},
             "claims": list(run.claims),
             **statement.figures,
             "motion_allowed": run.allow_motion,

@@ -16,7 +16,7 @@ import msgspec
 
 from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
-from conformance.engine.pytest_run import connection_of
+from conformance.engine.connecting import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.selftest.robots import Robot
 from conformance.statement.statement import Statement, empty_statement, load_statement

@@ -15,6 +15,24 @@ class StatementError(TomlFileError):
     """Raised for an invalid statement; the message names the file, the key and the offending value."""
 
 
+class Auth(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A login before the run, whose token all requests carry.
+
+    Attributes:
+        login: method and target of the request: ``POST /login``.
+        token: JSON pointer to the token in the response (RFC 6901): ``/access_token``.
+        body_file: file with the request's content, for example a user name and a password.
+        content_type: media type of that content.
+        send_as: where the token goes: ``bearer``, ``header NAME``, ``query NAME`` or ``cookie NAME``.
+    """
+
+    login: Annotated[str, Meta(pattern=r"^[A-Z]+ /\S*$")]
+    token: Annotated[str, Meta(pattern="^/")]
+    body_file: Text | None = None
+    content_type: Text = "application/json"
+    send_as: Annotated[str, Meta(pattern=r"^(bearer|(header|query|cookie) \S+)$")] = "bearer"
+
+
 class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The addresses of a device's interfaces.
 
@@ -32,6 +50,7 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         client_key_file: its key, if it is not in the same file.
         request_rate: maximum requests per second; slower than one a second, no run would end.
         timeout_s: deadline of one request, s.
+        auth: a login before the run.
     """
 
     rest: Text | None = None
@@ -49,6 +68,7 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     client_key_file: Text | None = None
     request_rate: Annotated[float, Meta(ge=1, le=100_000)] | None = None
     timeout_s: Positive = 10.0
+    auth: Auth | None = None
 
     @property
     def publishers(self) -> bool:
@@ -207,6 +227,7 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     values: dict[str, tuple[Any, ...]] = {}
     calls: Calls = Calls()
     api: Api = Api()
+    auth: Auth | None = None
 
     def read(self, contract: Contract, path: Path) -> Statement:
         """Return the statement.
@@ -225,7 +246,7 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         robot = msgspec.structs.asdict(self.robot)
         return {
             "robot": {key: str(value) for key, value in robot.items() if value is not None},
-            "endpoints": beside(path.parent, self.endpoints),
+            "endpoints": beside(path.parent, self.endpoints, self.auth),
             "claims": self.claims.named(contract, path),
             "load": self.load,
             "values": self.values,
@@ -249,6 +270,7 @@ class _Addresses(msgspec.Struct, frozen=True):
 
     api: Api = Api()
     endpoints: Endpoints = Endpoints()
+    auth: Auth | None = None
 
 
 def api_of(path: Path) -> Api:
@@ -271,7 +293,8 @@ def endpoints_of(path: Path) -> Endpoints:
     Raises:
         StatementError: the statement cannot be read, or this table is invalid.
     """
-    return beside(path.parent, read_toml(path, _Addresses, StatementError).endpoints)
+    found = read_toml(path, _Addresses, StatementError)
+    return beside(path.parent, found.endpoints, found.auth)
 
 
 def empty_statement(contract: Contract) -> Statement:
@@ -284,9 +307,12 @@ def empty_statement(contract: Contract) -> Statement:
     return found
 
 
-def beside(folder: Path, where: Endpoints) -> Endpoints:
-    """Return endpoints with file names relative to a folder; URLs stay unchanged."""
+def beside(folder: Path, where: Endpoints, auth: Auth | None = None) -> Endpoints:
+    """Return endpoints, with a login, whose file names are relative to a folder; URLs stay unchanged."""
     files = [key for key in where.__struct_fields__ if key.endswith(("_file", "_wsdl"))]
     named = {key: getattr(where, key) for key in files}
     beside_it = {key: str(folder / name) for key, name in named.items() if name is not None and "://" not in name}
-    return msgspec.structs.replace(where, **beside_it)
+    auth = auth or where.auth
+    if auth is not None and auth.body_file is not None:
+        auth = msgspec.structs.replace(auth, body_file=str(folder / auth.body_file))
+    return msgspec.structs.replace(where, auth=auth, **beside_it)

@@ -67,7 +67,7 @@ def test_a_full_statement(tmp_path):
     [
         (
             "[robto]\nname = 'x'",
-            "unknown key 'robto'; known are api, calls, claims, endpoints, limits, load, motion, robot, ros, values",
+            "unknown key 'robto'; known are api, auth, calls, claims, endpoints, limits, load, motion, robot, ros, values",
         ),
         ("[limts]\nhold_s = 1", "unknown key 'limts'"),
         ("[endpoints]\nrset = 'x'", "[endpoints] unknown key 'rset'; known are api_key,"),

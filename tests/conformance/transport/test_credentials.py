@@ -5,7 +5,7 @@ import shlex
 
 import pytest
 
-from conformance.engine.pytest_run import connection_of
+from conformance.engine.connecting import connection_of
 from conformance.engine.resending import send_again
 from conformance.statement.statement import Endpoints, StatementError
 from conformance.transport import raw

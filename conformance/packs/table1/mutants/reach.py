@@ -19,9 +19,7 @@ for _class in ("rest-resources", "rest-delivery", "http", "safety", "equivalence
     _mutant(f"rest-silent-{_class}", f"{_class}/reachable", _says, interface="rest").made(hanging_up(rest()))
 
 _mutant(
-    "publishers-elsewhere",
-    "soap-delivery/reachable",
-    "Another web server is at the address of the publishers service.",
+    "publishers-elsewhere", "soap-delivery/reachable", "Another web server is at the address of the publishers service."
 ).made(_elsewhere("publisher"))
 _mutant(
     "subscribers-elsewhere",

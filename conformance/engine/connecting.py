@@ -1,0 +1,128 @@
+"""Make the settings of a connection from a statement: deadline, TLS, credentials, and a login where there is one."""
+
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+from jsonpath import JSONPointer
+from jsonpath.exceptions import JSONPointerError
+
+from conformance.documents.json_text import read_json
+from conformance.statement.statement import Auth, Endpoints, StatementError
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.credentials import Credential, Credentials, Kind
+from conformance.transport.exchange import NoAnswerError
+
+# Places in which a description may want an API key (OpenAPI 3.1, Security Scheme Object).
+_PLACES: Final = frozenset({Kind.HEADER, Kind.QUERY, Kind.COOKIE})
+
+
+def connection_of(where: Endpoints) -> Connection:
+    """Return connection settings with the statement's deadline, credentials and rate limit, logged in if it says how.
+
+    Raises:
+        OSError: a file with a credential cannot be read.
+        StatementError: a credential is malformed, or the login fails; the message shows no secret.
+    """
+    found = Connection(
+        timeout_s=where.timeout_s,
+        ca_file=Path(where.ca_file) if where.ca_file else None,
+        token=_secret(where.token_file) if where.token_file else None,
+        credentials=_credentials(where),
+        certificate=_certificate(where),
+        request_rate=where.request_rate,
+    )
+    if where.auth is not None and where.rest:
+        found.credentials = Credentials((*found.credentials.items, _logged_in(where.auth, where.rest, found)))
+    return found
+
+
+def keyed(where: Endpoints, document: dict[str, Any]) -> Endpoints:
+    """Return endpoints whose API key goes where the description wants one, unless they say where.
+
+    Args:
+        where: the endpoints.
+        document: an OpenAPI description.
+
+    Raises:
+        StatementError: there is a key, and the description wants none, or several.
+    """
+    if not where.api_key_file or where.api_key:
+        return where
+    schemes = document.get("components", {}).get("securitySchemes", {}).values()
+    wanted = {
+        f"{one['in']} {one['name']}"
+        for one in schemes
+        if isinstance(one, dict) and one.get("type") == "apiKey" and {"in", "name"} <= one.keys()
+    }
+    if len(wanted) != 1:
+        named = f"wants {' and '.join(sorted(wanted))}" if wanted else "names no scheme of type apiKey"
+        raise StatementError(f"the description {named}: say where the API key goes, as in --api-key 'header X-Api-Key'")
+    return msgspec.structs.replace(where, api_key=wanted.pop())
+
+
+def _logged_in(auth: Auth, base_url: str, connection: Connection) -> Credential:
+    """Return the credential that a login gives.
+
+    Raises:
+        OSError: the file with the content cannot be read.
+        StatementError: there is no response, or no token in it.
+    """
+    method, target = auth.login.split(" ", 1)
+    content = Path(auth.body_file).read_bytes() if auth.body_file else b""
+    headers = [("Accept", "application/json"), *([("Content-Type", auth.content_type)] if content else [])]
+    client = HttpClient(base_url, connection)
+    try:
+        response = client.send(
+            method, target, headers=[*headers, ("Accept", "application/json")], body=content
+        ).response
+    except NoAnswerError as none:
+        raise StatementError(f"[auth] login: {none}") from none
+    finally:
+        client.close()
+    if not response.ok:
+        raise StatementError(f"[auth] login = {auth.login!r}: the device responded {response.status}")
+    try:
+        token = JSONPointer(auth.token).resolve(read_json(response.body).value)
+    except JSONPointerError:
+        token = None
+    if not isinstance(token, str) or not token.isprintable() or not token:
+        raise StatementError(f"[auth] token = {auth.token!r}: the response to {auth.login} has no text there")
+    place, _, name = auth.send_as.partition(" ")
+    return Credential(Kind(place), token, name)
+
+
+def _secret(path: str) -> str:
+    return Path(path).read_text(encoding="utf-8").strip()
+
+
+def _certificate(where: Endpoints) -> tuple[Path, Path | None] | None:
+    if where.client_cert_file is None:
+        return None
+    return Path(where.client_cert_file), Path(where.client_key_file) if where.client_key_file else None
+
+
+def _credentials(where: Endpoints) -> Credentials:
+    """Return the credentials beside the bearer token; their secrets are in files.
+
+    Raises:
+        StatementError: one is malformed; the message shows no secret.
+        OSError: a file cannot be read.
+    """
+    found: list[Credential] = []
+    if where.basic_file:
+        pair = _secret(where.basic_file)
+        if ":" not in pair:
+            raise StatementError(f"{where.basic_file}: expected one line user:password")
+        found.append(Credential(Kind.BASIC, pair))
+    if where.api_key or where.api_key_file:
+        place, _, name = (where.api_key or "").partition(" ")
+        if place not in _PLACES or not name.strip() or not where.api_key_file:
+            raise StatementError("an API key needs api_key = 'header NAME' (or query, or cookie) and api_key_file")
+        found.append(Credential(Kind(place), _secret(where.api_key_file), name.strip()))
+    for number, line in enumerate(_secret(where.headers_file).splitlines() if where.headers_file else (), 1):
+        name, colon, value = line.partition(":")
+        if not colon or not name.strip():
+            raise StatementError(f"{where.headers_file}, line {number}: expected Name: value")
+        found.append(Credential(Kind.HEADER, value.strip(), name.strip()))
+    return Credentials(tuple(found))
