@@ -19,7 +19,7 @@ from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.contract.toml_file import TomlFileError
 from conformance.packs.table1.statement import Statement, load_robot_statement
 from conformance.packs.table1.thresholds import load_thresholds
-from conformance.statement.statement import Endpoints
+from conformance.statement.endpoints import Endpoints
 from loadtests.measuring.command_line import without_folders
 from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest, store
 from loadtests.schedule.plan import CLIENTS, INTERFACES, OPERATIONS

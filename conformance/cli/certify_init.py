@@ -12,7 +12,8 @@ from conformance.commandline.result_command import CommandResult
 from conformance.contract.pack import Contract
 from conformance.engine.connecting import connection_of
 from conformance.engine.describing import fetch_description
-from conformance.statement.statement import Api, Calls, Endpoints, Statement, StatementError
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import Api, Calls, Statement, StatementError
 
 
 def init(path: Path | None, chosen: Statement, contract: Contract, *, force: bool) -> CommandResult:

@@ -12,10 +12,10 @@ from conformance.contract.pack import Contract
 from conformance.documents.description import is_url
 from conformance.engine.connecting import connection_of, keyed
 from conformance.engine.describing import described_contract
+from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import (
     Api,
     Calls,
-    Endpoints,
     Statement,
     StatementError,
     api_of,

@@ -17,7 +17,7 @@ from conformance.contract.toml_file import basic_string
 from conformance.documents.description import DescriptionError
 from conformance.documents.openapi import operations_of
 from conformance.engine.describing import UnreachableError, described_contract
-from conformance.statement.statement import Endpoints
+from conformance.statement.endpoints import Endpoints
 
 if TYPE_CHECKING:
     from conformance.contract.pack import Contract

@@ -8,7 +8,8 @@ from jsonpath import JSONPointer
 from jsonpath.exceptions import JSONPointerError
 
 from conformance.documents.json_text import read_json
-from conformance.statement.statement import Auth, Endpoints, StatementError
+from conformance.statement.endpoints import Auth, Endpoints
+from conformance.statement.statement import StatementError
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.credentials import Credential, Credentials, Kind
 from conformance.transport.exchange import NoAnswerError

@@ -9,7 +9,7 @@ from urllib.parse import urljoin, urlsplit
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.documents.description import Description, DescriptionError, is_url, read_description
-from conformance.statement.statement import Endpoints
+from conformance.statement.endpoints import Endpoints
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError
 

@@ -9,7 +9,8 @@ from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.engine.connecting import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.statement.statement import Endpoints, StatementError, empty_statement, load_statement
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import StatementError, empty_statement, load_statement
 from conformance.verdict.effort import EFFORTS, Effort
 from conformance.verdict.run import Run
 

@@ -8,7 +8,8 @@ import msgspec
 
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import Positive, Text, TomlFileError, read_toml
-from conformance.statement.statement import Endpoints, StatementError, beside, load_statement
+from conformance.statement.endpoints import Endpoints, beside
+from conformance.statement.statement import StatementError, load_statement
 
 TIME_LIMIT_S = 3600.0
 """How long one robot may take where the file does not say, s."""

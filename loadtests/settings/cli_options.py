@@ -5,7 +5,7 @@ from typing import Any, Self
 
 from conformance.packs.table1.statement import Statement
 from conformance.packs.table1.thresholds import Threshold
-from conformance.statement.statement import Endpoints
+from conformance.statement.endpoints import Endpoints
 from loadtests.settings.settings import STEP_S, Generator, Repeats, Selection
 
 TOLERANCE = 0.05

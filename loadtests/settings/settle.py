@@ -7,7 +7,7 @@ from typing import Self
 import msgspec
 
 from conformance.packs.table1.statement import Statement
-from conformance.statement.statement import Endpoints
+from conformance.statement.endpoints import Endpoints
 from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import bridge_endpoint

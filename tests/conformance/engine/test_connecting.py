@@ -8,7 +8,8 @@ from processes import ended
 from toy_server import serving
 
 from conformance.engine.connecting import connection_of, keyed
-from conformance.statement.statement import Auth, Endpoints, StatementError
+from conformance.statement.endpoints import Auth, Endpoints
+from conformance.statement.statement import StatementError
 
 _SECRET, _TOKEN = "correct horse", "a-token-of-the-device"
 _AUTH = Auth("POST /login", "/session/token")

@@ -13,7 +13,7 @@ from conformance.packs.table1.robot import delivery, delivery_messages
 from conformance.packs.table1.selftest import BAROQUE
 from conformance.packs.table1.statement import Statement
 from conformance.selftest.robots import running
-from conformance.statement.statement import Endpoints
+from conformance.statement.endpoints import Endpoints
 from conformance.transport import raw
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run

@@ -12,7 +12,8 @@ from conformance.cli.summary import print_summary
 from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.statement.statement import Endpoints, empty_statement
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import empty_statement
 from conformance.transport.client import Connection
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run

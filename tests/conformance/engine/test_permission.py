@@ -13,7 +13,8 @@ from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.packs.table1.independent_robots import plain
-from conformance.statement.statement import Endpoints, empty_statement
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import empty_statement
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NotPermittedError

@@ -10,7 +10,7 @@ from conformance.contract.interfaces import Interface
 from conformance.engine import robot_under_test
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.packs.table1.statement import Statement
-from conformance.statement.statement import Endpoints
+from conformance.statement.endpoints import Endpoints
 from conformance.transport.client import Connection
 from conformance.verdict.run import Run
 

@@ -9,7 +9,8 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.observers import Observer
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
-from conformance.statement.statement import Endpoints, Statement
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.verdict.run import Run
 

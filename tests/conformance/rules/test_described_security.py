@@ -10,7 +10,8 @@ from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.rules.description.test_security import security
 from conformance.scenarios.anonymous import anonymous_reads
-from conformance.statement.statement import Endpoints, Statement
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.verdict.run import Run
 

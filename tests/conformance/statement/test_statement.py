@@ -9,7 +9,8 @@ from conformance.packs.table1.limits import Noise
 from conformance.packs.table1.robot.robot import STILL, Velocity, is_near
 from conformance.packs.table1.statement import Statement
 from conformance.packs.table1.thresholds import ApiStyle, Operation, Quantile, Threshold
-from conformance.statement.statement import Endpoints, StatementError, load_statement
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import StatementError, load_statement
 
 CONTRACT = Contract.load()
 ONLY_REST = replace(CONTRACT, publishers_path=None, subscribers_path=None)
@@ -67,7 +68,7 @@ def test_a_full_statement(tmp_path):
     [
         (
             "[robto]\nname = 'x'",
-            "unknown key 'robto'; known are api, auth, calls, claims, endpoints, limits, load, motion, robot, ros, values",
+            "unknown key 'robto'; known are api, auth, calls, claims, endpoints, limits, load, motion, robot, ros",
         ),
         ("[limts]\nhold_s = 1", "unknown key 'limts'"),
         ("[endpoints]\nrset = 'x'", "[endpoints] unknown key 'rset'; known are api_key,"),

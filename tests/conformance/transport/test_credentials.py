@@ -7,7 +7,8 @@ import pytest
 
 from conformance.engine.connecting import connection_of
 from conformance.engine.resending import send_again
-from conformance.statement.statement import Endpoints, StatementError
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import StatementError
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.credentials import Credential, Credentials, Kind

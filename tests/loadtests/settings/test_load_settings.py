@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from conformance.commandline.exit_codes import ExitCode
 from conformance.packs.table1.statement import Load, Statement
 from conformance.packs.table1.thresholds import ThresholdsError, load_thresholds
-from conformance.statement.statement import Endpoints
+from conformance.statement.endpoints import Endpoints
 from loadtests.cli import load
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.settings import Settings

@@ -19,7 +19,7 @@ from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.packs.table1.statement import Statement
-from conformance.statement.statement import Endpoints
+from conformance.statement.endpoints import Endpoints
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.run import Run
