@@ -105,7 +105,10 @@ class Observer(Listener):
 
     def _judge_fields(self, exchange: Exchange, answer: Response, context: RequestContext) -> None:
         judge = self._api.run.judge
-        expect(judge, "http/framing", exchange).that(holds=True, expected=_WELL_FRAMED)
+        # RFC 9112 6.2: of two lengths, readers may take either one.
+        both = answer.header("transfer-encoding") is not None and answer.header("content-length") is not None
+        found = "Content-Length beside Transfer-Encoding"
+        expect(judge, "http/framing", exchange).that(not both, _WELL_FRAMED, found, cause="two lengths")
         if answer.body:
             named = answer.header("content-type")
             found = (
