@@ -5,9 +5,6 @@ from __future__ import annotations
 import copy
 from typing import Any
 
-import jsonpath
-from jsonpath.exceptions import JSONPathError
-
 from conformance.documents.json_schema import Schema
 
 
@@ -21,6 +18,10 @@ def overlaid(document: Schema, overlay: Schema) -> Schema:
     Raises:
         OverlayError: the overlay is malformed, or an action has no valid JSONPath (RFC 9535).
     """
+    # Imported late: it takes a twentieth of a second, and few descriptions have an overlay.
+    import jsonpath  # noqa: PLC0415
+    from jsonpath.exceptions import JSONPathError  # noqa: PLC0415
+
     if "overlay" not in overlay or not isinstance(overlay.get("actions"), list):
         raise OverlayError("it is no overlay: it needs 'overlay' and a list of 'actions'")
     changed = copy.deepcopy(document)

@@ -4,8 +4,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import msgspec
-from jsonpath import JSONPointer
-from jsonpath.exceptions import JSONPointerError
 
 from conformance.documents.json_text import read_json
 from conformance.statement.endpoints import Auth, Endpoints
@@ -69,6 +67,10 @@ def _logged_in(auth: Auth, base_url: str, connection: Connection) -> Credential:
         OSError: the file with the content cannot be read.
         StatementError: there is no response, or no token in it.
     """
+    # Imported late: it takes a twentieth of a second.
+    from jsonpath import JSONPointer  # noqa: PLC0415
+    from jsonpath.exceptions import JSONPointerError  # noqa: PLC0415
+
     method, target = auth.login.split(" ", 1)
     content = Path(auth.body_file).read_bytes() if auth.body_file else b""
     headers = [("Accept", "application/json"), *([("Content-Type", auth.content_type)] if content else [])]

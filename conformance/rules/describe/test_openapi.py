@@ -17,7 +17,7 @@ from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("describe"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _PATH = "/openapi.json"
 _BEHAVIOUR = "describe/openapi-behaviour"
 

@@ -13,7 +13,7 @@ from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("describe"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _PATH = "/application.wadl"
 _BEHAVIOUR = "describe/wadl-behaviour"
 _IDS = ("describe/wadl", "describe/wadl-resources", _BEHAVIOUR)

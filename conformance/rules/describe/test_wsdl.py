@@ -22,7 +22,7 @@ from conformance.transport.exchange import Attempt, Exchange, NoAnswerError
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-pytestmark = pytest.mark.phase("describe")
+pytestmark = pytest.mark.phase("settling")
 _COMPARED: dict[str, tuple[Callable[[Description, Description], Iterator[str]], str]] = {
     "wsdl-names": (comparison.names, "a WSDL with the names of the contract"),
     "wsdl-operations": (comparison.operations, "a WSDL with the operations of the contract"),
