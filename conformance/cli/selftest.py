@@ -74,7 +74,7 @@ _SHORT = 15
 @click.option("--base-url", metavar="URL", help="With --api: where the operations of the description are.")
 @click.option("--call", "allow", multiple=True, metavar="PATTERN", help="With --api: as in roaas certify; repeatable.")
 @click.option("--never", multiple=True, metavar="PATTERN", help="With --api: as in roaas certify; repeatable.")
-@click.option("--seed", type=int, default=0, help="Seed of the sample of generated mutants.")
+@click.option("--seed", type=int, default=0, help="Seed of the mutants' runs, and of the sample of generated ones.")
 @click.option("--list", "listed", is_flag=True, help="List the mutants, and run nothing.")
 @click.option(
     "--out",
@@ -222,7 +222,7 @@ def _run(report: Report, chosen: list[Mutant], options: dict[str, Any]) -> None:
             if not options["short"]:
                 already = frozenset(run_unchanged(pool, options["effort"]).not_passed())
             report.mutant_results = run_mutants(
-                pool, chosen, effort=options["effort"], already=already, tell=progress.mutant
+                pool, chosen, effort=options["effort"], seed=options["seed"], already=already, tell=progress.mutant
             )
             if options["compare"]:
                 compare(report, pool, chosen, progress)
