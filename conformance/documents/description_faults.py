@@ -8,7 +8,8 @@ from functools import lru_cache
 from typing import Any
 
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed, resolved, shape_of
-from conformance.documents.openapi import METHODS, PARAMETER
+from conformance.documents.openapi import METHODS
+from conformance.documents.resources import PARAMETER
 
 _DEPTH = 40
 

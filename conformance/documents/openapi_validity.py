@@ -6,7 +6,8 @@ from functools import lru_cache
 from typing import Any
 
 from conformance.documents.json_schema import UnresolvedError
-from conformance.documents.openapi import PARAMETER, Operation, read_operations
+from conformance.documents.openapi import Operation, read_operations
+from conformance.documents.resources import PARAMETER
 
 
 def openapi_fault(document: Any) -> str:

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from conformance.api.rest.inputs import FORM, MULTIPART, NOTHING, Inputs
 from conformance.api.rest.values import fits, sample
-from conformance.api.rest.variations import DEPTH, LONG, UNKNOWN, Kind, Variation, place_of, shown, with_member
+from conformance.api.rest.variations import DEPTH, LONG, UNKNOWN, Kind, Steps, Variation, place_of, shown, with_member
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.openapi import Operation, Parameter, is_json
 from conformance.documents.representation import flat
@@ -44,13 +44,33 @@ def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
     yield Variation(Kind.MALFORMED, "a body that is not UTF-8", "body", not_utf8)
     if "object" in kinds_of(body.schema) and len(kinds_of(body.schema)) == 1:
         yield Variation(Kind.INVALID, "a list instead of an object", "body", replace(usual, body=[]))
-    if isinstance(usual.body, dict):
-        # What one alternative of a union forbids, another one may allow.
-        found = _invalid_members(usual, usual.body, body.schema, ())
-        yield from (one for one in found if not fits(body.schema, one.inputs.body))
+    # What one alternative of a union forbids, another one may allow.
+    found = _invalid_parts(usual, usual.body, body.schema, ())
+    yield from (one for one in found if not fits(body.schema, one.inputs.body))
 
 
-def _invalid_members(usual: Inputs, value: Any, schema: Schema, steps: tuple[str, ...]) -> Iterator[Variation]:
+def _invalid_parts(usual: Inputs, value: Any, schema: Schema, steps: Steps) -> Iterator[Variation]:
+    """Yield bodies in which one member or item within ``value`` is missing or wrong; optional ones are put in."""
+    if isinstance(value, dict):
+        yield from _invalid_members(usual, value, schema, steps)
+    items = flat(schema).get("items")
+    if isinstance(value, list) and isinstance(items, dict) and not flat(schema).get("prefixItems"):
+        first = value[0] if value else sample(items, whole=True)
+        filled = replace(usual, body=with_member(usual.body, steps, [first, *value[1:]]) if steps else [first])
+        yield from _invalid_part(filled, first, items, (*steps, 0))
+
+
+def _invalid_part(usual: Inputs, value: Any, schema: Schema, here: Steps) -> Iterator[Variation]:
+    """Yield bodies with a forbidden value in one place, and with one within the value there."""
+    place = place_of(here)
+    for wrong, why in _invalid_values(schema):
+        body = with_member(usual.body, here, wrong)
+        yield Variation(Kind.INVALID, f"{shown(wrong)} as {place}, {why}", place, replace(usual, body=body))
+    if len(here) <= DEPTH:
+        yield from _invalid_parts(usual, value, schema, here)
+
+
+def _invalid_members(usual: Inputs, value: dict[str, Any], schema: Schema, steps: Steps) -> Iterator[Variation]:
     """Yield bodies in which one member is missing or wrong."""
     flatter = flat(schema)
     for name, part in list(flatter.get("properties", {}).items()):
@@ -61,11 +81,11 @@ def _invalid_members(usual: Inputs, value: Any, schema: Schema, steps: tuple[str
         if name in flatter.get("required", ()):
             body = with_member(usual.body, here, NOTHING)
             yield Variation(Kind.MISSING, f"no {place}", place, replace(usual, body=body))
-        for wrong, why in _invalid_values(part):
-            body = with_member(usual.body, here, wrong)
-            yield Variation(Kind.INVALID, f"{shown(wrong)} as {place}, {why}", place, replace(usual, body=body))
-        if isinstance(value.get(name), dict) and len(steps) < DEPTH:
-            yield from _invalid_members(usual, value[name], part, here)
+        inner, filled = value.get(name), usual
+        if name not in value and kinds_of(part) & {"object", "array"}:
+            inner = sample(part, whole=True)
+            filled = replace(usual, body=with_member(usual.body, here, inner))
+        yield from _invalid_part(filled, inner, part, here)
     if flatter.get("additionalProperties") is False and not steps:
         body = with_member(usual.body, ("roaas_unknown",), 1)
         yield Variation(
@@ -88,6 +108,8 @@ def _invalid_values(schema: Schema) -> Iterator[tuple[Any, str]]:
         if not fits(schema, value) and (is_plain or isinstance(value, dict)):
             yield value, "which has another type" if "enum" not in merged else "which is none of its values"
             break
+    if kinds & {"number", "integer"} and "string" not in kinds and not fits(schema, value=False):
+        yield False, "which has another type"
 
 
 def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:

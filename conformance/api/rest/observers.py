@@ -34,6 +34,8 @@ _IMF_FIXDATE = re.compile(
     r"\d{2}:\d{2}:\d{2} GMT",
     re.ASCII,
 )
+# RFC 9110 8.8.3: entity-tag.
+_ENTITY_TAG = re.compile(r'(?:W/)?"[\x21\x23-\x7e\x80-\xff]*"')
 
 
 class Observer(Listener):
@@ -131,6 +133,10 @@ class Observer(Listener):
                 expected, found = f"{name} in the format Sun, 06 Nov 1994 08:49:37 GMT", f"{name}: {value}"
                 holds = _IMF_FIXDATE.fullmatch(value.strip()) is not None
                 expect(judge, "http/date-format", exchange).that(holds, expected, found, cause=name.lower())
+            elif name.lower() == "etag":
+                holds = _ENTITY_TAG.fullmatch(value.strip()) is not None
+                expected = 'ETag with a tag in double quotes, such as "a1" or W/"a1"'
+                expect(judge, "http/etag-format", exchange).that(holds, expected, f"ETag: {value}", cause="etag")
 
     def _judge_json(self, exchange: Exchange, answer: Response) -> None:
         judge = self._api.run.judge

@@ -12,7 +12,8 @@ from urllib.parse import parse_qsl
 from conformance.api.call_rules import CallRules
 from conformance.api.rest.branches import branches_in, branches_of
 from conformance.contract.pack import Contract
-from conformance.documents.openapi import Operation, is_json, matching, operations_of, resource_at
+from conformance.documents.openapi import Operation, is_json, operations_of
+from conformance.documents.resources import matching, resource_at
 from conformance.transport.exchange import Exchange, Listener, Request, Unanswered
 from conformance.verdict.finding import Finding
 

@@ -7,8 +7,8 @@ from conformance.api.expectation import expect
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.request_context import RequestContext
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import inside_prefix, is_normal
 from conformance.documents.representation import UnreadableError, local_name, parse_xml
+from conformance.documents.resources import inside_prefix, is_normal
 from conformance.transport.exchange import Exchange, Response
 
 JSON = "application/problem+json"

@@ -7,7 +7,8 @@ from functools import cached_property
 
 from conformance.api.rest.accept import accept_of, quality
 from conformance.contract.pack import Contract
-from conformance.documents.openapi import Operation, is_normal, matching
+from conformance.documents.openapi import Operation
+from conformance.documents.resources import is_normal, matching
 from conformance.transport.exchange import Request
 
 _USUAL_FIELDS = {

@@ -8,8 +8,9 @@ from urllib.parse import parse_qsl, unquote
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, kinds_of, shape_of
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import Operation, Parameter, is_json, is_normal, is_xml, matching
+from conformance.documents.openapi import Operation, Parameter, is_json, is_xml
 from conformance.documents.representation import UnreadableError, from_element, local_name, parse_xml
+from conformance.documents.resources import is_normal, matching
 from conformance.verdict.evidence import HarnessError
 
 VALID, INVALID, UNCLEAR = "valid", "invalid", "unclear"

@@ -23,6 +23,8 @@ _FEW: Final = 12
 DEPTH: Final = 3
 LONG: Final = 5000
 _BEYOND: Final = 2**63
+#: Names of members and indexes of items on the way into a body.
+Steps = tuple[str | int, ...]
 UNKNOWN: Final = "roaas-unknown"
 _UNKNOWN_NUMBER: Final = 987_654_321
 # Texts that programs stumble over; none of them acts on anything.
@@ -186,12 +188,12 @@ def _sendable(parameter: Parameter, value: Any) -> bool:
     return True
 
 
-def with_member(body: Any, steps: tuple[str, ...], value: Any) -> Any:
-    """Return a copy of a body with another value of a member; NOTHING removes the member."""
+def with_member(body: Any, steps: Steps, value: Any) -> Any:
+    """Return a copy of a body with another value of a member or item; NOTHING removes the member."""
     changed = copy.deepcopy(body)
-    inner = changed
+    inner: Any = changed
     for step in steps[:-1]:
-        inner = inner.setdefault(step, {})
+        inner = inner[step] if isinstance(step, int) else inner.setdefault(step, {})
     if value is NOTHING:
         inner.pop(steps[-1], None)
     else:
@@ -199,9 +201,9 @@ def with_member(body: Any, steps: tuple[str, ...], value: Any) -> Any:
     return changed
 
 
-def place_of(steps: tuple[str, ...]) -> str:
-    """Return the place of a member of a body, as variations name it."""
-    return "body /" + "/".join(steps)
+def place_of(steps: Steps) -> str:
+    """Return the place of a member or item of a body, as variations name it."""
+    return "body /" + "/".join(map(str, steps))
 
 
 def shown(value: Any) -> str:

@@ -42,9 +42,11 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
     def fault(probe: Probe) -> Fault | None:
         if not probe.ok:
             return None
-        why = "" if probe.says else _why_invalid(run, probe)
+        why = _why_invalid(run, probe)
         # A type that a framework converts, it converts in every operation.
         kind = _CONVERTED.search(why)
+        if probe.says:
+            kind, why = (kind if kind and _json_type(kind[1]) == "boolean" else None), ""
         cause = (
             f"{_json_type(kind[1])} {kind[2]}" if kind else f"{probe.operation} {probe.place} {without_numbers(why)}"
         )

@@ -20,6 +20,7 @@ _IN_ALL = 56
     "http/content-type",
     "http/date",
     "http/date-format",
+    "http/etag-format",
     "http/field-once",
     "http/framing",
     "http/json-finite",

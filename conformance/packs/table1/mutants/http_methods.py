@@ -219,3 +219,4 @@ _mutant("http-date-zone", "date-format", "Date ends with -0000 instead of GMT.")
 _mutant("http-date-old", "date-format", "One Date in 50 has the obsolete format of RFC 850.").altered(
     rest("GET", POSE, VELOCITY), header("Date", "Sunday, 06-Nov-94 08:49:37 GMT"), nth=50
 )
+_mutant("http-etag-bare", "etag-format", "ETag has no quotes.").altered(_ANY, header("ETag", "a1"), anything)

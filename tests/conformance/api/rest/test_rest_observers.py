@@ -197,6 +197,29 @@ def test_the_format_of_a_time(name, value, holds):
     assert ("http/date-format" in found) is not holds
 
 
+@pytest.mark.parametrize(
+    ("value", "holds"),
+    [
+        ('"a1"', True),
+        ('W/"a1"', True),
+        ('""', True),
+        (' "a,\\ü" ', True),
+        ("a1", False),
+        ("'a1'", False),
+        ('w/"a1"', False),
+        ('W/ "a1"', False),
+        ('"a 1"', False),
+        ('"a"1"', False),
+        ('"a", "b"', False),
+        ("*", False),
+        ("", False),
+    ],
+)
+def test_the_format_of_an_entity_tag(value, holds):
+    found = seen("OPTIONS", "/robot/velocity/", 204, [("etag", value)])
+    assert ("http/etag-format" in found) is not holds
+
+
 def test_garbage_is_bad_framing():
     found = seen("GET", "/robot/pose/", None, problem="a response that is not HTTP: illegal status line")
     assert found == {"http/framing"}

@@ -109,6 +109,50 @@ def test_invalid_variations_do_not_fit():
     assert not any(place.rpartition("/")[2] == "id" or place == "path id" for _, place in places)
 
 
+_NUMBERS = {"type": "array", "items": {"type": "number"}}
+
+
+@pytest.mark.parametrize(
+    ("schema", "place", "body"),
+    [
+        ({"type": "number"}, "/room", {"room": False}),
+        (_NUMBERS, "/room/0", {"room": [False]}),
+        ({**_NUMBERS, "minItems": 2}, "/room/0", {"room": [False, 1]}),
+        ({"type": "object", "properties": {"max": _NUMBERS}}, "/room/max/0", {"room": {"max": [False]}}),
+        ({"type": "array", "items": {"properties": {"a": {"type": "integer"}}, "type": "object"}}, "/room/0/a",
+         {"room": [{"a": False}]}),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("required", [True, False])
+def test_a_truth_value_stands_for_no_number_however_deep(schema, place, body, required):
+    whole = {"type": "object", "properties": {"room": schema}, "required": ["room"] if required else []}
+    found = _variations(_operation(path="/a", body=whole), invalid_variations)
+    assert [one.inputs.body for one in found if one.place == f"body {place}" and False in _scalars(one.inputs)] == [
+        body
+    ]
+
+
+def test_items_of_a_body_that_is_a_list():
+    found = _variations(_operation(path="/a", body=_NUMBERS), invalid_variations)
+    assert [False] in [one.inputs.body for one in found]
+
+
+def test_a_truth_value_where_one_is_allowed_is_not_called_invalid():
+    items = {"type": "array", "items": {"type": ["number", "boolean"]}}
+    found = _variations(_operation(path="/a", body={"type": "object", "properties": {"n": items}}), invalid_variations)
+    assert not any(one.inputs.body == {"n": [False]} for one in found)
+
+
+def _scalars(inputs):
+    return [one for one in _flattened(inputs.body) if isinstance(one, bool)]
+
+
+def _flattened(value):
+    if not isinstance(value, dict | list):
+        return [value]
+    return [one for item in (value.values() if isinstance(value, dict) else value) for one in _flattened(item)]
+
+
 @pytest.mark.parametrize(
     "schema",
     [
