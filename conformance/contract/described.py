@@ -17,11 +17,7 @@ UNRESOLVED_NAME: Final = "unresolved.json"
 TITLE: Final = "its own description"
 _CLASSES: Final = ("description", "robustness", "http")
 # The class `description` judges these of each operation, and tells what operations have in common once.
-# An unknown method might act.
-_WITHOUT: Final = (
-    "http/declared-status", "http/declared-body", "http/json-integers", "http/no-traceback", "http/unknown-method",
-    "http/unknown-method-refused",
-)  # fmt: skip
+_WITHOUT: Final = ("http/declared-status", "http/declared-body", "http/json-integers", "http/no-traceback")
 # Formats in which one value can be written.
 _DATA: Final = re.compile(r"[/+](?:x-)?(?:json|xml|yaml)\b")
 _NO_NAME: Final = re.compile(r"[^a-z0-9]+")

@@ -106,9 +106,12 @@ class Values:
         return [value for value in _distinct(found) if value in given or fits(parameter.schema, value)][:_TRIED]
 
     def body(self, schema: Schema, examples: Sequence[Any] = ()) -> list[Any]:
-        """Return bodies to try, the most promising first: the examples, then one made from the schema."""
-        made = self._filled(sample(schema), schema)
-        return _distinct([*(value for value in examples if not isinstance(value, str)), made])[:_TRIED]
+        """Return bodies to try, the most promising first: the examples, then two made from the schema.
+
+        The first takes the first alternative of each union, the second the last one.
+        """
+        made = [self._filled(sample(one), one) for one in (schema, _backwards(schema))]
+        return _distinct([*(value for value in examples if not isinstance(value, str)), *made])[:_TRIED]
 
     def _filled(self, value: Any, schema: Schema) -> Any:
         """Return an object whose members have the values that the user gave, or that a response named."""
@@ -165,6 +168,15 @@ def sample(schema: Schema, depth: int = 0, *, whole: bool = False) -> Any:
     if kinds == {"boolean"}:
         return True
     return _text(schema)
+
+
+def _backwards(schema: Schema, depth: int = 0) -> Schema:
+    """Return a schema with the alternatives of its unions, and of its members' unions, in the opposite order."""
+    turned = {key: schema[key][::-1] for key in ("anyOf", "oneOf") if isinstance(schema.get(key), list)}
+    properties = schema.get("properties")
+    if isinstance(properties, dict) and depth < _DEPTH:
+        turned["properties"] = {name: _backwards(part, depth + 1) for name, part in properties.items()}
+    return {**schema, **turned}
 
 
 def _not_null(schema: Schema) -> Schema:

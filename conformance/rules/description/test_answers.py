@@ -20,6 +20,8 @@ from conformance.scenarios.survey import Probe, Survey, generated_requests, surv
 from conformance.transport.exchange import Response
 from conformance.verdict.run import Run
 
+# Such responses have no content (RFC 9110 15.3.5, 15.3.6, 15.4.5).
+_BODILESS = frozenset({204, 205, 304})
 _ON = (survey, generated_requests)
 # HTTP lets any server send these, whatever the operation: conditions, ranges, rates, sizes, credentials, upgrades.
 _ANY_TIME = frozenset(
@@ -148,7 +150,8 @@ def _with_schema(trace: Survey, run: Run) -> Iterator[tuple[Probe, tuple[Schema,
     for probe, operation, answer in _answered(trace, run):
         content = operation.declared(answer.status) or {}
         names = [name for name in content if _matches(name, answer.media_type) and is_json(answer.media_type)]
-        if names and not answer.cut and (answer.body or operation.method == "GET") and _usable(content[names[0]]):
+        whole = not answer.cut and (answer.body or operation.method != "HEAD")
+        if names and whole and answer.status not in _BODILESS and _usable(content[names[0]]):
             yield probe, (content[names[0]], answer)
 
 

@@ -85,7 +85,9 @@ def test_methods_that_nobody_knows(api: RestInterface, judge: Judge) -> None:
                     raise
                 attempt = none.unanswered
             expect(judge, "http/unknown-method-refused", attempt).status("4xx", 501, closed=True, cause=method)
-            expect(judge, "http/unknown-method", attempt).status(405, 501, cause=method)
+            # Which refusal it is, a described API need not choose: its server's parser may answer 400 first.
+            refusals = ("4xx", 501) if api.run.contract.described else (405, 501)
+            expect(judge, "http/unknown-method", attempt).status(*refusals, cause=method)
 
 
 @pytest.mark.requirement("http/options", "http/allow", "http/allow-agrees", "description/allow")

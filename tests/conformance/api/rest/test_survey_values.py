@@ -82,3 +82,12 @@ def test_what_the_user_gives_comes_first_and_the_description_next():
     assert values.of(_ONE, parameter) == ["given", 5, "shown", "roaas"]
     schema = {"type": "object", "required": ["job_id"], "properties": {"job_id": {"type": "string"}}}
     assert values.body(schema, ({"job_id": "e"},)) == [{"job_id": "e"}, {"job_id": "given"}]
+
+
+def test_the_second_body_takes_the_last_alternative_of_each_union():
+    part = {"type": "object", "required": ["type"], "properties": {"type": {"type": "string"}}}
+    union = {"anyOf": [part, {"type": "array", "items": part}, {"type": "null"}]}
+    schema = {"type": "object", "required": ["physics"], "properties": {"physics": union}}
+    assert Values().body(schema) == [{"physics": {"type": "roaas"}}, {"physics": []}]
+    plain = {"type": "object", "required": ["on"], "properties": {"on": {"type": "boolean"}}}
+    assert Values().body(plain) == [{"on": True}]
