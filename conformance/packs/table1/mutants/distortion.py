@@ -12,7 +12,8 @@ from conformance.mutation.messages import Forward, Request, Response
 from conformance.packs.table1.delivery import COORDINATES, PATH_NAMES
 from conformance.packs.table1.mutants.paths import DELIVERIES, deliveries
 
-_DELIVERY = re.compile(f"{DELIVERIES}([34])" + "".join(rf"/{name}/(-?\d+(?:\.\d+)?)" for name in PATH_NAMES))
+_NUMBER = r"([+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d{1,2})?)"
+_DELIVERY = re.compile(DELIVERIES + r"\+?0*([34])" + "".join(f"/{name}/{_NUMBER}" for name in PATH_NAMES), re.ASCII)
 _UNWANTED, _LIST = unwanted(deliveries), rest("GET", DELIVERIES)
 _BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 _CODE_PLACE = 4
