@@ -44,8 +44,8 @@ class Job:
         effort: quick, standard or deep.
         seed: seed of everything random.
         domain_id: ROS domain of the probe, or None for no probe.
-        token: bearer token to send, or empty.
         endpoints: further endpoint options of the statement (ca_file, request_rate).
+        secrets: contents of files that endpoint options of the statement name, by the option (token_file).
         timeout_s: time after which the run is killed, s.
         enough: requirements that end the run: after the first failure of one of them no further check starts.
         out: folder in which result.json is kept, or None.
@@ -61,8 +61,8 @@ class Job:
     effort: str = "quick"
     seed: int = 0
     domain_id: int | None = None
-    token: str = ""
     endpoints: dict[str, Any] = field(default_factory=dict)
+    secrets: dict[str, str] = field(default_factory=dict)
     timeout_s: float = 120.0
     enough: frozenset[str] = frozenset()
     out: Path | None = None
@@ -163,10 +163,10 @@ def statement_of(job: Job, contract: Contract) -> Statement:
 
 
 def robot_of(job: Job, folder: Path) -> RobotUnderTest:
-    """Return the robot and the run that a job describes; the job's token is written to a file in ``folder``."""
-    if job.token:
-        (folder / "token").write_text(job.token, encoding="utf-8")
-        job = replace(job, endpoints={**job.endpoints, "token_file": str(folder / "token")})
+    """Return the robot and the run that a job describes; the job's secrets are written to files in ``folder``."""
+    for option, secret in job.secrets.items():
+        (folder / option).write_text(secret, encoding="utf-8")
+    job = replace(job, endpoints={**job.endpoints, **{option: str(folder / option) for option in job.secrets}})
     contract = Contract.load(job.pack, only=job.requirements)
     statement = statement_of(job, contract)
     run = Run(

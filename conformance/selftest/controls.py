@@ -195,4 +195,4 @@ def _varied(stack: contextlib.ExitStack, variant: Variant, robot: Robot, seed: i
             **{side: f"http://{host}:{port}" for side, (host, port) in zip(proxy.listens, addresses, strict=True)}
         )
     proxy.change = variant.make()
-    return proxy.before(robot), {"token": variant.token, "endpoints": endpoints}
+    return proxy.before(robot), {"secrets": variant.secrets, "endpoints": endpoints}

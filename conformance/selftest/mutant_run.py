@@ -130,8 +130,9 @@ def become(proxy: Proxy, mutant: Mutant) -> None:
     proxy.serial, proxy.backwards, proxy.forgetful = mutant.serial, mutant.backwards, mutant.forgetful
 
 
-def job_for(robot: Robot, proxy: Proxy, effort: str, seed: int, **more: Any) -> Job:
-    """Return a job that certifies a robot through its proxy."""
+def job_for(robot: Robot, proxy: Proxy, effort: str, seed: int, token: str = "", **more: Any) -> Job:
+    """Return a job that certifies a robot through its proxy, with a bearer token if it wants one."""
+    more |= {"secrets": {"token_file": token}} if token else {}
     return job_at(proxy.before(robot), effort=effort, seed=seed, timeout_s=_TIMEOUTS[effort], **more)
 
 
@@ -195,8 +196,8 @@ def _try(mutant: Mutant, robot: Robot, proxy: Proxy, effort: str, seed: int, alr
     # The checks that judge the requirements alone; then the whole classes; then those with more cases.
     for chosen, requirements in ((effort, mutant.catches), (effort, ()), ("standard", ())):
         become(proxy, mutant)
-        more = {"classes": classes, "requirements": requirements, "domain_id": domain_id, "token": mutant.token}
-        outcome = run_job(job_for(robot, proxy, chosen, seed, **more))
+        more: dict[str, Any] = {"classes": classes, "requirements": requirements, "domain_id": domain_id}
+        outcome = run_job(job_for(robot, proxy, chosen, seed, token=mutant.token, **more))
         seen.update(dict.fromkeys(outcome.not_passed()))
         _note(result, outcome, tuple(seen), chosen)
         if proxy.broken:

@@ -1,5 +1,6 @@
 """Variants of a good device that must stay conformant: TLS, path prefix, authentication, rate limits, slow links."""
 
+import base64
 import json
 import shutil
 import ssl
@@ -19,7 +20,8 @@ from conformance.mutation.self_test import self_test_of
 from conformance.selftest.link import LINKS, Link
 
 _PREFIX = "/r2d2/api"
-_TOKEN = "open-sesame"  # noqa: S105 - of a robot that lives for seconds, on loopback
+_SECRET = "open-sesame"  # noqa: S105 - of a robot that lives for seconds, on loopback
+_BASIC = f"robot:{_SECRET}"
 _DELAY_S = 0.3
 _CEILING = 100.0
 
@@ -35,7 +37,7 @@ class Variant:
         host: address on which the proxy listens.
         prefix: path before every REST path.
         tls: whether the proxy speaks TLS.
-        token: bearer token that clients must send.
+        secrets: contents of the files with credentials that clients must send, by the endpoint option of the statement.
         endpoints: additional endpoint options of the statement.
         link: the simulated network link between clients and proxy, or None for none.
     """
@@ -46,7 +48,7 @@ class Variant:
     host: str = "127.0.0.1"
     prefix: str = ""
     tls: bool = False
-    token: str = ""
+    secrets: dict[str, str] = field(default_factory=dict)
     endpoints: dict[str, Any] = field(default_factory=dict)
     link: Link | None = None
 
@@ -101,11 +103,15 @@ def _closing(request: Request, forward: Forward) -> Response:
     return response
 
 
-def _guarded(request: Request, forward: Forward) -> Response:
-    """Respond 401 to every request without the token (RFC 9110 15.5.2)."""
-    if request.raw is None and request.field("Authorization") != f"Bearer {_TOKEN}":
-        return problem(401, "a bearer token is required", ("WWW-Authenticate", 'Bearer realm="robot"'))(request)
-    return forward(request)
+def _guarded(name: str, value: str, scheme: str) -> Callable[[], Change]:
+    """Return a change that responds 401 to every request without a header of this value (RFC 9110 15.5.2)."""
+
+    def change(request: Request, forward: Forward) -> Response:
+        if request.raw is None and request.field(name) != value:
+            return problem(401, f"{name} is required", ("WWW-Authenticate", f'{scheme} realm="robot"'))(request)
+        return forward(request)
+
+    return lambda: change
 
 
 class _Ceiling:
@@ -146,7 +152,25 @@ VARIANTS = (
     Variant("prefix", f"everything is under {_PREFIX}", lambda: _prefixed, prefix=_PREFIX),
     Variant("close", "HTTP/1.0, and every connection is closed", lambda: _closing),
     Variant("tls", "HTTPS with a certificate of the robot's own", tls=True),
-    Variant("token", "a bearer token is required", lambda: _guarded, token=_TOKEN),
+    Variant(
+        "token",
+        "a bearer token is required",
+        _guarded("Authorization", f"Bearer {_SECRET}", "Bearer"),
+        secrets={"token_file": _SECRET},
+    ),
+    Variant(
+        "basic",
+        "a user's name and password are required",
+        _guarded("Authorization", f"Basic {base64.b64encode(_BASIC.encode()).decode()}", "Basic"),
+        secrets={"basic_file": _BASIC},
+    ),
+    Variant(
+        "api-key",
+        "an API key is required",
+        _guarded("X-Api-Key", _SECRET, "ApiKey"),
+        secrets={"api_key_file": _SECRET},
+        endpoints={"api_key": "header X-Api-Key"},
+    ),
     Variant("ipv6", "the robot is at [::1]", host="::1"),
     Variant("uptime", "JSON objects have an uptime that ticks", lambda: _uptime),
     Variant("ceiling", "100 requests a second, and no more", _Ceiling, endpoints={"request_rate": _CEILING * 0.8}),

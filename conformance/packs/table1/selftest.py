@@ -8,9 +8,10 @@ from collections import deque
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 
-from conformance.mutation.changes import inputs, parsed, plain, rest, soap
+from conformance.mutation.changes import inputs, parsed, plain, problem, rest, soap
 from conformance.mutation.fields import without
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.programs import built, check_installed, program
@@ -18,7 +19,7 @@ from conformance.mutation.self_test import GoodDevice, HarmlessChange, OpenPlace
 from conformance.mutation.wire import IncompleteMessageError
 from conformance.packs.table1.faulty_bodies import STATEMENTS
 from conformance.packs.table1.mutants import MUTANTS
-from conformance.packs.table1.mutants.paths import GOAL, POSE
+from conformance.packs.table1.mutants.paths import GOAL, POSE, deliveries
 
 _HERE = Path(__file__).parent
 _ROBOTS = _HERE / "independent_robots"
@@ -125,6 +126,7 @@ class _Behind:
 _OWN = rest("POST", POSE)
 _GOAL_PUT = rest("PUT", GOAL)
 _AT_POSE = rest("", POSE)
+_ORDERS = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 
 
 def _extended(request: Request, forward: Forward) -> Response:
@@ -140,6 +142,22 @@ def _extended(request: Request, forward: Forward) -> Response:
     if _AT_POSE(request) and allow is not None:
         response.put("Allow", f"{allow}, POST")
     return response
+
+
+class _FullQueue:
+    """Put every twentieth delivery off for a second, over either interface, and take it when it comes again."""
+
+    def __init__(self) -> None:
+        self._answers = cycle([None] * 19 + [503] + [None] * 19 + [429])
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        status = next(self._answers) if deliveries(request) or _ORDERS(request) else None
+        if status is None:
+            return forward(request)
+        after = ("Retry-After", "1")
+        return (
+            problem(status, "the queue is full", after) if request.side == "rest" else plain(status, b"", "", after)
+        )(request)
 
 
 _OPEN_PLACES = (
@@ -220,6 +238,7 @@ SELFTEST = SelfTest(
         HarmlessChange(
             "extended", "POST at the pose is the vendor's own; a goal's status may be sent", lambda: _extended
         ),
+        HarmlessChange("full-queue", "every twentieth delivery is put off for a second by 503 or 429", _FullQueue),
     ),
     classes={
         r"(get|put|delete)\w*Deliver(y|ies)": ("rest-delivery", "equivalence"),

@@ -4,7 +4,7 @@ import re
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from conformance.contract.classes import Level
 from conformance.contract.pack import Contract
@@ -145,7 +145,7 @@ def _judge(
         effort, (classes, requirements) = waiting[0]
         known = control.known(effort)
         proxy.change = mutant.make(tally)
-        more = {"classes": classes, "requirements": requirements, "enough": musts - known}
+        more: dict[str, Any] = {"classes": classes, "requirements": requirements, "enough": musts - known}
         outcome = run_job(job_for(robot, proxy, effort, seed, **more))
         result.runs += 1
         result.seconds += outcome.seconds

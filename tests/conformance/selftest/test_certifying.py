@@ -15,7 +15,9 @@ def job(rest="http://127.0.0.1:9", **more):
 
 
 def test_a_job_says_where_the_robot_is_and_what_is_claimed(tmp_path):
-    robot = robot_of(job(classes=("http",), token=tmp_path.name, endpoints={"request_rate": 5.0}, seed=7), tmp_path)
+    robot = robot_of(
+        job(classes=("http",), secrets={"token_file": tmp_path.name}, endpoints={"request_rate": 5.0}, seed=7), tmp_path
+    )
     where = robot.run.statement.endpoints
     told = (where.rest, where.publishers_wsdl, where.request_rate)
     assert told == ("http://127.0.0.1:9", "http://127.0.0.1:9/p?wsdl", 5.0)

@@ -169,12 +169,20 @@ def test_it_speaks_tls_with_a_certificate_of_its_own(robot, tmp_path):
         connection.close()
 
 
-def test_the_token_variant_asks_as_rfc_9110_has_it(proxy):
-    variant = next(one for one in VARIANTS if one.name == "token")
+@pytest.mark.parametrize(
+    ("name", "sent"),
+    [
+        ("token", {"Authorization": "Bearer open-sesame"}),
+        ("basic", {"Authorization": "Basic cm9ib3Q6b3Blbi1zZXNhbWU="}),
+        ("api-key", {"X-Api-Key": "open-sesame"}),
+    ],
+)
+def test_variants_with_credentials_ask_as_rfc_9110_has_it(proxy, name, sent):
+    variant = next(one for one in VARIANTS if one.name == name)
     proxy.change = variant.make()
     response, _ = request(proxy.rest)
     assert (response.status, "WWW-Authenticate" in response.headers) == (401, True)
-    assert request(proxy.rest, Authorization=f"Bearer {variant.token}")[0].status == 200
+    assert request(proxy.rest, **sent)[0].status == 200
 
 
 def test_a_device_without_soap_has_a_proxy_without_it(robot):

@@ -3,13 +3,18 @@
 import re
 import struct
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import plain, soap
+from conformance.mutation.changes import plain, rest, soap, unwanted, values
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.packs.table1.mutants.paths import deliveries
+from conformance.packs.table1.delivery import COORDINATES, PATH_NAMES
+from conformance.packs.table1.mutants.paths import DELIVERIES, deliveries
 
+_NUMBER = r"([+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d{1,2})?)"
+_DELIVERY = re.compile(DELIVERIES + r"\+?0*([34])" + "".join(f"/{name}/{_NUMBER}" for name in PATH_NAMES), re.ASCII)
+_UNWANTED, _LIST = unwanted(deliveries), rest("GET", DELIVERIES)
 _BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 _CODE_PLACE = 4
 _DOUBLES = rb"(<(?:\w+:)?(?:depot|destination|source)_[xy][^>]*>\s*)([^<\s]+)(\s*<)"
@@ -62,6 +67,28 @@ class OutOfOrder:
         response = forward(request)
         if held is not None and overtaking:
             held[1](held[0])
+        return response
+
+
+class ListedOnly:
+    """A change that adds REST deliveries to the robot's list, and does not forward them."""
+
+    def __init__(self) -> None:
+        self._entries: list[dict[str, Any]] = []
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """List a valid delivery in its usual notation; forward every other request."""
+        found = _DELIVERY.fullmatch(request.path) if deliveries(request) and not _UNWANTED(request) else None
+        if found:
+            code, *numbers = found.groups()
+            order = {"message_code": int(code)} | dict(zip(COORDINATES, map(float, numbers), strict=True))
+            sec, nanosec = divmod(time.time_ns(), 10**9)
+            accepted = {"sec": sec, "nanosec": nanosec}
+            self._entries.insert(0, {"request": order, "state": "queued", "accepted": accepted, "interface": "rest"})
+            return plain(204)(request)
+        response = forward(request)
+        if _LIST(request):
+            values(lambda listed: [*self._entries, *listed])(response)
         return response
 
 

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import Make, Where, guarded, inputs, plain, rest, soap, success, unwanted
+from conformance.mutation.changes import Make, Where, becomes, guarded, inputs, plain, rest, soap, success, unwanted
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import each, gone, named
@@ -13,6 +13,7 @@ from conformance.packs.table1.delivery import COFFEE, COORDINATES, PATH_NAMES
 from conformance.packs.table1.mutants.delivery import OnlyOnce, segments
 from conformance.packs.table1.mutants.distortion import (
     EveryNth,
+    ListedOnly,
     OutOfOrder,
     as_delivery,
     doubled,
@@ -91,6 +92,11 @@ def _unsigned_zero(_place: int, text: str) -> str:
     return text.lstrip("-") if _NUMBER.fullmatch(text) and float(text) == 0 else text
 
 
+def _put_off(response: Response) -> None:
+    becomes(503)(response)
+    response.put("Retry-After", "1")
+
+
 _NO_GOAL = enveloped(f'<t:GetGoalResponse xmlns:t="{TNS}"/>')
 
 
@@ -140,6 +146,12 @@ _rest_delivery("same-rest-no-negative-zero", "delivery-rest", "The sign of -0 is
 _rest_delivery("same-rest-lost", "delivery-rest", "Every third REST delivery is lost.").made(
     lambda: EveryNth(deliveries, plain(204), 3)
 )
+_rest_delivery(
+    "same-rest-put-off-and-made", "delivery-rest", "Every fifth REST delivery is put off by 503, and published."
+).altered(deliveries, _put_off, nth=5)
+_rest_delivery(
+    "same-rest-listed-only", "delivery-rest", "REST deliveries are listed as accepted, and never published.", probe=True
+).made(ListedOnly)
 _rest_delivery("same-rest-narrow", "delivery-same", "REST deliveries go through 32-bit floats.").rewritten(
     deliveries, segments(narrow)
 )

@@ -4,7 +4,7 @@ Over 300 lines because the commands, the looks and the waits of a drive share on
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from http import HTTPStatus
@@ -118,11 +118,16 @@ class Drive:
 
         Not where the robot limits the rate of requests, or answers several at once more slowly.
         """
-        hold_s = self.robot.limits.hold_s
         # Whoever simulates the clock does so in one thread.
-        if hold_s is None or self._crowded or self.clock is not WALL_CLOCK:
+        if self._crowded or self.clock is not WALL_CLOCK:
             return False
-        return self.look_s > _LOOK_SHARE * hold_s and self.robot.rest.connection.request_rate is None
+        return self._looks_long and self.robot.rest.connection.request_rate is None
+
+    @property
+    def _looks_long(self) -> bool:
+        """Return whether a look takes so long that a renewal after it may be late."""
+        hold_s = self.robot.limits.hold_s
+        return hold_s is not None and self.look_s > _LOOK_SHARE * hold_s
 
     @contextmanager
     def renewing(self, command: Command) -> Iterator[Renewing]:
@@ -134,6 +139,23 @@ class Drive:
         finally:
             self.trace = replace(self.trace, commands=(*self.trace.commands, *paced.commands))
             self._crowded = self._crowded or paced.is_crowded
+
+    @contextmanager
+    def held(self, velocity: Velocity) -> Iterator[Callable[[float], bool]]:
+        """Command a velocity, and hold it beside the reads in the context where these take too long to renew it.
+
+        Yields a function that returns whether the velocity certainly has not ended since a time, s of the run's clock.
+        If it has, the robot may have slowed down and sped up again between two reads.
+        """
+        self.command(velocity)
+        last = self.trace.last_command
+        if velocity == STILL or last is None or not self._looks_long:
+            yield lambda _since: True
+        elif self.paces:
+            with self.renewing(last) as renewing:
+                yield lambda since: renewing.lasted(self.clock.now(), since)
+        else:
+            yield lambda _since: self.clock.now() <= self.holds_until
 
     def refresh(self, velocity: Velocity) -> None:
         """Command a velocity again, and wait until the robot reaches it if it had ended in the meantime."""

@@ -64,15 +64,16 @@ class Renewing:
         took = sorted(one.exchange.response.elapsed_ms / 1000 for one in self.commands)
         return bool(took) and took[len(took) // 2] > _UNDER_WAY * self._robot.usual_s
 
-    def lasted(self, until: float) -> bool:
+    def lasted(self, until: float, since: float = 0.0) -> bool:
         """Return whether each renewal certainly arrived before the hold time of those before it was over.
 
         Args:
             until: the time of the last reading that counts, s of the run's clock.
+            since: the time of the first one; a renewal that came too late before it does not matter.
         """
         certain = self._command.sent + certain_s(self._hold_s)
         for one in sorted(self.commands, key=lambda one: one.answered):
-            if one.answered > certain:
+            if one.answered > max(certain, since):
                 break
             certain = max(certain, one.sent + certain_s(self._hold_s))
         return certain >= until

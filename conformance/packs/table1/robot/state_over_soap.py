@@ -60,12 +60,20 @@ def answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
     return from_element(found[0], shape.schema), ""
 
 
-def read_state(robot: Robot, subscribers: SoapService, name: str, apart_s: float) -> StateRead | None:
+def _always(_since: float) -> bool:
+    return True
+
+
+def read_state(
+    robot: Robot, subscribers: SoapService, name: str, apart_s: float, lasted: Callable[[float], bool] = _always
+) -> StateRead | None:
     """Read a state over REST, SOAP and REST, ``apart_s`` apart.
 
-    Return None where REST has no value; the observers have judged that.
+    Return None where REST has no value, which the observers have judged, and where SOAP's differs although the state
+    has not ``lasted`` since the first read: it may have changed to and fro.
     """
     path, operation, shape = STATES[name]
+    since = robot.clock.now()
     before, _ = robot.read(path, shape)
     robot.clock.sleep(apart_s)
     exchange = ask(subscribers, operation)
@@ -74,13 +82,20 @@ def read_state(robot: Robot, subscribers: SoapService, name: str, apart_s: float
     after, _ = robot.read(path, shape)
     if before is None or after is None:
         return None
-    broken = ""
+    steady, broken = lasted(since), ""
     if not problem:
         broken = shape.problem(between) or restamped(between, before, after) or contradiction(between, before, after)
     problem = problem or disagreement(before, between, after, _slack(robot))
     if not problem and name == "pose" and not stamp_of(before) <= stamp_of(between) <= stamp_of(after):
         problem = f"stamp {stamp_of(between)}, which is not between {stamp_of(before)} and {stamp_of(after)}"
-    return StateRead(name, exchange, broken, problem)
+    return counted(StateRead(name, exchange, broken, problem), lasted=steady)
+
+
+def counted(read: StateRead, *, lasted: bool) -> StateRead | None:
+    """Return what counts of a reading: no difference where the state has not ``lasted`` meanwhile; None: nothing."""
+    if lasted or not read.differs:
+        return read
+    return replace(read, differs="") if read.broken else None
 
 
 def restamped(message: Any, *others: Any) -> str:
@@ -108,7 +123,11 @@ def _slack(robot: Robot) -> Slack:
 
 
 def compare(
-    robot: Robot, subscribers: SoapService, name: str, renew: Callable[[], object] = lambda: None
+    robot: Robot,
+    subscribers: SoapService,
+    name: str,
+    renew: Callable[[], object] = lambda: None,
+    lasted: Callable[[float], bool] = _always,
 ) -> list[StateRead]:
     """Read a state over both interfaces, again where one may lag an odometry message behind the other.
 
@@ -117,12 +136,13 @@ def compare(
         subscribers: its SOAP service.
         name: "pose" or "velocity".
         renew: called before each try to keep the state as it is.
+        lasted: returns whether it has been kept since a time, s of the run's clock.
     """
 
     def tries() -> Iterator[StateRead | None]:
         for apart_s in (0.0, robot.sample_s, robot.sample_s):
             renew()
-            yield read_state(robot, subscribers, name, apart_s)
+            yield read_state(robot, subscribers, name, apart_s, lasted)
 
     return agreed(tries())
 

@@ -61,6 +61,33 @@ def further_axes(robot: Robot) -> Driven:
     return driving.recorded
 
 
+def unrenewed(
+    bent: Velocity, ahead: Velocity, limits: tuple[Velocity, ...], effort: str, seed: int
+) -> list[tuple[Velocity, bool]]:
+    """Return velocities that are not renewed, and whether a PUT of the linear part commands them last.
+
+    A robot may keep a watchdog for each path, one for each sign, and one for velocities at its limits. One at the
+    limits that drives ahead is the one of its path and sign. At the effort "quick" the seed says which is tried.
+
+    Args:
+        bent: a velocity along an arc.
+        ahead: its opposite, or as much of it as the robot can drive.
+        limits: velocities at the limits, of which the seed says one; at the effort "deep" all are tried.
+        effort: quick, standard or deep.
+        seed: of the run.
+    """
+    chance = random.Random(f"{seed}/ways")  # noqa: S311 - no secret
+    limits = tuple(chance.sample(limits, len(limits)))
+    ways = [(bent, bool(bent.linear_x)), (bent, False), (ahead, bool(ahead.linear_x)), (limits[0], False)]
+    if limits[0].linear_x <= 0:
+        ways.append((ahead, False))
+    if effort == "quick":
+        ways = [chance.choice(ways)]
+    elif effort != "standard":
+        ways += [(one, False) for one in (*limits, ahead)]
+    return [way for way in dict.fromkeys(ways) if any(way[0])]
+
+
 @dataclass
 class _Turning:
     """One play of the scenario."""
@@ -104,29 +131,19 @@ class _Turning:
             # A small circle: either part has to end. The linear part is commanded last, and ends as well.
             bent, before = self._bent(bent)
             arc(robot, drive, bent, before)
-        for velocity, by_linear in self._ways(bent, run):
+        for velocity, by_linear in self._unrenewed(bent, run):
             self.let_go(velocity, by_linear=by_linear)
         if robot.actuated(AHEAD) and robot.actuated(ABOUT):
             self._ahead_from_rest()
 
-    def _ways(self, bent: Velocity, run: Run) -> list[tuple[Velocity, bool]]:
-        """Return velocities that are not renewed, and whether a PUT of the linear part commands them last.
-
-        A robot may keep a watchdog for each path, one for each sign, and one for velocities at its limits. At the
-        effort "quick" the seed says which is tried. Without a declared hold time one velocity is enough.
-        """
+    def _unrenewed(self, bent: Velocity, run: Run) -> list[tuple[Velocity, bool]]:
+        """Return what unrenewed() returns; without a declared hold time one velocity is enough."""
         robot = self.robot
         if robot.limits.hold_s is None:
             return [(bent, False)]
-        chance = random.Random(f"{run.seed}/ways")  # noqa: S311 - no secret
         ahead = robot.drivable(Velocity(*(-one for one in bent)))
-        limits = chance.sample([self._slow(), self.fastest], 2) if robot.actuated(ABOUT) else [ahead]
-        ways = [(bent, bool(bent.linear_x)), (limits[0], False), (bent, False), (ahead, bool(ahead.linear_x))]
-        if run.effort.name == "quick":
-            ways = [chance.choice(ways)]
-        elif run.effort.name != "standard":
-            ways += [(limits[-1], False), (ahead, False)]
-        return [way for way in dict.fromkeys(ways) if any(way[0])]
+        limits = (self._slow(), self.fastest) if robot.actuated(ABOUT) else (ahead,)
+        return unrenewed(bent, ahead, limits, run.effort.name, run.seed)
 
     def _slow(self) -> Velocity:
         """Return a slow turn to the left that can be told from rest."""

@@ -6,7 +6,7 @@ import pytest
 from toy_messages import exchange
 
 from conformance.packs.table1.robot.agreement import Slack, disagreement, unstamped
-from conformance.packs.table1.robot.state_over_soap import StateRead, agreed, contradiction, restamped
+from conformance.packs.table1.robot.state_over_soap import StateRead, agreed, contradiction, counted, restamped
 
 _SLACK = Slack(0.02, 0.05)
 
@@ -85,3 +85,17 @@ def test_of_several_tries_the_last_counts_and_what_is_wrong_for_good_in_those_be
     assert agreed([lags, lags]) == [lags]
     assert agreed([lags, None, lags]) == []
     assert [[case.holds for case in one.cases] for one in agreed([wrong, same])] == [[False, True], [True]]
+
+
+@pytest.mark.parametrize(
+    ("broken", "differs", "lasted", "counts"),
+    [
+        ("", "", False, ("", "")),
+        ("", "x is 1", True, ("", "x is 1")),
+        ("", "x is 1", False, None),
+        ("no stamp", "x is 1", False, ("no stamp", "")),
+    ],
+)
+def test_a_difference_counts_only_of_a_state_that_lasted(broken, differs, lasted, counts):
+    read = counted(StateRead("velocity", exchange(), broken, differs), lasted=lasted)
+    assert (read and (read.broken, read.differs)) == counts

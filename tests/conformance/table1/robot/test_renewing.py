@@ -6,9 +6,11 @@ import pytest
 from toy_body import interface_of
 from toy_messages import STILL, ZERO, exchange
 
+from conformance.observe.polling import poll_for
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import Command
 from conformance.packs.table1.robot.renewing import Renewing
+from conformance.packs.table1.robot.robot import STILL as STILL_VELOCITY
 from conformance.packs.table1.robot.robot import Robot, Velocity
 
 _HOLD_S, _SLOW_S = 0.4, 0.15
@@ -78,3 +80,21 @@ def test_renewals_that_arrived_in_time_whatever_the_network_did(drive):
     assert not _renewing(drive, (0.1, 0.25), (0.2, 0.35), (0.3, 0.45)).lasted(0.8)
     # The second may have arrived when the velocity had ended.
     assert not _renewing(drive, (0.3, 0.45), (0.4, 0.55)).lasted(0.6)
+
+
+def test_what_came_too_late_before_the_first_reading_does_not_matter(drive):
+    renewing = _renewing(drive, (0.3, 0.45), (0.4, 0.55))
+    assert renewing.lasted(0.6, 0.5)
+    assert not renewing.lasted(0.6, 0.4)
+
+
+def test_a_velocity_is_held_while_something_else_is_read(body, drive):
+    with drive.held(_WANTED):
+        assert any(body.puts > 3 for _ in poll_for(drive.clock, 0.02, 10.0))
+    assert sum(one.renewal for one in drive.trace.commands) == body.puts - 1
+
+
+def test_rest_needs_no_renewal(body, drive):
+    with drive.held(STILL_VELOCITY) as lasted:
+        assert lasted(drive.clock.now())
+    assert body.puts == 1
