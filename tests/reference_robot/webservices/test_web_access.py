@@ -230,6 +230,10 @@ def assert_certified_over_https(served, certificate: Path) -> None:
     """Have the suite judge what depends on TLS, tokens and addresses: raw sockets, zeep, a WSDL's own address."""
     asked = ("http/authentication", "http/pipelining", "describe/wsdl-address", "soap-subscribers/interop")
     services = [f"{url}?wsdl" for url in (served.publishers, served.subscribers)]
-    named = {"requirements": asked, "secrets": {"token_file": TOKENS.split()[-5]}, "endpoints": {"ca_file": str(certificate)}}
+    named = {
+        "requirements": asked,
+        "secrets": {"token_file": TOKENS.split()[-5]},
+        "endpoints": {"ca_file": str(certificate)},
+    }
     outcome = run_job(Job(Contract.load().directory, REFERENCE.statement, served.rest, *services, **named))
     assert outcome.verdicts == dict.fromkeys(asked, "pass"), outcome.reasons
