@@ -48,6 +48,7 @@ class Connection:
         token: bearer token, or None; it is one of the credentials.
         credentials: what every request carries.
         certificate: client certificate and key (PEM) for TLS, or None; the key may be in the certificate's file.
+        patience_s: how long the run may yet wait for a device that puts requests off, s.
         request_rate: maximum requests per second, or None.
         listeners: are called with every response and every failed request.
         sent: number of requests sent.
@@ -72,6 +73,7 @@ class Connection:
     permit: Permit = lambda _method, _url: ""
     credentials: Credentials = field(default_factory=Credentials)
     certificate: tuple[Path, Path | None] | None = None
+    patience_s: float = 120.0
     _next_slot: float = 0.0
 
     def __post_init__(self) -> None:

@@ -44,7 +44,9 @@ class Credential:
 
     @property
     def variable(self) -> str:
-        """The shell variable that stands for the sent text, with its dollar sign."""
+        """The shell variable that stands for the sent text, with its dollar sign; the text itself where it is wrong."""
+        if self.secret.startswith(_WRONG):
+            return self.sent
         own = {Kind.BEARER: "TOKEN", Kind.BASIC: "BASIC"}.get(self.kind)
         return f"$ROAAS_{own or re.sub('[^A-Z0-9]', '_', f'{self.kind}_{self.name}'.upper())}"
 

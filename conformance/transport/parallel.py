@@ -37,14 +37,6 @@ def is_busy(attempt: Attempt) -> bool:
     return not isinstance(attempt, Exchange) or attempt.response.status in _BUSY
 
 
-def put_off_s(attempt: Attempt) -> int | None:
-    """Return for how many seconds the robot puts a request off: 503 or 429 with Retry-After in seconds; None: not."""
-    if not isinstance(attempt, Exchange) or not is_busy(attempt):
-        return None
-    after = attempt.response.header("retry-after") or ""
-    return int(after) if after.isdecimal() and after.isascii() else None
-
-
 def send_together(rounds: Sequence[Sequence[Outgoing]]) -> list[list[Attempt]]:
     """Send the requests of each round concurrently, one round after another.
 

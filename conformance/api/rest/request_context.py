@@ -9,6 +9,7 @@ from conformance.api.rest.accept import accept_of, quality
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation
 from conformance.documents.resources import is_normal, matching
+from conformance.transport.credentials import is_shown
 from conformance.transport.exchange import Request
 
 _USUAL_FIELDS = {
@@ -62,7 +63,7 @@ class RequestContext:
     @cached_property
     def usual(self) -> bool:
         """Whether nothing in it but parameters and body could be a reason to refuse it."""
-        names = [name.lower() for name, _ in self.request.headers]
+        names = [name.lower() for name, value in self.request.headers if not is_shown(value)]
         return (
             self.request.raw is None
             and set(names) <= _USUAL_FIELDS

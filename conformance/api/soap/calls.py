@@ -10,6 +10,7 @@ from conformance.api.soap.envelope import Envelope, Fault, NotSoapError, envelop
 from conformance.api.soap.service import SoapService
 from conformance.documents.xml_node import Node
 from conformance.transport.exchange import Exchange
+from conformance.transport.put_off import until_taken
 from conformance.verdict.evidence import Judge
 
 _SHOWN = 200
@@ -92,7 +93,8 @@ def read_exchange(exchange: Exchange) -> SoapResponse:
 def send(service: SoapService, message: Node | bytes | str, **how: Any) -> SoapResponse:
     """Send a message to a SOAP service and return the response; ``how`` has the options of SoapService.post().
 
-    A Node is an Envelope and is written as XML; bytes and text are sent unchanged.
+    A Node is an Envelope and is written as XML; bytes and text are sent unchanged. While the service puts the message
+    off by Retry-After, it is sent again.
 
     Raises:
         NoAnswerError: no HTTP response came.
@@ -101,7 +103,9 @@ def send(service: SoapService, message: Node | bytes | str, **how: Any) -> SoapR
         message = message.written()
     elif isinstance(message, str):
         message = message.encode()
-    return read_exchange(service.post(message, **how))
+    octets = message
+    *_, exchange = until_taken(service.client.connection, lambda: service.post(octets, **how))
+    return read_exchange(exchange)
 
 
 def call(service: SoapService, *payload: Node, headers: tuple[Node, ...] | None = None, **how: Any) -> SoapResponse:

@@ -19,7 +19,8 @@ from conformance.mutation.self_test import GoodDevice, HarmlessChange, OpenPlace
 from conformance.mutation.wire import IncompleteMessageError
 from conformance.packs.table1.faulty_bodies import STATEMENTS
 from conformance.packs.table1.mutants import MUTANTS
-from conformance.packs.table1.mutants.paths import GOAL, POSE, deliveries
+from conformance.packs.table1.mutants.distortion import valid_delivery
+from conformance.packs.table1.mutants.paths import GOAL, POSE
 
 _HERE = Path(__file__).parent
 _ROBOTS = _HERE / "independent_robots"
@@ -151,7 +152,7 @@ class _FullQueue:
         self._answers = cycle([None] * 19 + [503] + [None] * 19 + [429])
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        status = next(self._answers) if deliveries(request) or _ORDERS(request) else None
+        status = next(self._answers) if valid_delivery(request) or _ORDERS(request) else None
         if status is None:
             return forward(request)
         after = ("Retry-After", "1")

@@ -12,7 +12,8 @@ from conformance.api.rest.applicable import reads
 from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError
-from conformance.transport.parallel import is_busy, put_off_s
+from conformance.transport.parallel import is_busy
+from conformance.transport.put_off import put_off_s
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("silence"), pytest.mark.needs("rest")]

@@ -1,5 +1,7 @@
 """Faults in the body of a robot: each can be started, and the suite sees them over real HTTP."""
 
+import json
+
 import pytest
 
 from conformance.contract.pack import Contract
@@ -32,8 +34,10 @@ def test_a_faulty_body_is_asked_like_a_good_one(name):
 
 
 @pytest.mark.parametrize(("fault", "fails"), [("delivery-single-precision", True), ("", False)])
-def test_a_fault_inside_a_robot_is_seen_from_outside(fault, fails):
-    requirement = "equivalence/delivery-rest"
+def test_a_fault_inside_a_robot_is_seen_from_outside(fault, fails, tmp_path):
+    requirement, on_ros = "equivalence/delivery-rest", "equivalence/sensors-graph"
     with running(Contract.load(), with_fault(fault)) as robot:
-        outcome = run_job(job_at(robot, requirements=(requirement,), timeout_s=60.0))
+        outcome = run_job(job_at(robot, requirements=(requirement, on_ros), timeout_s=60.0, out=tmp_path))
     assert outcome.verdicts[requirement] == ("fail" if fails else "pass"), outcome.reasons
+    # The robot's own list is all that shows what arrived, and the result says so.
+    assert json.loads((tmp_path / "result.json").read_text())["class_views"]["equivalence"] == "black box"

@@ -70,6 +70,11 @@ class OutOfOrder:
         return response
 
 
+def valid_delivery(request: Request) -> re.Match[str] | None:
+    """Return the match of a delivery that every robot takes, with code and coordinates as groups; None for others."""
+    return _DELIVERY.fullmatch(request.path) if deliveries(request) and not _UNWANTED(request) else None
+
+
 class ListedOnly:
     """A change that adds REST deliveries to the robot's list, and does not forward them."""
 
@@ -78,7 +83,7 @@ class ListedOnly:
 
     def __call__(self, request: Request, forward: Forward) -> Response:
         """List a valid delivery in its usual notation; forward every other request."""
-        found = _DELIVERY.fullmatch(request.path) if deliveries(request) and not _UNWANTED(request) else None
+        found = valid_delivery(request)
         if found:
             code, *numbers = found.groups()
             order = {"message_code": int(code)} | dict(zip(COORDINATES, map(float, numbers), strict=True))

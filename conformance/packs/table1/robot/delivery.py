@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, Final
 
 from hypothesis import strategies as st
@@ -12,20 +12,16 @@ from hypothesis import strategies as st
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.api.soap.forms import EXTREMES
-from conformance.observe.clock import WALL_CLOCK
 from conformance.packs.table1.delivery import COFFEE, COURIER, PATH_NAMES, DeliveryFields
 from conformance.packs.table1.robot.robot import DELIVERIES
 from conformance.transport.client import Headers
 from conformance.transport.exchange import Exchange
-from conformance.transport.parallel import put_off_s
+from conformance.transport.put_off import until_taken
 
 # Both ends of a double, of its subnormals and of what an integer holds exactly; the paper's own example.
 _KNOWN: Final = (*EXTREMES["double"], 76.02, 41.35, 60.633, 2.2250738585072009e-308)
 # As long as this a plain number is only digits.
 _ONLY_DIGITS: Final = 1e15
-# How often an order that the robot puts off is sent in all, and the longest wait that it may ask for, s.
-_TRIES: Final = 6
-_LONGEST_WAIT_S: Final = 10
 
 
 class Delivery(DeliveryFields):
@@ -63,22 +59,8 @@ def put_delivery(api: RestInterface, path: str, *, fresh: bool = False, headers:
         NoAnswerError: no HTTP response came.
     """
     require_valid(api.run.contract, "PUT", path)
-    *_, last = until_taken(lambda: api.client.send("PUT", path, headers=headers, fresh=fresh))
+    *_, last = until_taken(api.client.connection, lambda: api.client.send("PUT", path, headers=headers, fresh=fresh))
     return last
-
-
-def until_taken(send: Callable[[], Exchange]) -> Iterator[Exchange]:
-    """Send an order, again and again while the robot puts it off by Retry-After, and yield every exchange.
-
-    A robot with a full queue may do that (contract.md, deliveries); each order that it puts off is refused.
-    """
-    for _ in range(_TRIES):
-        exchange = send()
-        yield exchange
-        after = put_off_s(exchange)
-        if after is None or after > _LONGEST_WAIT_S:
-            return
-        WALL_CLOCK.sleep(after)
 
 
 def written(value: float) -> tuple[str, ...]:

@@ -13,12 +13,13 @@ from conformance.api.soap.xml_style import XmlStyle, value_styles
 from conformance.observe.clock import WALL_CLOCK
 from conformance.packs.table1.delivery import COFFEE
 from conformance.packs.table1.robot.deliveries_seen import DeliveryObserver
-from conformance.packs.table1.robot.delivery import Delivery, path_of, until_taken
+from conformance.packs.table1.robot.delivery import Delivery, path_of
 from conformance.packs.table1.robot.delivery_trace import Batch, Deliveries, Seen, Sent, key_of
 from conformance.packs.table1.robot.soap_services import delivery_outgoing, send_delivery
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import Outgoing, send_together
+from conformance.transport.put_off import until_taken
 
 
 @dataclass(frozen=True)
@@ -112,16 +113,16 @@ class DeliverySender:
         delivery, how = order.delivery, order.how
         for _ in range({"rest": 1, "same": 1, "twice": 2}.get(how, 0)):
             # On a connection of its own, so that the client does not send the request again.
-            for exchange in until_taken(lambda: self.rest.send("PUT", path_of(*order.written), fresh=True)):
+            for exchange in until_taken(
+                self.rest.connection, lambda: self.rest.send("PUT", path_of(*order.written), fresh=True)
+            ):
                 yield Sent(how, "rest", delivery, exchange)
         if how == "coffee":
             delivery = delivery._replace(message_code=COFFEE)
         if how in {"soap", "same", "coffee"}:
             style = next(self._styles)
-            for exchange in until_taken(
-                lambda: send_delivery(self.publishers, delivery, coffee=how == "coffee", style=style)
-            ):
-                yield Sent(how, "soap", delivery, exchange)
+            exchange = send_delivery(self.publishers, delivery, coffee=how == "coffee", style=style)
+            yield Sent(how, "soap", delivery, exchange)
 
     def _outgoing(self, how: str, delivery: Delivery) -> Outgoing:
         if how == "rest":

@@ -60,6 +60,7 @@ class Robot:
 
     def __init__(self, fault, status=204):
         self._fault, self._numbers, self._seen, self._status = fault, count(1), deque(), status
+        self.client, self.connection = self, Connection()
 
     def send(self, method, path, **_):
         parts = path.split("/")

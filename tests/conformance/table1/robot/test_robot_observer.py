@@ -11,6 +11,7 @@ from conformance.packs.table1.robot.clock import Clock
 from conformance.packs.table1.robot.observer import Observer
 from conformance.packs.table1.statement import Statement
 from conformance.transport.client import Connection, HttpClient
+from conformance.transport.credentials import Credential, Credentials, Kind
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.run import Run
 
@@ -39,9 +40,9 @@ def api() -> RestInterface:
     return opened(Statement(declared=DeclaredLimits(linear_m_s=0.5, angular_rad_s=2.0)))
 
 
-def see(api, path, value, *, status=200, headers=(("Accept", "*/*"),), method="GET", after=""):
+def see(api, path, value, *, status=200, headers=(("Accept", "*/*"),), method="GET", after="", query=""):
     body = value if isinstance(value, bytes) else json.dumps(value).encode()
-    request = Request(method, _BASE + path, (("Host", "robot:7003"), *headers))
+    request = Request(method, _BASE + path, (("Host", "robot:7003"), *headers), query=query)
     said = (("Content-Type", "application/json"), *((("Retry-After", after),) if after else ()))
     exchange = Exchange(request, Response(status, said, body, 0.0))
     for listener in api.client.connection.listeners:
@@ -141,10 +142,19 @@ def test_odd_requests_are_left_to_others(api, odd):
     assert not found(api)
 
 
-def test_without_the_token_nothing_is_judged(api):
-    api.client.connection = replace(api.client.connection, token="secret")  # noqa: S106 - no secret
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [(Kind.BEARER, ""), (Kind.BASIC, ""), (Kind.HEADER, "X-Api-Key"), (Kind.COOKIE, "session"), (Kind.QUERY, "key")],
+)
+def test_only_what_has_the_credentials_is_judged(api, kind, name):
+    credentials = Credentials((Credential(kind, "a:secret", name),))
+    api.client.connection = replace(api.client.connection, credentials=credentials)
     see(api, "/robot/pose/", b"", status=401)
-    assert not found(api)
+    for sent in (credentials.wrong, credentials):
+        assert not found(api)
+        fields = (("Accept", "*/*"), *sent.fields(shown=True))
+        see(api, "/robot/pose/", b"", status=401, headers=fields, query=sent.target("", shown=True))
+    assert found(api) == {"rest-resources/pose-type"}
 
 
 def test_undeclared_limits_are_not_known():
