@@ -103,6 +103,8 @@ def test_same_as_contract(soap: SoapServices, judge: Judge, effort: Effort) -> N
                 expect(judge, f"describe/{name_}", served.exchange).that(not problem, expected, problem)
 
 
+# Not while the robot settles: it has its time to do so from the last POST on.
+@pytest.mark.phase("resting")
 @pytest.mark.requirement("describe/wsdl-address")
 def test_address(soap: SoapServices, judge: Judge) -> None:
     """Send a request to each address that the description names."""

@@ -81,6 +81,12 @@ class LetGo:
         in_time = sum(turn.at <= certain for turn in self.turns)
         return any(self.holds_by(limits, count) for count in range(1, in_time + 1))
 
+    def rested_alone(self, limits: Limits) -> bool:
+        """Return whether the first reading after the pause shows the robot at rest, or there was no pause."""
+        return (
+            self.resumed is None or windows.shown(limits, self.turns[: self.resumed + 1][-1:], STILL, count=1) is True
+        )
+
     def rests(self, limits: Limits) -> bool:
         """Return whether the newest samples show the robot at rest."""
         return bool(windows.shown(limits, self.turns[-_LOOKED_AT:], STILL))

@@ -5,6 +5,7 @@ import random
 from dataclasses import dataclass, field
 from typing import Final
 
+from conformance.packs.table1.robot import drive_rules
 from conformance.packs.table1.robot.abilities import ABOUT, AHEAD, turn_beside
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART
@@ -19,8 +20,12 @@ from conformance.scenarios.scenario import PartialTraceError, scenario
 from conformance.scenarios.stage import Need
 from conformance.verdict.run import Run
 
-# Of the hold time: so long after a command it is given again, and holds from then on.
+# Of the hold time: so long after a command it is given again, and holds from then on; so long after it a robot that
+# has reached it already has time to hold it.
 _AGAIN: Final = 0.25
+_SOON: Final = 0.2
+# Of the hold time: so long after its end the suite does not read the robot, if that is enough for it to come to rest.
+_BRIEF: Final = 0.2
 # How often a measurement of how long a velocity holds is tried that a stall of the suite or a late response spoilt.
 _ATTEMPTS: Final = 3
 # The only whole number of rad/s below the limits of most robots.
@@ -97,6 +102,7 @@ class _Turning:
     tries: list[tuple[LetGo, ...]] = field(default_factory=list)
     not_tested: list[tuple[str, str]] = field(default_factory=list)
     fastest: Velocity = STILL  # the fastest turn to the left that the robot has reached
+    brief: bool = True  # whether the robot was at rest after each brief silence so far
 
     @property
     def _ends_s(self) -> float:
@@ -212,7 +218,8 @@ class _Turning:
         """Stop renewing a velocity, and watch how it ends; ``by_linear``: a PUT of the linear part commands it last.
 
         A measurement that a stall of the suite or a late response spoilt is made again. One that shows a robot that
-        does not come to rest is never made again: a watchdog that stops most velocities is none.
+        does not come to rest is never made again: a watchdog that stops most velocities is none. Where the robot still
+        moved after a brief silence, so that a request may have stopped it, the measurement is made with a longer one.
         """
         limits, tries = self.robot.limits, []
         for _ in range(_ATTEMPTS if limits.hold_s else 1):
@@ -226,6 +233,8 @@ class _Turning:
             if let_go.early(limits) or let_go.late(limits):
                 if not let_go.is_void(limits):
                     break
+            elif self.brief and not let_go.rested_alone(limits):
+                self.brief = False
             elif limits.hold_s is None or let_go.was_held(limits):
                 break
         if tries:
@@ -241,15 +250,17 @@ class _Turning:
         last = drive.trace.last_full
         if last is None or last.velocity != turning or clock.now() > drive.holds_until:
             drive.refresh(turning)
-        if limits.hold_s is not None:
-            # So long that a robot which takes the next command for a repetition of this one ends it clearly too early.
-            drive.keep(drive.trace.full_sent + _AGAIN * limits.hold_s - clock.now())
-        if not drive.command(turning):
+        # Given again once: a robot that takes that for a repetition ends it clearly too early.
+        if limits.hold_s is None or not self.tries or clock.now() > drive.trace.full_sent + _SOON * limits.hold_s:
+            drive.keep(drive.trace.full_sent + _AGAIN * (limits.hold_s or 0.0) - clock.now())
+            drive.command(turning)
+        last = drive.trace.last_full
+        if last is None or not drive_rules.answer_of(last).holds:
             return None
-        full = drive.trace.sent
+        full = last.sent
         if by_linear:
             drive.command_linear(turning)
-        answered = drive.trace.answered
+        answered = drive.trace.commands[-1].answered
         first, resumed, due = len(drive.trace.turns), None, None
         ends = answered + self._ends_s
         silent_from = math.inf if limits.hold_s is None else full + 0.95 * limits.hold_s
@@ -260,7 +271,8 @@ class _Turning:
                 return let_go
             if resumed is None and clock.now() > silent_from:
                 robot.put_velocity(Velocity(angular_z=1e4))
-                due = max(clock.now(), answered + let_go.longest(limits))
+                silent_s = (1 + _BRIEF) * (limits.hold_s or 0.0) if self.brief else let_go.longest(limits)
+                due = max(clock.now(), answered + silent_s)
                 clock.sleep(due - clock.now())
                 resumed = len(let_go.turns)
                 ends = max(ends, clock.now() + _SAMPLES_S)
