@@ -13,6 +13,7 @@ from conformance.api.rest.observers import Observer
 from conformance.api.rest.values import Values
 from conformance.api.soap.observer import PASSIVE, SoapObserver, answers_of
 from conformance.api.soap.service import SoapService
+from conformance.scenarios.other_exchanges import OtherExchanges
 from conformance.transport.client import Connection
 from conformance.transport.exchange import Listener
 from conformance.verdict.observers import Observers
@@ -23,7 +24,7 @@ _NEEDED_LATER: Final = ("conformance.api.soap.zeep_client", "schemathesis.specs.
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _watched(run: Run, interfaces: Interfaces, connection: Connection) -> None:
+def _watched(run: Run, interfaces: Interfaces, connection: Connection, other_exchanges: OtherExchanges | None) -> None:
     """Register the observers, so that every exchange of the run is judged; no other code registers any."""
     services = interfaces.soap.there.values()
     api = interfaces.rest
@@ -31,10 +32,18 @@ def _watched(run: Run, interfaces: Interfaces, connection: Connection) -> None:
     if api is not None:
         observers.append(Observer(api, [service.endpoint for service in services]))
         connection.listeners.extend(api.device.observers(api))
+        if other_exchanges is not None:
+            connection.listeners.append(other_exchanges)
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
         answers = {service.endpoint: answers_of(service) for service in services}
         observers.append(SoapObserver(run.judge, answers))
     connection.listeners.append(Observers(run.judge, observers))
+
+
+@pytest.fixture(scope="session")
+def other_exchanges(run: Run, interfaces: Interfaces) -> OtherExchanges | None:
+    """Return what keeps the exchanges with a described API that no scenario records; None for any other robot."""
+    return OtherExchanges(interfaces.rest) if run.contract.described and interfaces.rest else None
 
 
 @pytest.fixture(scope="session")

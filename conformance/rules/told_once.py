@@ -11,6 +11,7 @@ from conformance.scenarios.rule import Case
 from conformance.scenarios.survey import Probe
 
 _LISTED = 12
+_LESS_PLAIN = frozenset({Kind.GENERATED, Kind.OTHER})
 _NUMBERS = re.compile(r"\d+(?:\.\d+)?")
 
 
@@ -50,7 +51,7 @@ def told_once(
             faults.setdefault(cause, []).append((probe, fault))
     for cause, found in faults.items():
         # The smallest request shows it best; a usual one better than an odd one.
-        probe, fault = min(found, key=lambda pair: (pair[0].kind is Kind.GENERATED, pair[0].attempt.request.size))
+        probe, fault = min(found, key=lambda pair: (pair[0].kind in _LESS_PLAIN, pair[0].attempt.request.size))
         operations = sorted({one.operation for one, _ in found} - {probe.operation})
         observed = f"{fault.observed}, for {probe.says}" if probe.says else fault.observed
         yield Case(

@@ -61,6 +61,7 @@ class Kind(StrEnum):
     ANONYMOUS = "anonymous"  # without credentials, or with wrong ones
     AGAIN = "again"  # the usual request once more, after others
     GENERATED = "generated"  # made by Schemathesis
+    OTHER = "other"  # sent by another check
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from conformance.documents.json_schema import Schema, kinds_of, shape_of
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.rules.told_once import Fault, told_once, without_numbers
+from conformance.scenarios.other_exchanges import others
 from conformance.scenarios.rule import Outcome, rule
 from conformance.scenarios.survey import Probe, Survey, generated_requests, survey
 from conformance.transport.exchange import Response
@@ -22,7 +23,7 @@ from conformance.verdict.run import Run
 
 # Such responses have no content (RFC 9110 15.3.5, 15.3.6, 15.4.5).
 _BODILESS = frozenset({204, 205, 304})
-_ON = (survey, generated_requests)
+_ON = (survey, generated_requests, others)
 # HTTP lets any server send these, whatever the operation: conditions, ranges, rates, sizes, credentials, upgrades.
 _ANY_TIME = frozenset(
     {100, 101, 206, 304, 401, 403, 407, 408, 411, 412, 413, 414, 416, 417, 421, 425, 426, 428, 429, 431}
@@ -51,7 +52,7 @@ def _answered(trace: Survey, run: Run) -> Iterator[tuple[Probe, Operation, Respo
 def _by_server(probe: Probe) -> bool:
     """Return whether a web server may have refused a strange request before the application saw it."""
     answer = probe.exchange.response if probe.exchange else None
-    strange = probe.kind in {Kind.ODD, Kind.GENERATED}
+    strange = probe.kind in {Kind.ODD, Kind.GENERATED, Kind.OTHER}
     return answer is not None and strange and answer.status == _BAD_REQUEST and not is_json(answer.media_type)
 
 

@@ -10,6 +10,7 @@ from conformance.api.rest.statuses import CRASHES
 from conformance.api.rest.variations import Kind
 from conformance.documents.traceback import inside_shown, path_shown
 from conformance.rules.told_once import Fault, told_once
+from conformance.scenarios.other_exchanges import others
 from conformance.scenarios.rule import Case, NotTested, Outcome, rule
 from conformance.scenarios.survey import Probe, Survey, generated_requests, survey
 from conformance.transport.exchange import NoAnswer
@@ -29,7 +30,7 @@ def no_server_error(trace: Survey) -> Iterable[Outcome]:
     yield from told_once(trace.probes, "a status below 500", fault, apart=True)
 
 
-@rule("robustness/no-crash", on=_ON)
+@rule("robustness/no-crash", on=(*_ON, others))
 def no_crash(trace: Survey) -> Iterable[Outcome]:
     """Judge whether the device closes a connection without a response."""
 

@@ -1,0 +1,78 @@
+"""What other checks than the survey sent and received of a described API.
+
+A fault in one response of a hundred may meet none of the survey's requests, so its rules judge these as well.
+"""
+
+from typing import Final
+
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.request_context import RequestContext
+from conformance.api.rest.validity import VALID, validity
+from conformance.api.rest.variations import Kind
+from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.scenarios.survey import Probe, Survey
+from conformance.transport.exchange import Attempt, Exchange, Listener, NoAnswer, Request, Unanswered
+
+# Different responses that are kept, so that a long run needs no more memory.
+_MOST: Final = 2000
+_ANY_FORMAT: Final = frozenset({None, "*/*", "application/json"})
+
+
+class OtherExchanges(Listener):
+    """Keeps the usual and valid requests of all checks to operations that work, if no scenario records them.
+
+    Attributes:
+        probes: the exchanges, those with equal responses once.
+    """
+
+    def __init__(self, api: RestInterface) -> None:
+        self.probes: list[Probe] = []
+        self._api = api
+        self._seen: set[int] = set()
+
+    def answered(self, exchange: Exchange) -> None:
+        """Keep an exchange."""
+        answer = exchange.response
+        names = sorted(name.lower() for name, _ in answer.headers)
+        self._keep(exchange, (answer.status, answer.media_type, *names, answer.body))
+
+    def unanswered(self, request: Unanswered) -> None:
+        """Keep a request whose connection was closed; several clients at once may be refused, and are not told."""
+        if request.kind is NoAnswer.CLOSED:
+            self._keep(request, (request.kind,))
+
+    def _keep(self, attempt: Attempt, shown: tuple[object, ...]) -> None:
+        if self._api.is_recorded or len(self.probes) >= _MOST:
+            return
+        label = self._operation_of(attempt.request)
+        key = hash((label, shown))
+        if not label or key in self._seen:
+            return
+        self._seen.add(key)
+        exchange, unanswered = (attempt, None) if isinstance(attempt, Exchange) else (None, attempt)
+        self.probes.append(Probe(label, Kind.OTHER, exchange=exchange, unanswered=unanswered))
+
+    def _operation_of(self, request: Request) -> str:
+        """Return the operation of a usual and valid request, if it was answered 2xx before; or an empty text."""
+        contract, base_url = self._api.run.contract, self._api.client.base_url
+        context = RequestContext.of(contract, base_url, request)
+        operation = context.operation if context else None
+        if context is None or operation is None or operation.label not in self._api.working:
+            return ""
+        names = {name.lower() for name, _ in request.headers}
+        hidden = any(item.required for where in ("header", "cookie") for item in operation.parameter(where))
+        if not context.usual or hidden or "transfer-encoding" in names or context.accept not in _ANY_FORMAT:
+            return ""
+        fields = {name.lower(): value for name, value in request.headers}
+        media_type = fields.get("content-type", "").split(";")[0].strip().lower()
+        said = validity(contract, request.method, context.target, media_type, request.body)
+        return operation.label if said.verdict == VALID else ""
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)
+def others(other_exchanges: OtherExchanges) -> Survey:
+    """Return what other checks have sent and received until the end of the run."""
+    if not other_exchanges.probes:
+        raise NotPossibleError("no other check sent a usual request to an operation that works")
+    return Survey(tuple(other_exchanges.probes))
