@@ -35,6 +35,8 @@ _LEAST: Final = {"valid": 40, "invalid": 20, "odd": 12}
 # request is repeated until so many were sent that a failure in one call of twenty is met.
 _ACTING: Final = 12
 _ACTING_IN_ALL: Final = 24
+#: At standard effort the usual request of an operation that only reads is timed so often, before and after each group.
+TIMED: Final = 5
 # Statuses of an operation that is not there.
 _NOT_FOUND: Final = 404
 _NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
@@ -208,6 +210,7 @@ class _Surveyor:
             "odd": list(odd_variations(operation, usual)),
         }
         until = time.monotonic() + _BUDGETS * effort.budget_s
+        self._time(operation, usual, effort, until)
         for name, variations in groups.items():
             standard = max(_MOST[name], round(_LEAST[name] / effort.factor))
             for one in effort.draw(variations, standard, f"{seed}/{name} {operation.label}"):
@@ -217,11 +220,18 @@ class _Surveyor:
                     self.cut_short(f"survey of {operation.label}")
                 else:
                     self.send(operation, one)
+            self._time(operation, usual, effort, until)
         again = 1 if operation.safe or effort.name == "quick" else max(1, _ACTING_IN_ALL - len(valid))
         for number in range(again):
             if operation.label in self.given_up or (number and time.monotonic() > until):
                 break
             self.send(operation, Variation(Kind.AGAIN, "", "", usual))
+
+    def _time(self, operation: Operation, usual: Inputs, effort: Effort, until: float) -> None:
+        """Send the usual request of an operation that only reads, to compare its response times."""
+        for _ in range(TIMED if operation.safe and effort.name != "quick" else 0):
+            if operation.label not in self.given_up and time.monotonic() < until:
+                self.send(operation, Variation(Kind.AGAIN, "", "", usual))
 
 
 def order_of(operation: Operation) -> tuple[int, int]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from http import HTTPStatus
 
 from conformance.api.rest.statuses import CRASHES
@@ -12,8 +13,8 @@ from conformance.documents.traceback import inside_shown, path_shown
 from conformance.rules.told_once import Fault, told_once
 from conformance.scenarios.other_exchanges import others
 from conformance.scenarios.rule import Case, NotTested, Outcome, rule
-from conformance.scenarios.survey import Probe, Survey, generated_requests, survey
-from conformance.transport.exchange import NoAnswer
+from conformance.scenarios.survey import TIMED, Probe, Survey, generated_requests, survey
+from conformance.transport.exchange import Exchange, NoAnswer
 
 _ON = (survey, generated_requests)
 # A response time has grown when its median is so many times, and so many ms, above that of the first requests.
@@ -111,16 +112,22 @@ def recovers(trace: Survey) -> Iterable[Outcome]:
 
 @rule("robustness/steady-latency", on=(survey,))
 def steady_latency(trace: Survey) -> Iterable[Outcome]:
-    """Judge whether one request, sent again and again, is answered as fast at the end as at the beginning."""
-    if len(trace.repeats) < 3 * _FEWEST:
+    """Judge whether one request is answered as fast after many others as at the beginning."""
+    if len(trace.repeats) >= 3 * _FEWEST and trace.repeated is not None:
+        yield _steady(trace.repeated, trace.repeats, len(trace.repeats) // 3)
+    else:
         yield NotTested("no operation that only reads was answered often enough")
-        return
-    third = len(trace.repeats) // 3
-    parts = [statistics.median(trace.repeats[start : start + third]) for start in (0, third, 2 * third)]
-    grown = parts[0] < parts[1] < parts[2] and parts[2] > _TIMES * parts[0] and parts[2] - parts[0] > _MS
-    yield Case(
-        not grown,
-        trace.repeated,
-        f"a response time that does not grow over {len(trace.repeats)} requests",
-        f"{parts[0]:.1f} ms at the beginning, {parts[1]:.1f} ms in the middle, {parts[2]:.1f} ms at the end",
-    )
+    for label in {one.operation: None for one in trace.probes if one.operation.startswith("GET ")}:
+        timed = [one.exchange for one in trace.of(label, Kind.AGAIN) if one.exchange is not None and one.ok]
+        if len(timed) >= 3 * TIMED:
+            times = [one.response.elapsed_ms for one in timed]
+            yield replace(_steady(timed[-1], times, TIMED), cause=label, subject=label, operations=(label,))
+
+
+def _steady(last: Exchange, times: Sequence[float], number: int) -> Case:
+    """Judge the response times of one request, ms: the medians of each ``number`` of them must not grow throughout."""
+    parts = [statistics.median(times[start : start + number]) for start in range(0, len(times) - number + 1, number)]
+    first, middle, end = parts[0], parts[len(parts) // 2], parts[-1]
+    grown = parts == sorted(set(parts)) and end > _TIMES * first and end - first > _MS
+    told = f"{first:.1f} ms at the beginning, {middle:.1f} ms in the middle, {end:.1f} ms at the end"
+    return Case(not grown, last, f"a response time that does not grow over {len(times)} requests", told)

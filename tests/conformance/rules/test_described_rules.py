@@ -76,6 +76,10 @@ def _silent(kind_of_silence, kind=Kind.ODD, operation=_LABEL):
     return Probe(operation, kind, unanswered=unanswered)
 
 
+def _took(ms):
+    return replace(_OK.exchange, response=replace(_OK.exchange.response, elapsed_ms=ms))
+
+
 def _page(status=404, **more):
     return _probe(status, b"<html>", media_type="text/html", x_n="", **more)
 
@@ -225,3 +229,13 @@ def test_types_that_a_framework_converts_are_told_once(run):
 def test_latency_that_grows(times, holds, run):
     (found,) = robustness.steady_latency.outcomes(Survey((), tuple(times), _OK.exchange), {"run": run}.__getitem__)
     assert found.holds is holds
+
+
+def test_latency_of_an_operation_that_grows(run):
+    grows, steady = (
+        [replace(_OK, operation=label, kind=Kind.AGAIN, exchange=_took(ms * slope)) for ms in range(1, 21)]
+        for label, slope in ((_LABEL, 10.0), (_PLAIN, 0.1))
+    )
+    trace = Survey((*grows, *steady), (5.0,) * 90, _OK.exchange)
+    (found,) = _failed(robustness.steady_latency, trace, run)
+    assert found.subject == _LABEL
