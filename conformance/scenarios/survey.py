@@ -31,11 +31,10 @@ from conformance.verdict.explorer import Explorer
 # At standard effort, of one operation: valid, invalid and odd requests; and at least so many of each at quick.
 _MOST: Final = {"valid": 60, "invalid": 60, "odd": 40}
 _LEAST: Final = {"valid": 40, "invalid": 20, "odd": 12}
-# Valid requests of an operation that changes something: each leaves something behind. At standard effort the usual
-# request is repeated until so many were sent that a failure in one call of twenty is met.
+# Valid requests of an operation that changes something: each leaves something behind.
 _ACTING: Final = 12
-_ACTING_IN_ALL: Final = 24
-#: At standard effort the usual request of an operation that only reads is timed so often, before and after each group.
+#: At standard effort the usual request is sent and timed so often before the groups of others and after each: a failure
+#: in one call of twenty is met.
 TIMED: Final = 5
 # Statuses of an operation that is not there.
 _NOT_FOUND: Final = 404
@@ -221,15 +220,11 @@ class _Surveyor:
                 else:
                     self.send(operation, one)
             self._time(operation, usual, effort, until)
-        again = 1 if operation.safe or effort.name == "quick" else max(1, _ACTING_IN_ALL - len(valid))
-        for number in range(again):
-            if operation.label in self.given_up or (number and time.monotonic() > until):
-                break
-            self.send(operation, Variation(Kind.AGAIN, "", "", usual))
+        self.send(operation, Variation(Kind.AGAIN, "", "", usual))
 
     def _time(self, operation: Operation, usual: Inputs, effort: Effort, until: float) -> None:
-        """Send the usual request of an operation that only reads, to compare its response times."""
-        for _ in range(TIMED if operation.safe and effort.name != "quick" else 0):
+        """Send the usual request a few times, to compare response times; DELETE would find nothing the second time."""
+        for _ in range(0 if effort.name == "quick" or operation.method == "DELETE" else TIMED):
             if operation.label not in self.given_up and time.monotonic() < until:
                 self.send(operation, Variation(Kind.AGAIN, "", "", usual))
 

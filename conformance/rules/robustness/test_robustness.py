@@ -117,7 +117,7 @@ def steady_latency(trace: Survey) -> Iterable[Outcome]:
         yield _steady(trace.repeated, trace.repeats, len(trace.repeats) // 3)
     else:
         yield NotTested("no operation that only reads was answered often enough")
-    for label in {one.operation: None for one in trace.probes if one.operation.startswith("GET ")}:
+    for label in {one.operation: None for one in trace.probes}:
         timed = [one.exchange for one in trace.of(label, Kind.AGAIN) if one.exchange is not None and one.ok]
         if len(timed) >= 3 * TIMED:
             times = [one.response.elapsed_ms for one in timed]
