@@ -1,4 +1,7 @@
-"""Reads without credentials, of operations for which the description requires some."""
+"""Requests without credentials, and with wrong ones, to operations for which the description requires some."""
+
+from contextlib import closing, suppress
+from dataclasses import replace
 
 from conformance.api.rest.applicable import allowed
 from conformance.api.rest.inputs import usual_inputs, written
@@ -7,27 +10,39 @@ from conformance.api.rest.values import Values
 from conformance.documents.openapi import operations_of
 from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.INPUT)
-def anonymous_reads(api: RestInterface, values: Values) -> tuple[Exchange, ...]:
-    """Send each read for which the description requires credentials, without any."""
+def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ...]:
+    """Send each operation for which the description requires credentials, without any, and with wrong ones."""
     closed = [
         item
         for item in operations_of(api.run.contract)
         # An alternative without a scheme means that credentials are optional (OpenAPI 3.1, 4.8.30).
-        if item.method == "GET" and item.security and all(item.security) and allowed(api, item)
+        if item.security and all(item.security) and allowed(api, item)
     ]
     if not closed:
-        raise NotPossibleError("no read that may be called requires credentials by the description")
-    found = []
-    for operation in closed:
-        if operation.label in api.streams:
-            continue
-        request = written(operation, usual_inputs(operation, values)[0])
-        try:
-            found.append(api.client.send("GET", request.target, headers=request.headers, authorized=False, fresh=True))
-        except NoAnswerError:
-            continue  # the survey tells what gets no response
+        raise NotPossibleError("no operation that may be called requires credentials by the description")
+    connection, found = api.client.connection, []
+    stranger = replace(connection, token=None, credentials=connection.credentials.wrong)
+    with closing(HttpClient(api.client.base_url, stranger)) as unknown:
+        tried = [(api.client, False), *([(unknown, True)] if connection.credentials else [])]
+        for operation in closed:
+            if operation.label in api.streams:
+                continue
+            request = written(operation, usual_inputs(operation, values)[0])
+            fields = [*request.headers, *([("Content-Type", request.content_type)] if request.content_type else [])]
+            for client, authorized in tried:
+                with suppress(NoAnswerError):  # the survey tells what gets no response
+                    exchange = client.send(
+                        request.method,
+                        request.target,
+                        headers=fields,
+                        body=request.body,
+                        authorized=authorized,
+                        fresh=True,
+                    )
+                    found.append(exchange)
     return tuple(found)

@@ -2,14 +2,14 @@
 
 from collections.abc import Iterable
 
-from conformance.scenarios.anonymous import anonymous_reads
+from conformance.scenarios.anonymous import anonymous_requests
 from conformance.scenarios.rule import Case, Outcome, rule
 from conformance.transport.exchange import Exchange
 
 
-@rule("description/security", on=(anonymous_reads,))
+@rule("description/security", on=(anonymous_requests,))
 def security(trace: tuple[Exchange, ...]) -> Iterable[Outcome]:
-    """Judge whether reads that require credentials are refused without them."""
+    """Judge whether what requires credentials is refused without them, and with wrong ones."""
     for exchange in trace:
         expected = "a refusal, because the description requires credentials"
         yield Case(not exchange.response.ok, exchange, expected, cause=exchange.request.endpoint)

@@ -1,4 +1,4 @@
-"""Reads that require credentials by the description: who is asked, and how the responses are judged."""
+"""What requires credentials by the description: what is sent, and how the responses are judged."""
 
 import pytest
 from toy_messages import exchange
@@ -9,9 +9,9 @@ from conformance.api.rest.values import Values
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.rules.description.test_security import security
-from conformance.scenarios.anonymous import anonymous_reads
+from conformance.scenarios.anonymous import anonymous_requests
 from conformance.statement.endpoints import Endpoints
-from conformance.statement.statement import Statement
+from conformance.statement.statement import Calls, Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.verdict.run import Run
 
@@ -29,7 +29,8 @@ _DOCUMENT = {
 }
 
 
-def test_reads_that_require_credentials_are_sent_without_them(tmp_path):
+@pytest.mark.parametrize(("allow", "methods"), [((), ["GET"]), (("/closed",), ["GET", "POST"])])
+def test_what_requires_credentials_is_sent_without_them_and_with_wrong_ones(tmp_path, allow, methods):
     seen = []
 
     def answer(method, path, _content):
@@ -38,15 +39,18 @@ def test_reads_that_require_credentials_are_sent_without_them(tmp_path):
 
     contract = Contract.load(write_described_pack(tmp_path, _DOCUMENT, _DOCUMENT))
     with serving(answer) as url:
-        run = Run(statement=Statement(endpoints=Endpoints(rest=url)), contract=contract)
+        statement = Statement(endpoints=Endpoints(rest=url), calls=Calls(allow=allow))
+        run = Run(statement=statement, contract=contract)
         client = HttpClient(url, Connection(token="roaas"))  # noqa: S106 - no secret
-        trace = anonymous_reads.play(RestInterface(run, client), Values())
+        trace = anonymous_requests.play(RestInterface(run, client), Values())
         client.close()
-    assert seen == [("GET", "/closed")]
-    assert not any(name == "Authorization" for one in trace for name, _ in one.request.headers)
+    assert seen == [(method, "/closed") for method in methods for _ in range(2)]
+    sent = [dict(one.request.headers).get("Authorization") for one in trace]
+    assert sent[::2] == [None] * len(methods)
+    assert "$ROAAS_TOKEN" not in sent
 
 
 @pytest.mark.parametrize(("status", "holds"), [(401, True), (403, True), (404, True), (200, False), (204, False)])
-def test_a_read_without_credentials_must_be_refused(status, holds):
+def test_a_request_without_valid_credentials_must_be_refused(status, holds):
     (case,) = security.outcomes((exchange(status),), {}.__getitem__)
     assert case.holds is holds
