@@ -1,8 +1,9 @@
 """Judge several devices in parallel threads; each result is reported when it is ready, and Ctrl-C stops all of them."""
 
 import multiprocessing
+import subprocess
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Final, TypeVar
 
@@ -10,6 +11,25 @@ _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 # How long after a certification was killed to look for one more, s: a mutant may be tried several times.
 _AGAIN_S: Final = 0.1
+
+
+_PROGRAMS: set[subprocess.Popen[bytes]] = set()
+
+
+def run_program(words: Sequence[str], folder: str, limit_s: float) -> None:
+    """Run a program in a folder until it ends; each_at_once() kills it when it is interrupted. Its output is discarded.
+
+    Raises:
+        subprocess.TimeoutExpired: it did not end within ``limit_s``, and was killed.
+    """
+    # The words are the caller's.
+    with subprocess.Popen(words, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as program:  # noqa: S603
+        _PROGRAMS.add(program)
+        try:
+            program.wait(limit_s)
+        finally:
+            _PROGRAMS.discard(program)
+            program.kill()
 
 
 def each_at_once(
@@ -24,7 +44,7 @@ def each_at_once(
         tell: called with each result as soon as it is ready, never twice at a time and never after an interrupt.
 
     Raises:
-        KeyboardInterrupt: after the running certifications were killed and their robots stopped.
+        KeyboardInterrupt: after the running certifications and programs were killed and their robots stopped.
     """
     lock, interrupted = threading.Lock(), threading.Event()
 
@@ -46,4 +66,6 @@ def each_at_once(
             while wait(running, _AGAIN_S).not_done:
                 for process in multiprocessing.active_children():
                     process.kill()
+                for program in tuple(_PROGRAMS):
+                    program.kill()
             raise

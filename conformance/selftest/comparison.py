@@ -17,7 +17,7 @@ from pathlib import Path
 from lxml import etree
 
 from conformance.mutation.mutant import Mutant
-from conformance.selftest.at_once import each_at_once
+from conformance.selftest.at_once import each_at_once, run_program
 from conformance.selftest.mutant_run import Pool, become
 
 EXAMPLES, LIMIT_S = 3, 40.0
@@ -128,7 +128,7 @@ def _findings(description: Path, url: str, settings: Settings, token: str = "") 
         if token:
             words += ["-H", f"Authorization: Bearer {token}"]
         try:
-            subprocess.run(words, capture_output=True, timeout=settings.limit_s, cwd=folder, check=False)  # noqa: S603 - made above
+            run_program(words, folder, settings.limit_s)
         except subprocess.TimeoutExpired:
             return frozenset({("every operation", "no end within the limit")})
         if not report.exists():
