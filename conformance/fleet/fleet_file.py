@@ -9,7 +9,7 @@ import msgspec
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import Positive, Text, TomlFileError, read_toml
 from conformance.statement.endpoints import Endpoints, beside
-from conformance.statement.statement import StatementError, load_statement
+from conformance.statement.statement import StatementError, api_of, endpoints_of, load_statement
 
 TIME_LIMIT_S = 3600.0
 """How long one robot may take where the file does not say, s."""
@@ -90,15 +90,23 @@ def _member(path: Path, number: int, robot: _Robot, file: _File, contract: Contr
     identity = (name, "")
     if statement is not None:
         try:
-            declared = load_statement(statement, contract)
-            endpoints = declared.endpoints
-            identity = (declared.robot.get("name", ""), declared.robot.get("vendor", ""))
+            described = api_of(statement).openapi
+            if described:
+                # Judged by its own description, so that the contract does not say what else the statement may have.
+                endpoints = msgspec.structs.replace(endpoints_of(statement), rest=described)
+            else:
+                declared = load_statement(statement, contract)
+                endpoints = declared.endpoints
+                identity = (declared.robot.get("name", ""), declared.robot.get("vendor", ""))
         except StatementError as error:
             raise FleetError(f"{where}: {error}") from error
     else:
         endpoints = beside(path.parent.absolute(), robot.endpoints or Endpoints())
     if not endpoints.interfaces:
-        raise FleetError(f"{where} ({name}) has no address: neither rest nor a WSDL is among its endpoints")
+        raise FleetError(
+            f"{where} ({name}) has no address: neither rest nor a WSDL is among its endpoints, and its statement names "
+            "no description ([api] openapi)"
+        )
     return Member(
         name=name,
         statement=statement,

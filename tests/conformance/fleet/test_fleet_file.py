@@ -37,6 +37,15 @@ def test_statements_and_addresses_make_a_fleet(fleet, tmp_path):
     assert lift.endpoints.publishers_wsdl == str(tmp_path / "lift.wsdl")
 
 
+def test_a_robot_that_describes_itself_is_a_member(fleet, tmp_path):
+    (tmp_path / "lamp.toml").write_text(
+        '[api]\nopenapi = "http://127.0.0.1:4/openapi.json"\n[calls]\nallow = ["lamp"]\n'
+    )
+    (lamp,) = load_fleet(fleet('[[robot]]\nstatement = "lamp.toml"'), Contract.load())
+    assert (lamp.name, lamp.statement) == ("lamp", tmp_path / "lamp.toml")
+    assert lamp.endpoints.rest == "http://127.0.0.1:4/openapi.json"
+
+
 @pytest.mark.parametrize(
     ("text", "named"),
     [
