@@ -157,7 +157,7 @@ def _judge_again(
         raise click.UsageError(str(error)) from error
     for item in judged:
         word = _WORDS.get(item["verdict"], "not judged")
-        click.echo(f"{word}: {item['id']}: {inert(item['reason']) or 'passed'} ({item['cases']} cases)")
+        click.echo(f"{word}: {item['id']}: {inert(item['reason']) or 'passed'} ({_counted(item['cases'])})")
     verdicts = {item["verdict"] for item in judged}
     if verdicts & {"fail", "warn"}:
         return CommandResult(ExitCode.FAILED)
@@ -187,7 +187,7 @@ def _judge_recorded(
     chosen = [one for one in judged if wanted in {None, one.requirement}]
     for one in chosen:
         word = f"fails: {inert('; '.join(one.failures))}" if one.failures else "passes"
-        click.echo(f"{one.requirement} {word} ({one.cases} cases)")
+        click.echo(f"{one.requirement} {word} ({_counted(one.cases)})")
     if not chosen:
         raise click.UsageError(f"no recorded trace shows {requirement or 'any requirement'}")
     return CommandResult(ExitCode.FAILED if any(one.failures for one in chosen) else ExitCode.PASSED)
@@ -234,3 +234,7 @@ def _read(path: Path) -> dict[str, Any]:
     if not isinstance(document, dict) or document.get("format") != _FORMAT:
         raise click.UsageError(f"{path} is no {_FORMAT}")
     return document
+
+
+def _counted(cases: int) -> str:
+    return f"{cases} case{'' if cases == 1 else 's'}"

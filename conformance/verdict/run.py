@@ -110,7 +110,10 @@ class Run:
         """Remarks for the report about cases that were omitted because responses took long or time ran out."""
         found = [self.effort.speed.remark] if self.effort.speed.remark else []
         if self.tally.cut_short:
-            checks = ", ".join(f"{name} ({count} cases)" for name, count in sorted(self.tally.cut_short.items()))
+            checks = ", ".join(
+                f"{name} ({count} case{'' if count == 1 else 's'})"
+                for name, count in sorted(self.tally.cut_short.items())
+            )
             found.append(
                 f"For want of time ({self.effort.longest_s:g} s for each exploration at {self.effort.name} effort), "
                 f"cases that were made were not tried: {checks}."

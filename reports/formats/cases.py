@@ -70,7 +70,9 @@ class Case:
         if self.requirement is None or self.outcome is Outcome.SKIPPED:
             return ""
         rule = f"{self.requirement['level']}: {self.requirement['text']}\nSource: {self.requirement['source']}"
-        evidence = f"{self.requirement['cases']} cases by {', '.join(self.requirement['checks']) or 'no check'}"
+        cases = self.requirement["cases"]
+        by = ", ".join(self.requirement["checks"]) or "no check"
+        evidence = f"{cases} case{'' if cases == 1 else 's'} by {by}"
         if self.outcome is Outcome.PASSED:
             return f"{rule}\n{evidence}"
         return "\n\n".join([rule, evidence, *_in_full(self.findings)])
