@@ -74,8 +74,6 @@ def test_single_readings(robot: Robot, judge: Judge, effort: Effort) -> None:
     robot.odometry()
 
 
-# Late, while the suite waits for deliveries that come late.
-@pytest.mark.phase("aside")
 @pytest.mark.requirement(
     "rest-resources/velocity-type",
     "rest-resources/velocity-odometry",
