@@ -9,12 +9,13 @@ import msgspec
 import pytest
 
 from conformance.api.permission import Permission
+from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.packs.table1.independent_robots import plain
 from conformance.statement.endpoints import Endpoints
-from conformance.statement.statement import empty_statement
+from conformance.statement.statement import Calls, Statement, empty_statement
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NotPermittedError
@@ -154,3 +155,30 @@ def test_the_service_that_reads_takes_messages_unless_it_is_the_one_that_acts():
     permission.forbid_post_to("http://robot:5555/read")
     assert permission.refusal("POST", "http://robot:5555/read")
     assert Permission(Run(allow_motion=True)).refusal("DELETE", "http://robot/") == ""
+
+
+@pytest.mark.parametrize(
+    ("path", "sent"),
+    [
+        ("/play/a%2Fb/c", True),
+        ("/play/a/c", True),
+        ("/play/..%2F..%2Fstop/c", False),
+        ("/play/a%2Fb", True),
+        ("/play%2Fa%2Fc", True),
+        ("/%73top/now", False),
+    ],
+)
+def test_a_slash_in_a_value_is_no_other_path(tmp_path, path, sent):
+    """A robot with the calls /play/{set}/{move} (allowed) and /stop/now (not)."""
+    document = {
+        "openapi": "3.1.0",
+        "info": {"title": "Mini", "version": "1"},
+        "paths": {
+            "/play/{set}/{move}": {"post": {"responses": {"200": {"description": "it"}}}},
+            "/stop/now": {"post": {"responses": {"200": {"description": "it"}}}},
+        },
+    }
+    contract = Contract.load(write_described_pack(tmp_path, document, document))
+    statement = Statement(endpoints=Endpoints(rest="http://h"), calls=Calls(allow=("POST /play/{set}/{move}",)))
+    refusal = Permission(Run(statement=statement, contract=contract)).refusal("POST", f"http://h{path}")
+    assert (not refusal) == sent
