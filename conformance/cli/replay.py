@@ -106,7 +106,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
         raise click.UsageError(f"{result} is no well-made {_FORMAT}: {error!r}") from error
     for one in replayed:
         came = (
-            f" ({one.came}, after {one.sent} request{"" if one.sent == 1 else "s"}; {one.told_by})"
+            f" ({one.came}, after {one.sent} request{'' if one.sent == 1 else 's'}; {one.told_by})"
             if one.sent
             else f" ({one.came})"
             if one.came
