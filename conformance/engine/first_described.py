@@ -28,10 +28,10 @@ version = {version}
 {api}
 
 [endpoints]
-{credentials}# ca_file = "ca.pem"         # authorities to trust for https
+# ca_file = "ca.pem"         # authorities to trust for https
 # request_rate = 100         # ceiling, requests per second
 # timeout_s = 10             # deadline of one request
-
+{credentials}
 [calls]
 # Operations that may be called although they may change something: "METHOD PATH", an operationId or a tag; * is any
 # text. What moves the device (x-roaas-motion in an overlay) also needs --allow-motion.

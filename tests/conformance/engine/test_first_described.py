@@ -1,6 +1,7 @@
 """The first statement on a device with a description of its own."""
 
 import json
+import re
 import tomllib
 
 import pytest
@@ -94,6 +95,17 @@ def test_what_the_options_say_stands_in_it(folder):
     assert found["calls"] == {"allow": ["DELETE /api/jobs/*"], "never": ["update"]}
     assert found["api"]["base_url"] == "http://other"
     assert "# called: DELETE /api/jobs/{job_id}" in (folder / "arm.toml").read_text()
+
+
+def test_what_is_commented_out_stands_in_its_table(folder):
+    assert run("--init", "arm.toml", "api.json").exit_code == 0
+    text = (folder / "arm.toml").read_text()
+    on = re.sub(
+        r"^# (?=\[auth\]|(?:ca_file|request_rate|timeout_s|login|body_file|token) )", "", text, flags=re.MULTILINE
+    )
+    read = tomllib.loads(on)
+    assert read["endpoints"].keys() == {"ca_file", "request_rate", "timeout_s"}
+    assert read["auth"].keys() == {"login", "body_file", "token"}
 
 
 def test_files_are_named_from_where_the_statement_is(folder):
