@@ -83,9 +83,9 @@ class LetGo:
 
     def rested_alone(self, limits: Limits) -> bool:
         """Return whether the first reading after the pause shows the robot at rest, or there was no pause."""
-        return (
-            self.resumed is None or windows.shown(limits, self.turns[: self.resumed + 1][-1:], STILL, count=1) is True
-        )
+        if self.resumed is None:
+            return True
+        return bool(windows.shown(limits, self.turns[self.resumed : self.resumed + 1], STILL, count=1))
 
     def rests(self, limits: Limits) -> bool:
         """Return whether the newest samples show the robot at rest."""
