@@ -22,7 +22,6 @@ class Stage(StrEnum):
     STAYS = "stays"
     INPUT = "input"
     ACTING = "acting"
-    SILENCE = "silence"
     EFFECT = "effect"
     ARRIVAL = "arrival"
     DESCRIBE = "describe"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings
 from hypothesis.errors import Flaky
+from hypothesis.internal.conjecture import providers
 from hypothesis.stateful import RuleBasedStateMachine, run_state_machine_as_test
 
 from conformance.transport.exchange import NoAnswerError
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy
 
     from conformance.verdict.effort import Effort
+
+# Hypothesis also takes values from the source of all loaded modules that are not in site-packages. The cases would then
+# depend on how the suite is installed; and reading the source takes a quarter of a second.
+providers._get_local_constants = lambda: providers._local_constants  # noqa: SLF001 - there is no setting for it
 
 
 class Explorer:

@@ -60,14 +60,15 @@ class Pursuit:
             error = wrap(goal_yaw - yaw)
             self._turned_at = float(goal_x), float(goal_y)
             arrived = abs(error) < self._straight
-            return self._turned(0.0 if arrived else 2.5 * error, off, (x, y, yaw), arrived=arrived)
+            turn = 3.0 * error + math.copysign(0.1, error)
+            return self._turned(0.0 if arrived else turn, off, (x, y, yaw), arrived=arrived)
         target_x, target_y, remaining = self._target(x, y)
         course = wrap(math.atan2(target_y - y, target_x - x) - yaw)
         if abs(course) > _TURN_ON_SPOT:
             return self._turned(3.0 * course, remaining, (x, y, yaw))
         self._turned_at = None
         # Slower near the goal, so that the robot stops there, and off the course, so that it cuts no corners.
-        linear = min(self._kinematics.cruise, 1.5 * off + 0.02) * math.cos(course) ** 4
+        linear = min(self._kinematics.cruise, 2.5 * off + 0.05) * math.cos(course) ** 4
         return Command(linear, within(3.0 * course, self._kinematics.turn), remaining, arrived=False)
 
     def _turned(

@@ -16,7 +16,7 @@ from conformance.transport.parallel import is_busy
 from conformance.transport.put_off import put_off_s
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("silence"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _ID = "http/available"
 # The first look is as fast as the robot answers and takes no longer than this, s. Only a robot that does not answer all
 # of it is looked at again, at the rate that the requirement names.

@@ -11,7 +11,7 @@ from conformance.transport.client import HttpClient
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("silence"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 # More than servers used to allow on one connection before they close it.
 _MANY = 120
 # So many requests that were dropped are the robot's habit, and not the end of an idle connection.

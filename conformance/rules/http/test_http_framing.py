@@ -32,7 +32,7 @@ def _first(api: RestInterface) -> Call:
     return min(calls, key=lambda call: "?" in call.path)
 
 
-@pytest.mark.phase("silence")
+@pytest.mark.phase("settling")
 @pytest.mark.requirement("http/framing")
 def test_every_octet_of_an_answer(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Read responses from the socket: a status line, valid fields, and exactly as many bytes as announced.
@@ -55,7 +55,7 @@ def test_every_octet_of_an_answer(api: RestInterface, rest: HttpClient, judge: J
             expect(judge, "http/framing", attempt).that(not fault, "one well-framed response", fault)
 
 
-@pytest.mark.phase("silence")
+@pytest.mark.phase("settling")
 @pytest.mark.requirement("http/framing", "http/head-no-body")
 def test_answers_stay_aligned(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Send two requests at once: the second response begins where the first one ends, also after HEAD."""

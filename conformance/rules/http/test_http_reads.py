@@ -8,7 +8,7 @@ from conformance.api.rest.applicable import reads
 from conformance.api.rest.interface import RestInterface
 from conformance.verdict.effort import Effort
 
-pytestmark = [pytest.mark.phase("silence"), pytest.mark.needs("rest")]
+pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 # Reads of each resource at standard effort; and reads in all, at any effort, with a robot that is not slow.
 _EACH = 60
 _IN_ALL = 56

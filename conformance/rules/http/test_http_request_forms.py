@@ -53,7 +53,7 @@ def _telling_read(api: RestInterface) -> tuple[Call, str, tuple[int, str]] | Non
     return None
 
 
-@pytest.mark.phase("describe")
+@pytest.mark.phase("settling")
 @pytest.mark.requirement("http/field-forms", "http/field-lines")
 def test_fields_in_any_form(api: RestInterface, judge: Judge) -> None:
     """Write Accept in other letters, with other white space, and in several lines."""
@@ -74,7 +74,7 @@ def test_fields_in_any_form(api: RestInterface, judge: Judge) -> None:
         expect(judge, "http/field-lines", attempt).that(_kind(attempt) == wanted, expected)
 
 
-@pytest.mark.phase("describe")
+@pytest.mark.phase("settling")
 @pytest.mark.requirement("http/octet-stream")
 def test_requests_in_pieces(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Send requests in several TCP segments."""
@@ -90,7 +90,7 @@ def test_requests_in_pieces(api: RestInterface, rest: HttpClient, judge: Judge) 
             expect(judge, "http/octet-stream", attempt).that(_kind(attempt) == wanted, expected)
 
 
-@pytest.mark.phase("describe")
+@pytest.mark.phase("settling")
 @pytest.mark.requirement("http/close", "http/old-client")
 def test_the_end_of_a_connection(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Send Connection: close, and requests of an HTTP/1.0 client, which does not know chunked encoding."""

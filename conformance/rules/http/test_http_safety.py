@@ -38,7 +38,7 @@ def test_reading_changes_nothing_after_input(api: RestInterface, judge: Judge) -
         _judge_safe(api, judge)
 
 
-@pytest.mark.phase("input")
+@pytest.mark.phase("aside")
 @pytest.mark.requirement("http/safe")
 def test_reading_leaves_what_was_put(api: RestInterface, judge: Judge) -> None:
     """PUT a resource (a goal), and check that HEAD and OPTIONS of every resource do not remove it.
@@ -122,7 +122,7 @@ def _judge_safe(api: RestInterface, judge: Judge) -> None:
         expect(judge, "http/safe", None).that(True, expected)
 
 
-@pytest.mark.phase("input")
+@pytest.mark.phase("aside")
 @pytest.mark.requirement("http/put-idempotent")
 def test_put_twice(api: RestInterface, judge: Judge) -> None:
     """Send the same PUT twice: both succeed, and the resource is as after the first."""
@@ -166,7 +166,7 @@ def _pair(api: RestInterface, call: Call) -> tuple[Exchange, str | None, Exchang
     return first, settles_at(api, call), second
 
 
-@pytest.mark.phase("input")
+@pytest.mark.phase("aside")
 @pytest.mark.requirement("http/delete-idempotent")
 def test_delete_twice(api: RestInterface, judge: Judge) -> None:
     """Send DELETE twice: the second one gets 2xx or 404, and leaves the resource as it is."""

@@ -52,6 +52,7 @@ class Standstill:
         self._waiting: list[_Waiting] = []
         # What moved while another check read the robot.
         self._moved: Rest | None = None
+        self._looked_at = -1
 
     def begin(self) -> str:
         """Bring the robot to rest before an attempt; return why it is not, or an empty text.
@@ -92,9 +93,11 @@ class Standstill:
         return none and _stays(Drive(robot)) is not False
 
     def look(self) -> None:
-        """Read the robot once if an effect may still show: checks that only read the robot call this."""
-        if self._moved is None and self._waiting and self._clock.now() < self._until:
+        """Read the robot once if an effect may still show, and something was sent since; called after each check."""
+        sent = self._api.client.connection.sent
+        if self._moved is None and self._waiting and sent != self._looked_at and self._clock.now() < self._until:
             self._moved = self._look(Drive(Robot(self._api, self._clock)))
+            self._looked_at = self._api.client.connection.sent
 
     def watch(self) -> None:
         """Watch until the last effect would have shown; if the robot moves, repeat each attempt alone."""

@@ -28,8 +28,9 @@ from conformance.verdict.effort import Effort
 # How often velocities are put that ended before a read showed them, or that the robot did not reach in time.
 _TRIES: Final = 3
 _CLIENTS: Final = 4
-# How long after it was cancelled a goal is read, s.
-_WATCHED_S: Final = 0.1
+# How long after it was cancelled a goal is read, s: each fifth time for longer.
+_WATCHED_S: Final = 0.03
+_WATCHED_LONGER_S: Final = 0.1
 _GOAL_STEP_S: Final = 0.02
 _VELOCITY_STEP_S: Final = 0.01
 # Shares of the limits, ahead and turning: no velocity has one of its components in common with another.
@@ -53,14 +54,14 @@ def concurrent_goal(robot: Robot, effort: Effort) -> tuple[ConcurrentGoal, ...]:
             break
         robot.delete_goal()
         await_none(robot)
-        trace.append(ConcurrentGoal(puts, GoalRead(read, differs), _after_cancel(robot, body)))
+        trace.append(ConcurrentGoal(puts, GoalRead(read, differs), _after_cancel(robot, body, longer=turn % 5 == 0)))
     return tuple(trace)
 
 
-def _after_cancel(robot: Robot, body: dict[str, Any]) -> tuple[GoalRead, ...]:
+def _after_cancel(robot: Robot, body: dict[str, Any], *, longer: bool) -> tuple[GoalRead, ...]:
     """Read the goal for a while after a cancel: a second copy of the cancelled goal would now be active."""
     reads: list[GoalRead] = []
-    for _ in poll_for(robot.clock, _GOAL_STEP_S, _WATCHED_S):
+    for _ in poll_for(robot.clock, _GOAL_STEP_S, _WATCHED_LONGER_S if longer else _WATCHED_S):
         goal, exchange = robot.goal()
         reads.append(GoalRead(exchange, "no goal" if goal is None else difference(goal, {"goal": body["goal"]})))
         if not reads[-1].differs:

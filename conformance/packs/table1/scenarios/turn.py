@@ -93,6 +93,11 @@ def unrenewed(
     return [way for way in dict.fromkeys(ways) if any(way[0])]
 
 
+def _slow_part(limit: float, seen_from_rest: float) -> float:
+    """Return a slow velocity in one component whose limit is given; one of ``seen_from_rest`` may be taken for rest."""
+    return min(max(0.2 * limit, 4 * seen_from_rest), 0.6 * limit)
+
+
 @dataclass
 class _Turning:
     """One play of the scenario."""
@@ -152,11 +157,12 @@ class _Turning:
         return unrenewed(bent, ahead, limits, run.effort.name, run.seed)
 
     def _slow(self) -> Velocity:
-        """Return a slow turn to the left that can be told from rest."""
-        limits = self.robot.limits
-        told_from_rest = 4 * (limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s)
-        slow = min(max(0.2 * limits.angular_rad_s, told_from_rest), 0.6 * limits.angular_rad_s)
-        return self.robot.only(ABOUT, slow)
+        """Return a slow turn to the left, ahead where the robot drives ahead, that can be told from rest."""
+        limits, noise = self.robot.limits, self.robot.limits.noise
+        ahead = limits.range_of(AHEAD)[1] if self.robot.actuated(AHEAD) else 0.0
+        linear = _slow_part(ahead, limits.tolerance_linear_m_s + FARTHEST * noise.linear_m_s)
+        angular = _slow_part(limits.angular_rad_s, limits.tolerance_angular_rad_s + FARTHEST * noise.angular_rad_s)
+        return self.robot.drivable(Velocity(linear_x=linear, angular_z=angular))
 
     def along(self, component: int) -> None:
         """Drive along one more axis, slowly and as fast as the robot can, there and back, and let it go."""
@@ -199,7 +205,7 @@ class _Turning:
         self.fastest = beside if reached else left
         if not reached and not ids:
             return None
-        if ids and not reach(drive, left):
+        if ids and not reached and not reach(drive, left):
             return None
         return right if reach(drive, right) else None
 
