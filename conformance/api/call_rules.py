@@ -114,6 +114,9 @@ def told(rules: CallRules, operations: Sequence[Operation]) -> list[str]:
         if labels and reason is not Reason.SAFE:
             verb = "  Calls" if reason.may else "  Does not call"
             lines.append(f"{verb} {len(labels)}, because {reason}: {_listed(labels)}")
+    stops = [operation.label for operation in operations if operation.stop]
+    if stops and changing:
+        lines.append(f"  Sends at the end, to stop the device (x-roaas-stop): {_listed(stops)}")
     return lines
 
 

@@ -70,7 +70,9 @@ class Permission:
         if declared is None and method in SAFE_METHODS:
             return ""  # whatever is there, it changes nothing
         reason = rules.decide(declared or Operation(path, method, path))
-        if reason.may and (declared is not None or reason is Reason.ALLOWED):
+        if declared is not None and (reason.may or (declared.stop and not declared.never)):
+            return ""
+        if reason is Reason.ALLOWED:
             return ""
         return f"{method} {path[:200]} was not sent: {reason}"
 

@@ -64,10 +64,10 @@ def replay(  # noqa: C901 - one branch for each way to judge
 ) -> CommandResult:
     """Send the requests of findings again, in order, and report whether each failure occurs again.
 
-    RESULT is a result.json, or its folder; REQUIREMENT is an id such as http/head, by default all requirements that
-    were not met. A response that is wrong in itself is judged as in the run. Any other failure counts as repeated if
-    the last response has the same status, media type and content as in the run. With --statement, the requirements'
-    own checks run again, with the seed and effort of the result; options override the statement.
+    RESULT is a result.json, or its folder; REQUIREMENT is an id such as http/head, or the number of a finding; by
+    default all findings. A response that is wrong in itself is judged as in the run. Any other failure counts as
+    repeated if the last response has the same status, media type and content as in the run. With --statement, the
+    requirements' own checks run again, with the seed and effort of the result; options override the statement.
 
     Exit code: 0 no failure again, 1 a failure again, 2 usage, 3 robot not reached, 4 the checks could not judge.
     """
@@ -94,7 +94,9 @@ def replay(  # noqa: C901 - one branch for each way to judge
             requirements = {id_ for id_, _ in chosen}
             contract = _contract_of(document, pack)
             return _judge_again(document, contract, statement_file, given, requirements, allow_motion=allow_motion)
-        if not allow_motion and any(moves(failure) for _, failure in chosen):
+        acting = [] if allow_motion else [failure for _, failure in chosen if moves(failure)]
+        chosen = [one for one in chosen if one[1] not in acting]
+        if not chosen:
             raise click.UsageError("these requests may move the robot: add --allow-motion, or name one that only reads")
         if token:
             _check_addresses([failure for _, failure in chosen], trusted)
@@ -105,14 +107,14 @@ def replay(  # noqa: C901 - one branch for each way to judge
     except (KeyError, TypeError, ValueError) as error:
         raise click.UsageError(f"{result} is no well-made {_FORMAT}: {error!r}") from error
     for one in replayed:
-        came = (
-            f" ({one.came}, after {one.sent} request{'' if one.sent == 1 else 's'}; {one.told_by})"
-            if one.sent
-            else f" ({one.came})"
-            if one.came
-            else ""
-        )
-        click.echo(f"{one.outcome}: {one.requirement}: {inert(one.message)}{inert(came)}")
+        now = f"now {one.came}" if one.came else ""
+        if one.sent:
+            now += f", after {one.sent} request{'' if one.sent == 1 else 's'} (judged {one.told_by})"
+        told = ". ".join(filter(None, (now, f"In the run: {one.message}")))
+        click.echo(f"{one.outcome}: {one.requirement}: {inert(told)}")
+    if acting:
+        numbers = ", ".join(str(failure.get("number", "")) for failure in acting)
+        click.echo(f"not sent, because they may move the robot: finding {numbers}; --allow-motion sends them")
     outcomes = {one.outcome for one in replayed}
     if Outcome.STILL_THERE in outcomes:
         return CommandResult(ExitCode.FAILED)

@@ -73,6 +73,7 @@ class Operation:
         tags: groups that the description puts it in.
         security: names of the security schemes of each alternative; empty: none is needed.
         never: whether the description says that a test must not send it (x-roaas-never).
+        stop: whether it stops the device (x-roaas-stop).
     """
 
     id: str
@@ -88,6 +89,7 @@ class Operation:
     tags: tuple[str, ...] = ()
     security: tuple[tuple[str, ...], ...] = ()
     never: bool = False
+    stop: bool = False
 
     @property
     def label(self) -> str:
@@ -208,6 +210,7 @@ def _operation(
         tags=tuple(given.get("tags", ())),
         security=tuple(tuple(alternative) for alternative in given["security"]),
         never=bool(given.get("x-roaas-never", False)),
+        stop=bool(given.get("x-roaas-stop", False)),
     )
 
 

@@ -24,7 +24,7 @@ from conformance.verdict.run import Run
 
 # A pause between two requests is kept, as what is judged may be what comes after it; never longer than this, s.
 _LONGEST_PAUSE_S = 10.0
-_BY_JUDGEMENT = "judged as in the run"
+_BY_JUDGEMENT = "as in the run"
 _BY_KIND = "by status, media type and whether there is content"
 
 
@@ -58,11 +58,18 @@ class Replayed:
     told_by: str = ""
 
 
-def findings(result: Mapping[str, Any], requirement: str | None) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield (requirement id, finding) for all findings of a result, or for those of one requirement (id or alias)."""
+def findings(result: Mapping[str, Any], chosen: str | None) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield (requirement id, finding) for all findings of a result.
+
+    Args:
+        result: the result.
+        chosen: only those of this requirement (id or alias), or the one with this number; None: all.
+    """
     for item in result["requirements"]:
-        if requirement in {None, item["id"], *item.get("aliases", ())}:
-            yield from ((item["id"], failure) for failure in item["failures"])
+        whole = chosen in {None, item["id"], *item.get("aliases", ())}
+        for failure in item["failures"]:
+            if whole or chosen == str(failure.get("number")):
+                yield item["id"], failure
 
 
 def replay(

@@ -36,6 +36,8 @@ _ACTING: Final = 12
 #: At standard effort the usual request is sent and timed so often before the groups of others and after each: a failure
 #: in one call of twenty is met.
 TIMED: Final = 5
+# An operation that once took more than a second gets this part of the requests.
+_SLOW_SHARE: Final = 4
 # Statuses of an operation that is not there.
 _NOT_FOUND: Final = 404
 _NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
@@ -212,6 +214,7 @@ class _Surveyor:
         self._time(operation, usual, effort, until)
         for name, variations in groups.items():
             standard = max(_MOST[name], round(_LEAST[name] / effort.factor))
+            standard //= _SLOW_SHARE if operation.label in self.api.slow else 1
             for one in effort.draw(variations, standard, f"{seed}/{name} {operation.label}"):
                 if operation.label in self.given_up:
                     return
@@ -244,6 +247,7 @@ def survey(api: RestInterface, values: Values) -> Survey:
     if not operations:
         raise NotPossibleError("no operation of the description may be called")
     surveyor = _Surveyor(api, values)
+    api.values = values
     for operation in sorted(operations, key=order_of):
         surveyor.begin(operation)
         if operation.label not in surveyor.given_up:
@@ -295,7 +299,8 @@ def generated_requests(api: RestInterface, values: Values, explore: Explorer) ->
             continue
         cases = list(target.covering())
         until = time.monotonic() + _BUDGETS * run.effort.budget_s
-        for case in run.effort.draw(cases, _COVERAGE, f"{run.seed}/coverage {target.label}"):
+        count = _COVERAGE // (_SLOW_SHARE if operation.label in api.slow else 1)
+        for case in run.effort.draw(cases, count, f"{run.seed}/coverage {target.label}"):
             if time.monotonic() > until:
                 surveyor.cut_short(f"generated requests of {target.label}")
                 continue

@@ -18,14 +18,16 @@ A raw request tests a rule of its own, so it shares a cause only if an ordinary 
 from collections import Counter, defaultdict
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
-from conformance.contract.classes import CauseKind, Level
+from conformance.contract.classes import CauseKind, Level, Topic
 from conformance.contract.ledger import Requirement
 from conformance.verdict.evidence import Evidence
 from conformance.verdict.finding import Finding
 
 _LEVELS = tuple(Level)
 _KINDS = tuple(CauseKind)
+_TOPICS = tuple(Topic)
 # A check of more requirements than this watches many things, and says less of one.
 _FEW = 5
 
@@ -51,9 +53,8 @@ def by_cause(
 ) -> tuple[dict[str, Evidence], list[Cause]]:
     """Keep one finding for each cause, and number the findings in the order in which a vendor should look at them.
 
-    MUST comes before SHOULD; then closed connection, hang, server error, unparsable response, broken rule; then the
-    cause
-    that blocks more requirements.
+    They are numbered by topic, as pages and terminal list them. Within a topic MUST comes before SHOULD; then closed
+    connection, hang, server error, unparsable response, broken rule; then the cause that blocks more requirements.
 
     Args:
         evidence: by requirement.
@@ -91,9 +92,13 @@ def by_cause(
     }
     blocked = Counter(number for reasons in waiting.values() for number in {id(one) for one in reasons})
     remaining = [finding for id_ in judged for finding in kept[id_].values()]
-    remaining.sort(
-        key=lambda one: (weight(one), _KINDS.index(one.cause), -blocked[id(one)], places[one.requirement], one.met)
-    )
+
+    def place(finding: Finding) -> tuple[Any, ...]:
+        topic = _TOPICS.index(judged[finding.requirement].topic or Topic.HURT)
+        kind = _KINDS.index(finding.cause)
+        return topic, weight(finding), kind, -blocked[id(finding)], places[finding.requirement], finding.met
+
+    remaining.sort(key=place)
     for number, finding in enumerate(remaining, 1):
         finding.number = number
     seen = dict(evidence)

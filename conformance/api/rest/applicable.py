@@ -25,10 +25,13 @@ def reads(api: RestInterface) -> list[Call]:
 def _described_reads(api: RestInterface, operations: list[Operation]) -> list[Call]:
     """Return requests for some operations that read: how a server speaks HTTP shows in a few of them.
 
-    Those that the survey found to answer 2xx come first; a response that does not end is none that two can share.
+    Those that the survey found to answer 2xx come first, of these the ones that never took a second. A response that
+    does not end is none that two can share.
     """
     ending = [item for item in operations if item.label not in api.streams]
-    ranked = sorted(ending, key=lambda item: (item.label not in api.working, len(item.parameters)))
+    ranked = sorted(
+        ending, key=lambda item: (item.label not in api.working, item.label in api.slow, len(item.parameters))
+    )
     return [api.working.get(item.label) or example_call(api, item) for item in ranked[:_DESCRIBED_READS]]
 
 

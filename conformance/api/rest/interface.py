@@ -26,6 +26,8 @@ class RestInterface:
         waits: how many more deferred reads may be repeated.
         working: requests that the survey of a described API found to be answered 2xx, by operation.
         streams: operations whose responses do not end.
+        slow: operations that once took more than a second to respond.
+        values: what the survey of a described API knows for parameters and bodies, or None.
         is_recorded: whether the present exchange is recorded by a scenario, whose rules judge it.
     """
 
@@ -36,6 +38,8 @@ class RestInterface:
     waits: int = 5
     working: dict[str, Any] = field(default_factory=dict)
     streams: set[str] = field(default_factory=set)
+    slow: set[str] = field(default_factory=set)
+    values: Any = None
     is_recorded: bool = False
     device: Device = field(init=False)
 

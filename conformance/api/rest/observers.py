@@ -26,6 +26,8 @@ _SINGLE = ("Content-Type", "Location", "Retry-After")
 # Fields that ask for a part or set a condition, and the statuses that only such requests get.
 _CONDITIONS = frozenset({"range", "if-none-match", "if-modified-since", "if-match", "if-unmodified-since"})
 _CONDITIONAL = frozenset({206, 304, 412, 416})
+# An operation that took so long once is asked less often, ms.
+_SLOW_MS = 1000.0
 _WELL_FRAMED = "well-framed HTTP"
 # Fields that contain one time and nothing else, in lower case, and the grammar of that time (RFC 9110 5.6.7).
 _TIMES = frozenset({"date", "last-modified"})
@@ -71,6 +73,10 @@ class Observer(Listener):
             expect(api.run.judge, "http/no-traceback", exchange).that(not inside, expected, found, cause="traceback")
             problem.judge(api, exchange, answer, context)
         if context.operation is not None:
+            if answer.elapsed_ms > _SLOW_MS:
+                api.slow.add(context.operation.label)
+            if api.values is not None and not context.operation.safe:
+                api.values.learn(context.operation, exchange)
             self._judge_crash(exchange, context.operation)
             if answer.status >= HTTPStatus.BAD_REQUEST and context.usual and not is_cut_off(exchange):
                 self._judge_input(exchange, answer, context)

@@ -94,14 +94,15 @@ class Values:
         del known[_REMEMBERED:]
 
     def known_ids(self, operation: Operation, parameter: Parameter) -> list[Any]:
-        """Return values of a path parameter that an earlier response named."""
+        """Return values of a parameter that an earlier response named."""
         before = operation.template.split(f"{{{parameter.name}}}", 1)[0].rstrip("/")
         return [*self._ids.get(before, ()), *self._seen.get(plain_name(parameter.name), ())]
 
     def of(self, operation: Operation, parameter: Parameter) -> list[Any]:
         """Return values to try for a parameter, the most promising first: at most four that its schema allows."""
         given = self._given.get(plain_name(parameter.name), [])
-        learned = self.known_ids(operation, parameter) if parameter.where == "path" else []
+        named = parameter.where == "path" or plain_name(parameter.name).endswith(IDS)
+        learned = self.known_ids(operation, parameter) if named else []
         found = [*given, *parameter.examples, *learned, sample(parameter.schema)]
         return [value for value in _distinct(found) if value in given or fits(parameter.schema, value)][:_TRIED]
 

@@ -61,6 +61,8 @@ def _in_question(probe: Probe, status: int) -> bool:
     if status in _ASKED_FOR:
         names = {name.lower() for name, _ in probe.exchange.request.headers} if probe.exchange else _ASKING
         return not names & _ASKING
+    if probe.kind is Kind.MALFORMED and status == _BAD_REQUEST:
+        return False  # any server may say so of content that it cannot read (RFC 9110 15.5.1)
     return status not in _ANY_TIME and (probe.kind in _PLAIN or status not in _OF_REQUEST)
 
 

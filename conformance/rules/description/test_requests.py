@@ -16,7 +16,7 @@ from conformance.verdict.run import Run
 
 _REFUSED = frozenset({400, 415, 422})
 _MISSING_OR_INVALID = frozenset({Kind.INVALID, Kind.MALFORMED})
-_CONVERTED = re.compile(r" is (.+), not of type (.+)$", re.DOTALL)
+_CONVERTED = re.compile(r"(?: is (.+), not of type (.+)|: (True|False) is not valid under any .+)$", re.DOTALL)
 _INVALID_TAKEN, _VALID_REFUSED = frozenset({"ST201", "ST203"}), "ST202"
 
 
@@ -44,12 +44,15 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
             return None
         why = _why_invalid(run, probe)
         # A type that a framework converts, it converts in every operation.
-        kind = _CONVERTED.search(why)
-        if probe.says:
-            kind, why = (kind if kind and _json_type(kind[1]) == "boolean" else None), ""
-        cause = (
-            f"{_json_type(kind[1])} {kind[2]}" if kind else f"{probe.operation} {probe.place} {without_numbers(why)}"
-        )
+        converted = _CONVERTED.search(why)
+        given = _json_type((converted[1] or converted[3]).lower()) if converted else ""
+        if given == "boolean":
+            cause = "a boolean converted"
+        elif converted and converted[2] and not probe.says:
+            cause = f"{given} {converted[2]}"
+        else:
+            cause = f"{probe.operation} {probe.place} {'' if probe.says else without_numbers(why)}"
+        why = "" if probe.says else why
         return Fault(cause, f"status {probe.status}" + (f", although {why}" if why else ""))
 
     yield from told_once(sure, "status 4xx for a request that the description forbids", fault)

@@ -202,6 +202,8 @@ def _judge_head_length(api: RestInterface, judge: Judge, call: Call, accept: str
             cause = f"{call.operation.id} {accept}"
             expect(judge, "http/head-length", exchange).that(right, expected, f"Content-Length: {said}", cause=cause)
             break
+        if got.status == after.status != exchange.response.status:
+            break  # such as 405: another response, of another length
 
 
 @pytest.mark.requirement("http/head-no-body", "http/framing")

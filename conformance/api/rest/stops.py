@@ -1,0 +1,37 @@
+"""Stop a device that only its description tells of, at the end of a run."""
+
+import math
+import time
+from typing import Final
+
+from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.values import Values
+from conformance.documents.openapi import operations_of
+from conformance.transport.exchange import NoAnswerError, NotPermittedError
+
+_DEADLINE_S: Final = 2.0
+_LONGEST_S: Final = 5.0
+
+
+def send_stops(api: RestInterface) -> None:
+    """Send each operation that the description marks as a stop (x-roaas-stop), if the run has called what may move.
+
+    Each is sent with the values that the run knows for it, such as the ids of the newest moves. Takes at most a few
+    seconds; never raises.
+    """
+    if not api.call_rules.allow or math.isinf(api.client.connection.acted_at):
+        return
+    until = time.monotonic() + _LONGEST_S
+    for operation in operations_of(api.run.contract):
+        for inputs in usual_inputs(operation, api.values or Values()) if operation.stop else ():
+            if time.monotonic() > until:
+                return
+            request = written(operation, inputs)
+            fields = [*request.headers, *([("Content-Type", request.content_type)] if request.content_type else [])]
+            try:
+                api.client.send(
+                    request.method, request.target, headers=fields, body=request.body, timeout_s=_DEADLINE_S
+                )
+            except (NoAnswerError, NotPermittedError):
+                continue
