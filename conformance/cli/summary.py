@@ -42,8 +42,10 @@ def print_summary(outcome: Certification) -> None:
             click.echo(f"\n{question}")
         for cause, requirement in found:
             _print_cause(cause, requirement)
+    not_claimed = "not judged" if "api" in document else "not-claimed"
     counts = Counter(requirement["verdict"] for requirement in document["requirements"])
-    told = ", ".join(f"{count} {value}" for value, count in sorted(counts.items()))
+    counts[not_claimed] = counts.pop("not-claimed", 0)
+    told = ", ".join(f"{count} {value}" for value, count in sorted(counts.items()) if count)
     if "api" in document:
         called, described = document["api"]["coverage"]["operations"]
         told = f"{called} of {described} operations called; {told}"

@@ -9,7 +9,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.request_context import RequestContext
 from conformance.api.rest.validity import VALID, validity
 from conformance.api.rest.variations import Kind
-from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey
 from conformance.transport.exchange import Attempt, Exchange, Listener, NoAnswer, Request, Unanswered
@@ -71,8 +71,10 @@ class OtherExchanges(Listener):
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)
-def others(other_exchanges: OtherExchanges) -> Survey:
+def others(api: RestInterface, other_exchanges: OtherExchanges) -> Survey:
     """Return what other checks have sent and received until the end of the run."""
+    if not api.working:
+        raise NotPossibleError("no request was answered 2xx; if the device asks for credentials, give them")
     if not other_exchanges.probes:
-        raise NotPossibleError("no other check sent a usual request to an operation that works")
+        raise NoOccasionError("no other check sent a usual request to an operation that works")
     return Survey(tuple(other_exchanges.probes))

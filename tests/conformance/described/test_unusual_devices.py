@@ -65,6 +65,9 @@ def _certified(device, arguments, tmp_path, *, fault="", effort="quick"):
 def test_a_right_device_is_not_blamed(device, arguments, tmp_path):
     done, result, blamed = _certified(device, arguments, tmp_path)
     assert blamed == {}, done.stdout
+    # Without its token nothing of the guarded device can be judged.
+    decided = device is not devices.guarded or bool(arguments)
+    assert done.returncode == (0 if decided else 4), done.stdout
     passed = [one["id"] for one in result["requirements"] if one["verdict"] == "pass"]
     assert "description/file-valid" in passed
 

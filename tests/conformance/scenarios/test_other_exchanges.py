@@ -6,7 +6,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.scenarios.other_exchanges import OtherExchanges, others
-from conformance.scenarios.scenario import NotPossibleError
+from conformance.scenarios.scenario import NoOccasionError, NotPossibleError
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
 from conformance.verdict.run import Run
@@ -42,10 +42,10 @@ def _exchange(status=200, body=b"1", target="/lamp?level=1", fields=()):
     return Exchange(request, Response(status, (("Content-Type", "application/json"),), body, 1.0))
 
 
-def test_different_responses_to_valid_requests_are_kept_once(kept):
+def test_different_responses_to_valid_requests_are_kept_once(api, kept):
     for exchange in (_exchange(), _exchange(), _exchange(418), _exchange(body=b"null"), _exchange(418)):
         kept.answered(exchange)
-    assert [(one.operation, one.status) for one in others.play(kept).probes] == [
+    assert [(one.operation, one.status) for one in others.play(api, kept).probes] == [
         ("GET /lamp", s) for s in (200, 418, 200)
     ]
 
@@ -82,6 +82,12 @@ def test_a_closed_connection_is_kept(kept, kind, number):
     assert len(kept.probes) == number
 
 
-def test_without_exchanges_there_is_nothing_to_judge(kept):
-    with pytest.raises(NotPossibleError, match="no other check"):
-        others.play(kept)
+def test_without_exchanges_there_is_nothing_to_judge_and_nothing_is_lost(api, kept):
+    with pytest.raises(NoOccasionError, match="no other check"):
+        others.play(api, kept)
+
+
+def test_a_device_that_never_answered_2xx_is_not_judged(api, kept):
+    api.working.clear()
+    with pytest.raises(NotPossibleError, match="credentials"):
+        others.play(api, kept)
