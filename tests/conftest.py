@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# How long an example takes is the machine's affair, which others may use as well; which examples there are is not: every
-# run of the tests has the same ones.
+# How long an example takes is the machine's affair, which others may use as well. Every run has the same examples.
 settings.register_profile("tests", deadline=None, derandomize=True)
 settings.load_profile("tests")
 
