@@ -14,7 +14,7 @@ from typing import Any
 from aiohttp import web
 
 LIMIT = 0.6
-SPEED = 1.5
+SPEED = 3.0
 MAP = f"""
 [motion.state]
 read = "GET /pose"
@@ -27,7 +27,7 @@ y = {{ at = "/pose/1", unit = "m", limits = [-{LIMIT}, {LIMIT}], speed = {SPEED}
 
 [motion.goto]
 send = "PUT /goal/{{x}}/{{y}}"
-within_s = 2.5
+within_s = 1.0
 settle_s = 0.3
 tolerance = 0.03
 beyond_limits = "clamped"
@@ -135,7 +135,7 @@ class Rover:
         now = time.monotonic()
         if self.fault == "coasts":
             here = self.at(now)
-            ahead = [one + 0.8 * (end - one) for one, end in zip(here, self.target, strict=True)]
+            ahead = [one + 0.9 * (end - one) for one, end in zip(here, self.target, strict=True)]
             self.go((ahead[0], ahead[1]), now)
         elif self.fault != "no-stop":
             self.go(self.at(now), now)
@@ -160,10 +160,12 @@ def serving_rover(rover: Rover) -> Iterator[str]:
     """Serve a rover on loopback; yields its base URL."""
     logging.getLogger("aiohttp.server").setLevel(logging.CRITICAL)  # it tells each malformed request
     loop, ready, address = asyncio.new_event_loop(), threading.Event(), []
+    runners: list[web.AppRunner] = []
 
     async def begin() -> None:
         runner = web.AppRunner(rover.app(), access_log=None)
         await runner.setup()
+        runners.append(runner)
         site = web.TCPSite(runner, "127.0.0.1", 0)
         await site.start()
         address.append(runner.addresses[0][1])
@@ -177,5 +179,6 @@ def serving_rover(rover: Rover) -> Iterator[str]:
     thread.start()
     ready.wait(10)
     yield f"http://127.0.0.1:{address[0]}"
+    asyncio.run_coroutine_threadsafe(runners[0].cleanup(), loop).result(10)
     loop.call_soon_threadsafe(loop.stop)
     thread.join(10)

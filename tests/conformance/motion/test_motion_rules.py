@@ -8,6 +8,7 @@ from arm import MAP, Arm
 
 from conformance.observe.clock import SimulatedClock
 from conformance.rules.motion import test_motion as rules
+from conformance.rules.motion import test_motion_attempts as readings
 from conformance.scenarios.motion import plays
 from conformance.scenarios.motion.mapped import Mapped
 from conformance.scenarios.rule import Case
@@ -47,7 +48,7 @@ _FAULTS = {
 _PLAYED = (plays.targets, plays.stops, plays.new_targets, plays.many_commands, plays.repeated)
 _RULES = (
     rules.reaches, rules.stays, rules.way, rules.speed, rules.stop_rests, rules.stop_lasts, rules.new_target,
-    rules.last_of_many, rules.repetition, rules.fresh, rules.stamp,
+    rules.last_of_many, rules.repetition, readings.fresh, readings.stamp,
 )  # fmt: skip
 
 
