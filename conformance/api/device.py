@@ -85,9 +85,6 @@ class Device:
 
     def leave_at_rest(self, api: Rest) -> None:
         """Stop the device at the end of a run; never raises, and returns within seconds."""
-        from conformance.api.rest.stops import send_stops  # noqa: PLC0415 - it imports this module
-
-        send_stops(api)
 
 
 def device_of(run: Run) -> Device:

@@ -70,6 +70,9 @@ class Permission:
         if declared is None and method in SAFE_METHODS:
             return ""  # whatever is there, it changes nothing
         reason = rules.decide(declared or Operation(path, method, path))
+        moves = self._run.statement.motion_map
+        if moves is not None and self._run.allow_motion and declared is not None and declared.label in moves.calls:
+            return ""
         if declared is not None and (reason.may or (declared.stop and not declared.never)):
             return ""
         if reason is Reason.ALLOWED:

@@ -21,6 +21,7 @@ from conformance.statement.statement import (
     api_of,
     empty_statement,
     endpoints_of,
+    has_motion_map,
     load_statement,
 )
 
@@ -72,7 +73,10 @@ def _described(
     try:
         # Where an API key goes, the description may say, so that it is read without one.
         connection = connection_of(where if where.api_key else msgspec.structs.replace(where, api_key_file=None))
-        contract, where, remarks = described_contract(source, overlays, base_url, where, connection, options["out"])
+        moves = statement is not None and has_motion_map(statement)
+        contract, where, remarks = described_contract(
+            source, overlays, base_url, where, connection, options["out"], moves=moves
+        )
     except OSError as error:
         raise StatementError(str(error)) from error
     options["remarks"] = remarks

@@ -24,7 +24,12 @@ _NO_NAME: Final = re.compile(r"[^a-z0-9]+")
 
 
 def write_described_pack(
-    folder: Path, document: Mapping[str, Any], original: Mapping[str, Any], unresolved: tuple[str, ...] = ()
+    folder: Path,
+    document: Mapping[str, Any],
+    original: Mapping[str, Any],
+    unresolved: tuple[str, ...] = (),
+    *,
+    moves: bool = False,
 ) -> Path:
     """Write a contract pack for a description; return its folder.
 
@@ -33,6 +38,7 @@ def write_described_pack(
         document: the description as one OpenAPI 3 document.
         original: the description as it was read.
         unresolved: references to other files that lead nowhere.
+        moves: whether the statement has a motion map, so that motion is judged as well.
 
     Raises:
         OSError: it cannot be written.
@@ -42,7 +48,7 @@ def write_described_pack(
     info = info if isinstance(info, dict) else {}
     name = _NO_NAME.sub("-", str(info.get("title", "api")).lower()).strip("-") or "api"
     taken, sent = _formats(document)
-    more = {"rest-formats": len(sent) > 1, "xml-security": any("xml" in name for name in taken)}
+    more = {"motion": moves, "rest-formats": len(sent) > 1, "xml-security": any("xml" in name for name in taken)}
     classes = [*_CLASSES, *(name for name, there in more.items() if there)]
     lines = [
         f"name = {basic_string(name)}",

@@ -214,7 +214,10 @@ class ChecksPlugin:
     def pytest_sessionfinish(self) -> None:
         """Stop the robot at the end of the session, also after Ctrl-C."""
         if self._connected is not None and self._connected.rest is not None:
+            from conformance.api.rest.stops import send_stops  # noqa: PLC0415 - see pytest_collect_file()
+
             self._connected.device.leave_at_rest(self._connected.rest)
+            send_stops(self._connected.rest)
 
     @pytest.fixture(scope="session")
     def run(self) -> Run:

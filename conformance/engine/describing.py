@@ -98,6 +98,8 @@ def described_contract(
     endpoints: Endpoints,
     connection: Connection,
     out: Path,
+    *,
+    moves: bool = False,
 ) -> tuple[Contract, Endpoints, tuple[str, ...]]:
     """Return the contract of an API's own description, the endpoints with its base URL, and remarks.
 
@@ -108,6 +110,7 @@ def described_contract(
         endpoints: what the statement or the options say.
         connection: deadline, credentials and TLS.
         out: folder of the results, in which the pack is written.
+        moves: whether the statement has a motion map.
 
     Raises:
         DescriptionError: there is no usable description, or it does not say where the API is.
@@ -122,7 +125,7 @@ def described_contract(
         raise DescriptionError(
             f"{source} names no server: say where the API is with --base-url, as in --base-url http://robot:8000"
         )
-    folder = write_described_pack(out / FOLDER, found.document, found.original, found.unresolved)
+    folder = write_described_pack(out / FOLDER, found.document, found.original, found.unresolved, moves=moves)
     Contract.load.cache_clear()
     remarks = () if base_url or endpoints.rest else found.remarks
     return Contract.load(folder), msgspec.structs.replace(endpoints, rest=base), remarks

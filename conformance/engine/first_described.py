@@ -41,6 +41,9 @@ allow = [
 # Operations that must never be called, whatever else is said.
 never = [{never}]
 
+# [motion.state], [motion.goto] and [motion.stop] say how the device moves, so that its motion is judged as well:
+# docs/motion.md.
+
 [values]
 # Values for parameters that the description gives none for. Without them, ids are taken from what the device lists.
 {values}"""

@@ -11,6 +11,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.stops import send_stops
 from conformance.documents.readable import unreadable
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
@@ -158,6 +159,7 @@ def look_again(run: Run, connection: Connection, rest: RestInterface | None = No
     finally:
         if moves and rest is not None:
             rest.device.leave_at_rest(rest)
+            send_stops(rest)
 
 
 def _may_be_sent(run: Run, exchange: Exchange) -> bool:

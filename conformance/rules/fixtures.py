@@ -13,7 +13,10 @@ from conformance.api.rest.observers import Observer
 from conformance.api.rest.values import Values
 from conformance.api.soap.observer import PASSIVE, SoapObserver, answers_of
 from conformance.api.soap.service import SoapService
+from conformance.scenarios.motion.mapped import Mapped
 from conformance.scenarios.other_exchanges import OtherExchanges
+from conformance.scenarios.scenario import NotPossibleError
+from conformance.statement.motion_map import MotionMap
 from conformance.transport.client import Connection
 from conformance.transport.exchange import Listener
 from conformance.verdict.observers import Observers
@@ -50,6 +53,22 @@ def other_exchanges(run: Run, interfaces: Interfaces) -> OtherExchanges | None:
 def values(run: Run) -> Values:
     """Return the values that the run knows for parameters and bodies: the user's, and those seen in responses."""
     return Values(run.statement.values)
+
+
+@pytest.fixture(scope="session")
+def motion(run: Run) -> MotionMap:
+    """Return the motion map; the class that needs it is judged only where there is one."""
+    if run.statement.motion_map is None:
+        raise NotPossibleError("the statement has no motion map")
+    return run.statement.motion_map
+
+
+@pytest.fixture(scope="session")
+def mapped(interfaces: Interfaces, motion: MotionMap) -> Mapped:
+    """Return the device that is moved by its map."""
+    if interfaces.rest is None:
+        raise NotPossibleError("the device has no REST interface")
+    return Mapped(interfaces.rest, motion)
 
 
 @pytest.fixture

@@ -42,6 +42,7 @@ class ControlResult:
         seed: seed of the run.
         outcome: outcome of the run, or None when it did not take place.
         not_tried: why the run did not take place, or empty.
+        breaks: requirements that the web server in front breaks by itself.
     """
 
     robot: str
@@ -49,13 +50,14 @@ class ControlResult:
     seed: int
     outcome: Outcome | None
     not_tried: str = ""
+    breaks: frozenset[str] = frozenset()
 
     @property
     def false_positives(self) -> dict[str, str]:
         """Return the MUST requirements that the good device failed, with the reasons."""
         if self.outcome is None:
             return {}
-        return {id_: self.outcome.reasons[id_] for id_, value in self.outcome.verdicts.items() if value == "fail"}
+        return {id_: self.outcome.reasons[id_] for id_ in self.outcome.fails - self.breaks}
 
     @property
     def unjudged(self) -> dict[str, str]:
@@ -68,8 +70,11 @@ class ControlResult:
 
     @property
     def conformant(self) -> bool:
-        """Return whether the device was found conformant or the run did not take place."""
-        return self.outcome is None or (self.outcome.exit_code == 0 and not self.false_positives)
+        """Return whether the device was found conformant, its front's faults aside, or the run did not take place."""
+        if self.outcome is None:
+            return True
+        blamed = self.outcome.fails
+        return blamed == self.breaks if blamed & self.breaks else self.outcome.exit_code == 0 and not blamed
 
 
 @dataclass
@@ -147,7 +152,8 @@ def run_controls(
         try:
             name = case.variant.name if case.variant else ""
             outcome, not_tried = _judge(contract, case, effort, domain, requirements)
-            return ControlResult(case.device.name, name, case.seed, outcome, not_tried)
+            breaks = case.variant.breaks if isinstance(case.variant, Front) else frozenset()
+            return ControlResult(case.device.name, name, case.seed, outcome, not_tried, breaks)
         finally:
             with lock:
                 domains.append(domain)

@@ -7,8 +7,9 @@ import msgspec
 
 from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
-from conformance.contract.toml_file import Positive, Text, TomlFileError, read_toml
+from conformance.contract.toml_file import Positive, Text, TomlFileError, fit, read_toml
 from conformance.statement.endpoints import Auth, Endpoints, beside
+from conformance.statement.motion_map import MotionMap
 
 
 class StatementError(TomlFileError):
@@ -61,6 +62,7 @@ class Statement(msgspec.Struct, frozen=True):
         claims: the claimed conformance classes; None: none were named.
         values: values to use in requests, by the name of a parameter or member.
         calls: what may be called.
+        motion_map: how a device moves of which only its description is known, or None.
     """
 
     robot: dict[str, str] = {}
@@ -69,6 +71,7 @@ class Statement(msgspec.Struct, frozen=True):
     load: Load = Load()
     values: dict[str, tuple[Any, ...]] = {}
     calls: Calls = Calls()
+    motion_map: MotionMap | None = None
 
     @property
     def figures(self) -> dict[str, dict[str, float]]:
@@ -141,6 +144,10 @@ class _Claims(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return (*(profiles[self.profile] if self.profile else ()), *(self.classes or ()))
 
 
+class _Map(msgspec.Struct, frozen=True):
+    motion: MotionMap
+
+
 class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The tables of a statement file. A pack extends it with its own tables."""
 
@@ -152,14 +159,16 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     calls: Calls = Calls()
     api: Api = Api()
     auth: Auth | None = None
+    motion: Any = None
 
     def read(self, contract: Contract, path: Path) -> Statement:
         """Return the statement.
 
         Raises:
-            StatementError: it claims an unknown class or profile.
+            StatementError: it claims an unknown class or profile, or its motion map has an unknown key.
         """
-        return Statement(**self.common(contract, path))
+        moves = None if self.motion is None else fit({"motion": self.motion}, _Map, str(path), StatementError).motion
+        return Statement(**self.common(contract, path), motion_map=moves)
 
     def common(self, contract: Contract, path: Path) -> dict[str, Any]:
         """Return the attributes that every statement has, by name.
@@ -195,6 +204,16 @@ class _Addresses(msgspec.Struct, frozen=True):
     api: Api = Api()
     endpoints: Endpoints = Endpoints()
     auth: Auth | None = None
+    motion: Any = None
+
+
+def has_motion_map(path: Path) -> bool:
+    """Return whether a statement on a device with a description has a motion map.
+
+    Raises:
+        StatementError: the statement cannot be read.
+    """
+    return read_toml(path, _Addresses, StatementError).motion is not None
 
 
 def api_of(path: Path) -> Api:

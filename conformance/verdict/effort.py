@@ -60,6 +60,10 @@ SPEEDS = (Speed("local", 40, 1.0), Speed("near", 130, 0.2), Speed("far", 800, 0.
 _CLEARLY = 1.25
 
 
+# A robot that takes longer for a response gets proportionally more time, ms.
+_UNHURRIED_MS = 100.0
+
+
 @dataclass
 class Tally:
     """Counts of generated cases.
@@ -127,9 +131,9 @@ class Effort:
         """Time after which one exploration stops trying further cases, s.
 
         It is a bound for robots that take far longer than planned, so that the same seed gives the same cases on a busy
-        machine as well.
+        machine as well. A slow robot gets fewer cases, but the fewest take longer than a fast robot's many.
         """
-        return _LONGEST * self.budget_s
+        return _LONGEST * self.budget_s * max(1.0, self.usual_ms / _UNHURRIED_MS)
 
     @property
     def slow(self) -> bool:

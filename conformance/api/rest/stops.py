@@ -2,6 +2,7 @@
 
 import math
 import time
+from contextlib import suppress
 from typing import Final
 
 from conformance.api.rest.inputs import usual_inputs, written
@@ -15,11 +16,14 @@ _LONGEST_S: Final = 5.0
 
 
 def send_stops(api: RestInterface) -> None:
-    """Send each operation that the description marks as a stop (x-roaas-stop), if the run has called what may move.
+    """Stop the device by its motion map, or by what the description marks (x-roaas-stop), if it may have been moved.
 
-    Each is sent with the values that the run knows for it, such as the ids of the newest moves. Takes at most a few
-    seconds; never raises.
+    Each operation is sent with the values that the run knows for it, such as the ids of the newest moves. Takes at most
+    a few seconds; never raises.
     """
+    with suppress(NoAnswerError, NotPermittedError):
+        if api.still is not None:
+            api.still()
     if not api.call_rules.allow or math.isinf(api.client.connection.acted_at):
         return
     until = time.monotonic() + _LONGEST_S

@@ -50,11 +50,13 @@ class Front:
         says: a short description.
         command: returns the command that starts the server in the foreground, from the ports and a folder of its own;
             raises NotInstalledError where the server is not installed.
+        breaks: requirements that the server itself breaks with default settings, whatever is behind it.
     """
 
     name: str
     says: str
     command: Callable[[Ports, Path], list[str]]
+    breaks: frozenset[str] = frozenset()
 
 
 def _nginx(ports: Ports, folder: Path) -> list[str]:
@@ -86,7 +88,8 @@ def _written(template: str, folder: Path, values: dict[str, str]) -> str:
 
 FRONTS = (
     Front("nginx", "behind nginx", _nginx),
-    Front("haproxy", "behind haproxy", _haproxy),
+    # It takes two equal Host lines for one, where RFC 9112 3.2 demands 400.
+    Front("haproxy", "behind haproxy", _haproxy, frozenset({"http/host-missing"})),
     Front("apache", "behind Apache httpd", _apache),
     Front("go-reverse-proxy", "behind Go's httputil.ReverseProxy", _go),
     Front("nginx-http10", "HTTP/1.0 behind nginx", _nginx),

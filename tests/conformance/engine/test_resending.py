@@ -53,6 +53,7 @@ def _sent_again(monkeypatch, run, answer=_GOOD):
     stopped = []
     monkeypatch.setattr(resending, "send_again", lambda request, _: Exchange(request, answer))
     device = SimpleNamespace(leave_at_rest=stopped.append)
+    monkeypatch.setattr(resending, "send_stops", stopped.append)
     look_again(run, Connection(), SimpleNamespace(device=device))
     return next(iter(run.judge.evidence["http/head"].findings.values())).again, bool(stopped)
 

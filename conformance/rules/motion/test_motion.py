@@ -1,0 +1,212 @@
+"""Whether a device moves as its motion map says (statement, tables ``[motion.*]``)."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from statistics import median
+
+from conformance.rules.motion.judging import ALL, at, legs_of, named, off, reached, usable
+from conformance.scenarios.motion.plays import many_commands, new_targets, repeated, several_clients, stops, targets
+from conformance.scenarios.motion.trace import SEVERAL, Leg, Reading, place
+from conformance.scenarios.rule import Case, NotTested, Outcome, rule
+from conformance.statement.motion_map import MotionMap
+
+# A reading between two others that a device needs for a step of its own, s.
+_APART_S = 0.15
+_FASTER = 1.1
+
+
+@rule("motion/reaches", on=(targets,))
+def reaches(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether each target within the limits is reached in time."""
+    for leg in trace:
+        yield from reached(leg, leg.commands[-1], motion)
+
+
+@rule("motion/stays", on=(targets,))
+def stays(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether the device stays at a target that it has reached."""
+    for leg in trace:
+        seen, goal = usable(leg), leg.commands[-1]
+        arrived = _first_at(seen, goal.targets, motion)
+        if arrived is None:
+            continue
+        last = seen[-SEVERAL:]
+        apart = off(at(last, motion), goal.targets, motion, 1.5)
+        yield Case(not apart, goal.attempt, f"{named(goal.targets)} kept", observed=f"{apart} after it was reached")
+
+
+def _first_at(readings: tuple[Reading, ...], goal: dict[str, float], motion: MotionMap) -> int | None:
+    """Return the index of the first of several readings in a row at a position."""
+    for index in range(len(readings) - SEVERAL + 1):
+        if not any(off(one.values, goal, motion) for one in readings[index : index + SEVERAL]):
+            return index
+    return None
+
+
+@rule("motion/way", on=ALL)
+def way(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether the device stays within its limits on all its ways; where it begins beyond them is its affair."""
+    for leg in legs_of(trace):
+        seen = usable(leg)
+        for name, axis in motion.state.axes.items():
+            room = motion.tolerance(name)
+            least, greatest = axis.limits[0] - room, axis.limits[1] + room
+            places = [place(seen[i : i + SEVERAL], name) for i in range(len(seen) - SEVERAL + 1)]
+            inside = next((i for i, one in enumerate(places) if least <= one <= greatest), len(places))
+            beyond = [one for one in places[inside:] if not least <= one <= greatest]
+            if places:
+                found = f"{name} {max(beyond, key=abs):.4g}" if beyond else ""
+                yield Case(
+                    not beyond,
+                    leg.commands[-1].attempt,
+                    f"{name} from {axis.limits[0]:g} to {axis.limits[1]:g} on the way to {leg.what}",
+                    observed=found,
+                    cause=name,
+                )
+
+
+@rule("motion/speed", on=ALL)
+def speed(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether an axis moves no faster than declared."""
+    limited = {name: axis.speed for name, axis in motion.state.axes.items() if axis.speed is not None}
+    if not limited:
+        yield NotTested("the map declares no greatest speed")
+    for leg, (name, most) in itertools.product(legs_of(trace), limited.items()):
+        seen = usable(leg)
+        fastest = 0.0
+        for index, one in enumerate(seen):
+            later = next((two for two in seen[index:] if two.sent - one.received > _APART_S), None)
+            if later is not None:
+                moved = abs(later.values[name] - one.values[name]) - motion.tolerance(name)
+                fastest = max(fastest, moved / (later.received - one.sent))
+        yield Case(
+            fastest <= _FASTER * most,
+            leg.commands[-1].attempt,
+            f"{name} at {most:g} a second at most",
+            observed=f"{fastest:.3g} a second on the way to {leg.what}",
+            cause=name,
+        )
+
+
+def _usual_s(leg: Leg) -> float:
+    return median(one.received - one.sent for one in leg.readings) if leg.readings else 0.0
+
+
+def _stopped(leg: Leg, motion: MotionMap) -> tuple[tuple[Reading, ...], NotTested | Case | None]:
+    """Return the readings from when the device must rest, or why they cannot be judged."""
+    stop, (goal, order) = motion.stop, leg.commands[:2]
+    if stop is None or not order.accepted:
+        return (), Case(holds=False, exchange=order.attempt, expected="a 2xx for a stop under way")
+    before = [one for one in usable(leg) if one.received <= order.sent]
+    axis = max(goal.targets, key=lambda name: abs(goal.targets[name] - leg.start.get(name, 0.0)))
+    left = abs(goal.targets[axis] - before[-1].values[axis]) if before else 0.0
+    if left < 4 * motion.tolerance(axis) or abs(before[-1].values[axis] - leg.start[axis]) < motion.tolerance(axis):
+        return (), NotTested("the device was not under way when it was stopped")
+    due = order.sent + stop.rests_within_s + _usual_s(leg)
+    readings = leg.after(due)
+    return readings, None if len(readings) > 2 * SEVERAL else NotTested("the state could not be read after the stop")
+
+
+@rule("motion/stop", on=(stops,))
+def stop_rests(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether a stop under way stops the device in time, before its target."""
+    for leg in trace:
+        readings, unusable = _stopped(leg, motion)
+        if unusable is not None:
+            yield unusable
+            continue
+        goal, order = leg.commands[:2]
+        where = at(readings[:SEVERAL], motion)
+        soon = [one for one in readings if one.sent < readings[0].sent + 0.5][-SEVERAL:]
+        moved = off(at(tuple(soon), motion), where, motion)
+        arrived = not off(where, goal.targets, motion)
+        rests_s = motion.stop.rests_within_s if motion.stop else 0.0
+        yield Case(
+            not moved and not arrived,
+            order.attempt,
+            f"rest {rests_s:g} s after {leg.what}",
+            observed=f"{moved}, {soon[-1].sent - order.sent:.2f} s after the stop"
+            if moved
+            else f"the target reached all the same: {named(where)}",
+            cause="moves" if moved else "arrived",
+        )
+
+
+@rule("motion/stop-lasts", on=(stops,))
+def stop_lasts(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether a device that was stopped stays where it is, and does not resume its way."""
+    for leg in trace:
+        readings, unusable = _stopped(leg, motion)
+        if unusable is None:
+            where, last = at(readings[:SEVERAL], motion), at(readings[-SEVERAL:], motion)
+            moved = off(last, where, motion)
+            after = readings[-1].sent - leg.commands[1].sent
+            yield Case(
+                not moved, leg.commands[1].attempt, f"rest after {leg.what}", f"{moved}, {after:.1f} s after the stop"
+            )
+
+
+@rule("motion/new-target", on=(new_targets,))
+def new_target(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
+    """Judge what a second target under way does: it displaces the first for good, or is refused, as declared."""
+    for leg in trace:
+        first, second = leg.commands[:2]
+        if motion.goto.while_moving == "refused":
+            yield Case(second.refused, second.attempt, "4xx for a second move under way")
+            if second.refused:
+                yield from reached(leg, first, motion)
+        else:
+            yield from reached(leg, second, motion)
+            yield from _given_up(leg, motion)
+
+
+def _given_up(leg: Leg, motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether a device that has another target gives up the first one within the time to settle."""
+    first, second = leg.commands[:2]
+    axis = max(first.targets, key=lambda name: abs(first.targets[name] - leg.start.get(name, 0.0)))
+    ahead = 1 if first.targets[axis] > leg.start[axis] else -1
+    readings = leg.after(second.answered + motion.goto.settle_s)
+    if not second.accepted or len(readings) < SEVERAL:
+        return
+    places = [ahead * one.values[axis] for one in readings]
+    farther = max(places) - places[0]
+    yield Case(
+        farther <= 2 * motion.tolerance(axis),
+        second.attempt,
+        f"{axis} no nearer to the first target {motion.goto.settle_s:g} s after a second one was accepted",
+        observed=f"{farther:.3g} nearer after that",
+        cause="first target",
+    )
+
+
+@rule("motion/last-of-many", on=(many_commands,))
+def last_of_many(trace: Leg, motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether the device ends at the last accepted of many targets."""
+    accepted = [one for one in trace.commands if one.accepted]
+    if not accepted:
+        yield Case(holds=False, exchange=trace.commands[-1].attempt, expected="a 2xx for one of many moves at least")
+    else:
+        yield from reached(trace, accepted[-1], motion)
+
+
+@rule("motion/repeated", on=(repeated,))
+def repetition(trace: Leg, motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether a move that is sent twice ends where it ends when it is sent once."""
+    accepted = [one for one in trace.commands if one.accepted]
+    yield from reached(trace, (accepted or list(trace.commands))[-1], motion)
+
+
+@rule("motion/one-client", on=(several_clients,))
+def one_client(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether of several clients' targets one is reached, and no mix of two."""
+    for leg in trace:
+        accepted = [one for one in leg.commands if one.accepted]
+        seen = usable(leg)[-SEVERAL:]
+        if not accepted or len(seen) < SEVERAL:
+            yield NotTested("no client's move was accepted" if not accepted else "the state could not be read")
+            continue
+        here = at(seen, motion)
+        fits = any(not off(here, one.targets, motion) for one in accepted)
+        yield Case(fits, accepted[-1].attempt, "the target of one client", observed=named(here))

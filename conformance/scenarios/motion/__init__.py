@@ -1,0 +1,1 @@
+"""Move a device by its motion map, and record where it is."""

@@ -1,0 +1,186 @@
+"""A device that is read, commanded and stopped by its motion map."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from conformance.api.rest.interface import RestInterface
+from conformance.documents.json_text import read_json
+from conformance.observe.clock import WALL_CLOCK, Clock
+from conformance.scenarios.motion.templates import NoValueError, at, filled, names_in, seconds_of
+from conformance.scenarios.motion.trace import SEVERAL, Command, Leg, Reading
+from conformance.statement.motion_map import MotionMap
+from conformance.transport.client import Headers
+from conformance.transport.exchange import Exchange, NoAnswerError
+
+_PACE_S: Final = 0.02
+# For so long a device that has arrived is watched, s.
+_STAYS_S: Final = 0.3
+# Beyond the time that it has, whoever reads is patient for so long, s.
+_LONGER_S: Final = 0.3
+_STOP_S: Final = 2.0
+
+# A device that takes one move at a time may finish the one before, s.
+_FINISHES_S: Final = 1.0
+_AGAIN_S: Final = 0.05
+
+Position = dict[str, float]
+
+
+def _content(body: Any) -> tuple[Headers, bytes]:
+    """Return header fields and octets of a body; None: there is none."""
+    return ((), b"") if body is None else ((("Content-Type", "application/json"),), json.dumps(body).encode())
+
+
+class Mapped:
+    """One device.
+
+    Args:
+        api: its REST interface.
+        motion: its map.
+        clock: by which it is watched.
+
+    Attributes:
+        home: where it is brought between scenarios: where it was at first, within its limits.
+    """
+
+    def __init__(self, api: RestInterface, motion: MotionMap, clock: Clock = WALL_CLOCK) -> None:
+        self.api, self.motion, self.clock = api, motion, clock
+        self._answer: Any = None
+        self._read_at = 0.0
+        first = self.read().values
+        self.home = {name: self._inside(name, first.get(name, 0.0)) for name in motion.state.axes}
+        api.still = self.stop
+
+    def _inside(self, axis: str, value: float) -> float:
+        least, greatest = self.motion.state.axes[axis].limits
+        margin = (greatest - least) / 4
+        return min(max(value, least + margin), greatest - margin)
+
+    @property
+    def takes_s(self) -> float:
+        """Time that the device has for a move, without the time to settle, s."""
+        return self._lasts_s or self.motion.goto.within_s
+
+    @property
+    def _lasts_s(self) -> float:
+        """How long a move lasts, s; 0: as long as the way takes."""
+        goto = self.motion.goto
+        return goto.seconds if "seconds" in names_in([goto.send, goto.body]) else 0.0
+
+    def read(self) -> Reading:
+        """Read the state.
+
+        Raises:
+            NoAnswerError: there is no response.
+        """
+        state, wait = self.motion.state, self._read_at + _PACE_S - self.clock.now()
+        self.clock.sleep(wait)
+        self._read_at = sent = self.clock.now()
+        method, _, path = state.read.partition(" ")
+        exchange = self.api.client.send(method, path, headers=(("Accept", "application/json"),))
+        received, document = self.clock.now(), read_json(exchange.response.body).value
+        try:
+            values = {name: float(at(document, axis.at)) for name, axis in state.axes.items()}
+        except (NoValueError, TypeError, ValueError):
+            values = {}
+        try:
+            stamp = seconds_of(at(document, state.stamp)) if state.stamp else None
+        except NoValueError:
+            stamp = None
+        return Reading(sent, received, values if exchange.response.ok else {}, stamp, exchange)
+
+    def request_of(self, targets: Mapping[str, Any]) -> tuple[str, str, Headers, bytes]:
+        """Return method, path, header fields and body of a move; axes without a target stay at home."""
+        goto = self.motion.goto
+        values = {**self.home, **targets, "seconds": goto.seconds}
+        method, _, path = goto.send.partition(" ")
+        return method, filled(path, values, self._answer), *_content(filled(goto.body, values, self._answer))
+
+    def goto(self, targets: Mapping[str, float], ends: Mapping[str, float] | None = None) -> Command:
+        """Send a move; ``ends``: where it must end, if not at the targets.
+
+        Raises:
+            NoAnswerError: there is no response.
+        """
+        method, path, fields, octets = self.request_of(targets)
+        sent = self.clock.now()
+        exchange = self.api.client.send(method, path, headers=fields, body=octets)
+        command = Command(sent, self.clock.now(), {**self.home, **(ends or targets)}, exchange)
+        if command.accepted:
+            self.note(exchange)
+        return command
+
+    def note(self, exchange: Exchange) -> None:
+        """Keep the response to an accepted move: a stop may name its id."""
+        self._answer = read_json(exchange.response.body).value
+
+    def stop(self) -> Command | None:
+        """Send the stop; return None if the map has none, or it names what is not known yet.
+
+        Raises:
+            NoAnswerError: there is no response.
+        """
+        stop = self.motion.stop
+        if stop is None:
+            return None
+        method, _, path = stop.send.partition(" ")
+        try:
+            path, body = filled(path, {}, self._answer), filled(stop.body, {}, self._answer)
+        except NoValueError:
+            return None
+        fields, octets = _content(body)
+        sent = self.clock.now()
+        exchange = self.api.client.send(
+            method, path, headers=fields, body=octets, timeout_s=max(_STOP_S, stop.rests_within_s)
+        )
+        return Command(sent, self.clock.now(), {}, exchange)
+
+    def watch(self, until: float, is_over: Callable[[list[Reading]], bool] = lambda _: False) -> list[Reading]:
+        """Read until a time, s of the clock, and once more after it, or until ``is_over``."""
+        readings: list[Reading] = []
+        while True:
+            late = self.clock.now() > until
+            readings.append(self.read())
+            if late or is_over(readings):
+                return readings
+
+    def is_at(self, targets: Mapping[str, float], readings: list[Reading]) -> bool:
+        """Return whether the last readings show the device at a position."""
+        last = readings[-SEVERAL:]
+        return len(last) == SEVERAL and all(self.is_near(one.values, targets) for one in last)
+
+    def is_near(self, here: Mapping[str, float], there: Mapping[str, float]) -> bool:
+        """Return whether a position is another one, within the tolerances."""
+        return bool(here) and all(abs(here[name] - there[name]) <= self.motion.tolerance(name) for name in there)
+
+    def leg(self, what: str, *commands: Command, start: Position, readings: list[Reading] | None = None) -> Leg:
+        """Watch until the last accepted target is reached and kept for a moment, or its time is over."""
+        due = commands[-1].answered + self.takes_s + self.motion.goto.settle_s
+        goal = next((one.targets for one in reversed(commands) if one.accepted and one.targets), None)
+        seen = list(readings or ())
+        if goal is not None:
+            seen += self.watch(due + _LONGER_S, lambda so_far: self.is_at(goal, so_far))
+            # A move with a duration lasts for that, also where the way is short.
+            seen += self.watch(max(self.clock.now() + _STAYS_S, commands[-1].answered + self._lasts_s))
+        return Leg(what, start, commands, tuple(seen), due)
+
+    def go(self, what: str, targets: Mapping[str, float], ends: Mapping[str, float] | None = None) -> Leg:
+        """Send one move and watch it; ``ends``: where it must end, if not at the targets."""
+        start, until = self.read().values, self.clock.now() + _FINISHES_S
+        command = self.goto(targets, ends)
+        while self.motion.goto.while_moving == "refused" and command.refused and self.clock.now() < until:
+            self.clock.sleep(_AGAIN_S)
+            command = self.goto(targets, ends)
+        return self.leg(what, command, start=start)
+
+    def bring_home(self) -> bool:
+        """Stop what goes on, and bring the device home; return whether it is there."""
+        try:
+            self.stop()
+            leg = self.go("home", {})
+        except NoAnswerError:
+            return False
+        return self.is_at(self.home, list(leg.readings))

@@ -1,0 +1,83 @@
+"""Fill the templates of a motion map, and read values at JSON pointers."""
+
+from __future__ import annotations
+
+import datetime as dt
+import re
+from collections.abc import Mapping
+from typing import Any, Final
+
+_NAME: Final = re.compile(r"\{([^{}]+)\}")
+
+
+class NoValueError(LookupError):
+    """Raised when a template names something that is not known; the message says what."""
+
+
+def filled(template: Any, values: Mapping[str, Any], answer: Any = None) -> Any:
+    """Return a template with its values.
+
+    Args:
+        template: JSON; a text that is nothing but "{name}" becomes the value, in any other text the value is inserted.
+        values: by name.
+        answer: JSON that the device sent, for "{goto:POINTER}".
+
+    Raises:
+        NoValueError: a value is not known.
+    """
+    if isinstance(template, Mapping):
+        return {key: filled(item, values, answer) for key, item in template.items()}
+    if isinstance(template, list | tuple):
+        return [filled(item, values, answer) for item in template]
+    if not isinstance(template, str):
+        return template
+    whole = _NAME.fullmatch(template)
+    if whole:
+        return _value(whole[1], values, answer)
+    return _NAME.sub(lambda found: str(_value(found[1], values, answer)), template)
+
+
+def names_in(template: Any) -> set[str]:
+    """Return the names that a template contains."""
+    if isinstance(template, Mapping):
+        return set().union(*map(names_in, template.values()))
+    if isinstance(template, list | tuple):
+        return set().union(*map(names_in, template))
+    return set(_NAME.findall(template)) if isinstance(template, str) else set()
+
+
+def _value(name: str, values: Mapping[str, Any], answer: Any) -> Any:
+    if name in values:
+        return values[name]
+    source, _, pointer = name.partition(":")
+    if source == "goto" and answer is not None:
+        return at(answer, pointer)
+    raise NoValueError(f"the template's {{{name}}} is not known")
+
+
+def at(document: Any, pointer: str) -> Any:
+    """Return the value at a JSON pointer (RFC 6901).
+
+    Raises:
+        NoValueError: there is none.
+    """
+    value = document
+    for step in pointer.split("/")[1:]:
+        key = step.replace("~1", "/").replace("~0", "~")
+        try:
+            value = value[int(key)] if isinstance(value, list) else value[key]
+        except (LookupError, TypeError, ValueError) as error:
+            raise NoValueError(f"the response has nothing at {pointer}") from error
+    return value
+
+
+def seconds_of(stamp: Any) -> float | None:
+    """Return a stamp as seconds: a number, or a date (RFC 3339); None if it is neither."""
+    if isinstance(stamp, bool):
+        return None
+    if isinstance(stamp, int | float):
+        return float(stamp)
+    try:
+        return dt.datetime.fromisoformat(str(stamp)).timestamp()
+    except ValueError:
+        return None

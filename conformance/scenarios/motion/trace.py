@@ -1,0 +1,118 @@
+"""What was recorded of a device that moves by its map: readings, commands and what was attempted at rest.
+
+Times are s of the run's monotonic clock; positions are in the units of the map's axes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from statistics import median
+
+from conformance.transport.exchange import Attempt, Exchange
+
+#: So many readings in a row show where a device is, whatever one of them says.
+SEVERAL = 3
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One reading of the state.
+
+    Attributes:
+        sent, received: when it was requested, and when the response had arrived.
+        values: positions by axis; empty: the response has not all of them.
+        stamp: the device's time, s; None: there is none.
+        exchange: request and response.
+    """
+
+    sent: float
+    received: float
+    values: dict[str, float]
+    stamp: float | None
+    exchange: Exchange
+
+
+@dataclass(frozen=True)
+class Command:
+    """A move that was sent, or a stop.
+
+    Attributes:
+        sent, answered: when.
+        targets: positions by axis; empty for a stop.
+        attempt: request and response.
+    """
+
+    sent: float
+    answered: float
+    targets: dict[str, float]
+    attempt: Attempt
+
+    @property
+    def accepted(self) -> bool:
+        """Whether it was answered 2xx."""
+        return isinstance(self.attempt, Exchange) and self.attempt.response.ok
+
+    @property
+    def refused(self) -> bool:
+        """Whether it was answered 4xx."""
+        return isinstance(self.attempt, Exchange) and 400 <= self.attempt.response.status < 500  # noqa: PLR2004
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One or more commands, and the readings after them.
+
+    Attributes:
+        what: as a noun phrase.
+        start: where the device was, by axis.
+        commands: in order.
+        readings: from the first command on.
+        due: when the last accepted target must have been reached.
+    """
+
+    what: str
+    start: dict[str, float]
+    commands: tuple[Command, ...]
+    readings: tuple[Reading, ...]
+    due: float
+
+    def after(self, moment: float) -> tuple[Reading, ...]:
+        """Return the usable readings that were requested after a moment."""
+        return tuple(one for one in self.readings if one.sent >= moment and one.values)
+
+
+@dataclass(frozen=True)
+class Tried:
+    """One attempt that must move nothing.
+
+    Attributes:
+        kind: beyond, invalid, incomplete or unauthorised.
+        what: as a noun phrase.
+        attempt: request and response; None if no response was awaited, or nothing was sent.
+    """
+
+    kind: str
+    what: str
+    attempt: Attempt | None
+
+
+@dataclass(frozen=True)
+class Quiet:
+    """Attempts that must move nothing, made at rest, and the readings after them.
+
+    Attributes:
+        where: where the device was, by axis.
+        tried: the attempts.
+        readings: after the last of them.
+        alone: the same, one attempt at a time, if the device moved after all of them.
+    """
+
+    where: dict[str, float]
+    tried: tuple[Tried, ...]
+    readings: tuple[Reading, ...]
+    alone: tuple[Quiet, ...] = ()
+
+
+def place(readings: tuple[Reading, ...], axis: str) -> float:
+    """Return where an axis is by the median of some readings."""
+    return median(one.values[axis] for one in readings)
