@@ -212,7 +212,7 @@ def test_types_that_a_framework_converts_are_told_once(run):
         for one in ({"n": "1"}, {"n": "2"}, {"n": True}, at)
     ]
     found = _failed(requests.invalid_refused, Survey(tuple(probes)), run)
-    assert sorted(one.cause for one in found) == ["boolean integer", "number ['string', 'null']", "string integer"]
+    assert sorted(one.cause for one in found) == ["a boolean converted", "number ['string', 'null']", "string integer"]
 
 
 @pytest.mark.parametrize(
