@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,11 @@ import msgspec
 
 from conformance.contract.pack import Contract
 from conformance.documents.description import is_url
+from conformance.documents.openapi import operations_of
 from conformance.engine.connecting import connection_of, keyed
 from conformance.engine.describing import described_contract
 from conformance.statement.endpoints import Endpoints
+from conformance.statement.motion_map import shape_of
 from conformance.statement.statement import (
     Api,
     Calls,
@@ -81,8 +84,25 @@ def _described(
         raise StatementError(str(error)) from error
     options["remarks"] = remarks
     declared = load_statement(statement, contract) if statement else empty_statement(contract)
+    _check_map(declared, contract)
     where = keyed(where, contract.openapi)
     return _apply(msgspec.structs.replace(declared, endpoints=where), options, contract), contract
+
+
+def _check_map(declared: Statement, contract: Contract) -> None:
+    """Check that the description has the operations that the motion map names.
+
+    Raises:
+        StatementError: it lacks one.
+    """
+    labels = [operation.label for operation in operations_of(contract)]
+    for call in declared.motion_map.calls if declared.motion_map else ():
+        if shape_of(call) not in map(shape_of, labels):
+            near = difflib.get_close_matches(call, labels, 1, 0)
+            raise StatementError(
+                f"[motion] names {call!r}, which the description does not have"
+                + (f"; did you mean {near[0]!r}?" if near else "")
+            )
 
 
 def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> Statement:

@@ -82,9 +82,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
     token = Path(token_file).read_text(encoding="utf-8").strip() if token_file else None
     connection = Connection(timeout_s=timeout_s or _TIMEOUT_S, ca_file=Path(ca_file) if ca_file else None, token=token)
     if recorded:
-        return _judge_recorded(
-            document, result if result.is_dir() else result.parent, statement_file, pack, requirement
-        )
+        return _judge_recorded(document, folder, statement_file, pack, requirement)
     try:
         chosen = list(findings(document, requirement))
         if not chosen:
@@ -92,7 +90,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
         if statement_file:
             given = {"token_file": token_file, "ca_file": ca_file, "timeout_s": timeout_s}
             requirements = {id_ for id_, _ in chosen}
-            contract = _contract_of(document, pack)
+            contract = _contract_of(document, pack, folder)
             return _judge_again(document, contract, statement_file, given, requirements, allow_motion=allow_motion)
         acting = [] if allow_motion else [failure for _, failure in chosen if moves(failure)]
         chosen = [one for one in chosen if one[1] not in acting]
@@ -101,7 +99,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
         if token:
             _check_addresses([failure for _, failure in chosen], trusted)
         # The contract at hand judges what was judged by it.
-        contract = _contract_of(document, pack)
+        contract = _contract_of(document, pack, folder)
         rest = document["target"].get("rest") if contract else None
         replayed = [send_again(id_, failure, connection, rest, contract) for id_, failure in chosen]
     except (KeyError, TypeError, ValueError) as error:
@@ -176,7 +174,7 @@ def _judge_recorded(
     from conformance.statement.statement import StatementError, empty_statement, load_statement  # noqa: PLC0415
     from conformance.verdict.run import Run  # noqa: PLC0415
 
-    contract = _contract_of(document, pack)
+    contract = _contract_of(document, pack, folder)
     if contract is None:
         raise click.UsageError("the result is by a contract that is not at hand: name its pack with --contract")
     try:
@@ -212,13 +210,19 @@ def _check_addresses(failures: list[dict[str, Any]], trusted: tuple[str, ...]) -
         )
 
 
-def _contract_of(document: dict[str, Any], pack: str | None) -> Contract | None:
+def _contract_of(document: dict[str, Any], pack: str | None, folder: Path) -> Contract | None:
     """Return the current version of the contract that judged, or None if it is not installed.
+
+    That of a device's own description is in the folder of the result.
 
     Raises:
         click.UsageError: the pack named by the user cannot be used.
     """
-    named = pack or str(document.get("pack", {}).get("name", DEFAULT_PACK))
+    from conformance.engine.describing import FOLDER  # noqa: PLC0415 - see replay()
+
+    described = folder / FOLDER
+    beside = str(described) if "api" in document and described.is_dir() else None
+    named = pack or beside or str(document.get("pack", {}).get("name", DEFAULT_PACK))
     try:
         contract = Contract.load(named)
     except ContractError as error:

@@ -15,6 +15,8 @@ ORIGINAL_NAME: Final = "original.json"
 UNRESOLVED_NAME: Final = "unresolved.json"
 #: How the contract is called in verdicts: "keeps its own description".
 TITLE: Final = "its own description"
+#: The class that a motion map claims.
+MOTION: Final = "motion"
 _CLASSES: Final = ("description", "robustness", "http")
 # The class `description` judges these of each operation, and tells what operations have in common once.
 _WITHOUT: Final = ("http/declared-status", "http/declared-body", "http/json-integers", "http/no-traceback")
@@ -48,7 +50,7 @@ def write_described_pack(
     info = info if isinstance(info, dict) else {}
     name = _NO_NAME.sub("-", str(info.get("title", "api")).lower()).strip("-") or "api"
     taken, sent = _formats(document)
-    more = {"motion": moves, "rest-formats": len(sent) > 1, "xml-security": any("xml" in name for name in taken)}
+    more = {MOTION: moves, "rest-formats": len(sent) > 1, "xml-security": any("xml" in name for name in taken)}
     classes = [*_CLASSES, *(name for name, there in more.items() if there)]
     lines = [
         f"name = {basic_string(name)}",

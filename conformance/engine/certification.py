@@ -2,7 +2,7 @@
 
 import datetime as dt
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -10,6 +10,7 @@ from typing import Any, TextIO
 import pytest
 
 from conformance.commandline.exit_codes import OF_VERDICT, ExitCode
+from conformance.contract.described import MOTION
 from conformance.engine.checks_plugin import ChecksPlugin
 from conformance.engine.interruption import remembered
 from conformance.engine.planning import pytest_options
@@ -128,7 +129,8 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
             judge.stopped(requirement.id, run.aborted)
     seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, run.scored)
     if run.contract.described:
-        _leave_out(seen)
+        # What the motion map declares is claimed.
+        _leave_out(seen[id_] for id_, item in run.contract.ledger.items() if item.class_ != MOTION)
     verdicts = [
         verdict_of(requirement, seen[requirement.id], run.claims, run.statement.undeclared)
         for requirement in run.contract.ledger.values()
@@ -136,9 +138,9 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
     return verdicts, causes
 
 
-def _leave_out(seen: Mapping[str, Evidence]) -> None:
+def _leave_out(seen: Iterable[Evidence]) -> None:
     """Leave out what no permitted request shows: an API that is judged by its description has claimed nothing else."""
-    for evidence in seen.values():
+    for evidence in seen:
         evidence.parts = {part: cases for part, cases in evidence.parts.items() if cases}
         if not (evidence.cases or evidence.errors or evidence.because or evidence.unclaimed):
             evidence.unclaimed = (evidence.skips or ["nothing that may be called shows it"])[0]

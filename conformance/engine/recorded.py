@@ -39,10 +39,11 @@ def judge_recorded(robot: RobotUnderTest, folder: Path) -> list[Rejudged]:
             rules.append(mark.args)
     recordings = read_traces(folder / TRACES_NAME, [scenario for _, scenario in rules])
     run = robot.run
-    known: dict[str, Any] = {"run": run, "statement": run.statement, "effort": run.effort}
+    moves = run.statement.motion_map
+    known: dict[str, Any] = {"run": run, "statement": run.statement, "effort": run.effort, "motion": moves}
     for rule, scenario in rules:
         recording = recordings.played.get(scenario.name)
-        if recording is not None:
+        if recording is not None and (moves or "motion" not in rule.fixtures):
             record(run.judge, rule.requirement, rule.outcomes(recording.trace, known.__getitem__))
     judged = ((id_, run.judge.evidence[id_]) for id_ in run.contract.ledger)
     return [

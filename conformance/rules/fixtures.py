@@ -13,7 +13,7 @@ from conformance.api.rest.observers import Observer
 from conformance.api.rest.values import Values
 from conformance.api.soap.observer import PASSIVE, SoapObserver, answers_of
 from conformance.api.soap.service import SoapService
-from conformance.scenarios.motion.mapped import Mapped
+from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.other_exchanges import OtherExchanges
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_map import MotionMap
@@ -64,11 +64,11 @@ def motion(run: Run) -> MotionMap:
 
 
 @pytest.fixture(scope="session")
-def mapped(interfaces: Interfaces, motion: MotionMap) -> Mapped:
+def mapped(interfaces: Interfaces, motion: MotionMap) -> MappedDevice:
     """Return the device that is moved by its map."""
     if interfaces.rest is None:
         raise NotPossibleError("the device has no REST interface")
-    return Mapped(interfaces.rest, motion)
+    return MappedDevice(interfaces.rest, motion)
 
 
 @pytest.fixture

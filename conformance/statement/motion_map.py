@@ -7,12 +7,16 @@ duration of a move, and "{goto:/uuid}" a value in the response to the last accep
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import re
+from collections.abc import Mapping
+from typing import Annotated, Any, Final, Literal
 
 import msgspec
 
 from conformance.contract.toml_file import Finite, NotNegative, Positive
 
+NAME: Final = re.compile(r"\{([^{}]+)\}")
+"""A name in a template."""
 Pointer = Annotated[str, msgspec.Meta(pattern=r"^(/.*)?$")]
 Call = Annotated[str, msgspec.Meta(pattern=r"^[A-Z]+ /\S*$")]
 
@@ -111,6 +115,19 @@ class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     goto: Goto
     stop: Stop | None = None
 
+    def __post_init__(self) -> None:
+        """Check that the templates name each axis, and nothing that is not known.
+
+        Raises:
+            ValueError: they do not.
+        """
+        axes, moved = set(self.state.axes), names_in([self.goto.send, self.goto.body])
+        if missing := axes - moved:
+            raise ValueError(f"goto has no {{{min(missing)}}} in send or body, so nothing would move that axis")
+        stopped = names_in([self.stop.send, self.stop.body]) if self.stop else set()
+        if strange := {name for name in moved - axes - {"seconds"} | stopped if not name.startswith("goto:/")}:
+            raise ValueError(f"a template names {{{min(strange)}}}, which is neither an axis nor known")
+
     @property
     def calls(self) -> tuple[str, ...]:
         """The operations that the map names."""
@@ -119,3 +136,17 @@ class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def tolerance(self, axis: str) -> float:
         """Return how far from its target an axis may rest, in the axis's unit."""
         return self.state.axes[axis].tolerance or self.goto.tolerance
+
+
+def names_in(template: Any) -> set[str]:
+    """Return the names that a template contains."""
+    if isinstance(template, Mapping):
+        return set().union(*map(names_in, template.values()))
+    if isinstance(template, list | tuple):
+        return set().union(*map(names_in, template))
+    return set(NAME.findall(template)) if isinstance(template, str) else set()
+
+
+def shape_of(call: str) -> str:
+    """Return an operation without the names in its path, which map and description may choose differently."""
+    return NAME.sub("{}", call)

@@ -27,7 +27,7 @@ class RestInterface:
         working: requests that the survey of a described API found to be answered 2xx, by operation.
         streams: operations whose responses do not end.
         slow: operations that once took more than a second to respond.
-        still: stops a device with a motion map; None: it has none, or was not moved.
+        stop_device: stops a device with a motion map; None: it has none, or was not moved.
         values: what the survey of a described API knows for parameters and bodies, or None.
         is_recorded: whether the present exchange is recorded by a scenario, whose rules judge it.
     """
@@ -40,7 +40,7 @@ class RestInterface:
     working: dict[str, Any] = field(default_factory=dict)
     streams: set[str] = field(default_factory=set)
     slow: set[str] = field(default_factory=set)
-    still: Callable[[], Any] | None = None
+    stop_device: Callable[[], Any] | None = None
     values: Any = None
     is_recorded: bool = False
     device: Device = field(init=False)

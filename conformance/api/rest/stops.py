@@ -22,8 +22,8 @@ def send_stops(api: RestInterface) -> None:
     a few seconds; never raises.
     """
     with suppress(NoAnswerError, NotPermittedError):
-        if api.still is not None:
-            api.still()
+        if api.stop_device is not None:
+            api.stop_device()
     if not api.call_rules.allow or math.isinf(api.client.connection.acted_at):
         return
     until = time.monotonic() + _LONGEST_S

@@ -7,14 +7,18 @@ from collections.abc import Iterator
 from statistics import median
 
 from conformance.rules.motion.judging import ALL, at, legs_of, named, off, reached, usable
-from conformance.scenarios.motion.plays import many_commands, new_targets, repeated, several_clients, stops, targets
-from conformance.scenarios.motion.trace import SEVERAL, Leg, Reading, place
-from conformance.scenarios.rule import Case, NotTested, Outcome, rule
+from conformance.scenarios.motion.moves import many_commands, new_targets, repeated, several_clients, stops, targets
+from conformance.scenarios.motion.trace import SEVERAL, Leg, Reading, middle_of
+from conformance.scenarios.rule import Case, NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
 
-# A reading between two others that a device needs for a step of its own, s.
+# Readings that are so far apart tell a speed, s.
 _APART_S = 0.15
+# Of the declared speed: nobody measures it more exactly than that from outside.
 _FASTER = 1.1
+# After the time to rest: for so long a device that still moves has not stopped in time; later it has set out again, s.
+_SOON_S = 0.5
+_NO_STOP = NotClaimed("the map declares no stop")
 
 
 @rule("motion/reaches", on=(targets,))
@@ -34,7 +38,7 @@ def stays(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
             continue
         last = seen[-SEVERAL:]
         apart = off(at(last, motion), goal.targets, motion, 1.5)
-        yield Case(not apart, goal.attempt, f"{named(goal.targets)} kept", observed=f"{apart} after it was reached")
+        yield Case(not apart, goal.exchange, f"{named(goal.targets)} kept", observed=f"{apart} after it was reached")
 
 
 def _first_at(readings: tuple[Reading, ...], goal: dict[str, float], motion: MotionMap) -> int | None:
@@ -53,15 +57,15 @@ def way(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
         for name, axis in motion.state.axes.items():
             room = motion.tolerance(name)
             least, greatest = axis.limits[0] - room, axis.limits[1] + room
-            places = [place(seen[i : i + SEVERAL], name) for i in range(len(seen) - SEVERAL + 1)]
+            places = [middle_of(seen[i : i + SEVERAL], name) for i in range(len(seen) - SEVERAL + 1)]
             inside = next((i for i, one in enumerate(places) if least <= one <= greatest), len(places))
             beyond = [one for one in places[inside:] if not least <= one <= greatest]
             if places:
                 found = f"{name} {max(beyond, key=abs):.4g}" if beyond else ""
                 yield Case(
                     not beyond,
-                    leg.commands[-1].attempt,
-                    f"{name} from {axis.limits[0]:g} to {axis.limits[1]:g} on the way to {leg.what}",
+                    leg.commands[-1].exchange,
+                    f"{name} between {axis.limits[0]:g} and {axis.limits[1]:g} all the time ({leg.what})",
                     observed=found,
                     cause=name,
                 )
@@ -72,7 +76,7 @@ def speed(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether an axis moves no faster than declared."""
     limited = {name: axis.speed for name, axis in motion.state.axes.items() if axis.speed is not None}
     if not limited:
-        yield NotTested("the map declares no greatest speed")
+        yield NotClaimed("the map declares no greatest speed")
     for leg, (name, most) in itertools.product(legs_of(trace), limited.items()):
         seen = usable(leg)
         fastest = 0.0
@@ -83,11 +87,17 @@ def speed(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
                 fastest = max(fastest, moved / (later.received - one.sent))
         yield Case(
             fastest <= _FASTER * most,
-            leg.commands[-1].attempt,
-            f"{name} at {most:g} a second at most",
-            observed=f"{fastest:.3g} a second on the way to {leg.what}",
+            leg.commands[-1].exchange,
+            f"{name} at {most:g} {motion.state.axes[name].unit or 'units'}/s at most ({leg.what})",
+            observed=f"{fastest:.3g} {motion.state.axes[name].unit or 'units'}/s",
             cause=name,
         )
+
+
+def _moved_axis(leg: Leg) -> str:
+    """Return the axis along which the first move goes farthest."""
+    goal = leg.commands[0].targets
+    return max(goal, key=lambda name: abs(goal[name] - leg.start[name]))
 
 
 def _usual_s(leg: Leg) -> float:
@@ -98,11 +108,13 @@ def _stopped(leg: Leg, motion: MotionMap) -> tuple[tuple[Reading, ...], NotTeste
     """Return the readings from when the device must rest, or why they cannot be judged."""
     stop, (goal, order) = motion.stop, leg.commands[:2]
     if stop is None or not order.accepted:
-        return (), Case(holds=False, exchange=order.attempt, expected="a 2xx for a stop under way")
+        return (), Case(holds=False, exchange=order.exchange, expected="a 2xx for a stop under way")
     before = [one for one in usable(leg) if one.received <= order.sent]
-    axis = max(goal.targets, key=lambda name: abs(goal.targets[name] - leg.start.get(name, 0.0)))
-    left = abs(goal.targets[axis] - before[-1].values[axis]) if before else 0.0
-    if left < 4 * motion.tolerance(axis) or abs(before[-1].values[axis] - leg.start[axis]) < motion.tolerance(axis):
+    if not before:
+        return (), NotTested("the state could not be read before the stop")
+    axis, here = _moved_axis(leg), before[-1].values
+    left, done = abs(goal.targets[axis] - here[axis]), abs(here[axis] - leg.start[axis])
+    if left < 4 * motion.tolerance(axis) or done < motion.tolerance(axis):
         return (), NotTested("the device was not under way when it was stopped")
     due = order.sent + stop.rests_within_s + _usual_s(leg)
     readings = leg.after(due)
@@ -112,6 +124,8 @@ def _stopped(leg: Leg, motion: MotionMap) -> tuple[tuple[Reading, ...], NotTeste
 @rule("motion/stop", on=(stops,))
 def stop_rests(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a stop under way stops the device in time, before its target."""
+    if motion.stop is None:
+        yield _NO_STOP
     for leg in trace:
         readings, unusable = _stopped(leg, motion)
         if unusable is not None:
@@ -119,14 +133,14 @@ def stop_rests(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
             continue
         goal, order = leg.commands[:2]
         where = at(readings[:SEVERAL], motion)
-        soon = [one for one in readings if one.sent < readings[0].sent + 0.5][-SEVERAL:]
-        moved = off(at(tuple(soon), motion), where, motion)
+        soon = [one for one in readings if one.sent < readings[0].sent + _SOON_S]
+        moved = off(at(tuple(soon[-SEVERAL:]), motion), where, motion)
         arrived = not off(where, goal.targets, motion)
         rests_s = motion.stop.rests_within_s if motion.stop else 0.0
         yield Case(
             not moved and not arrived,
-            order.attempt,
-            f"rest {rests_s:g} s after {leg.what}",
+            order.exchange,
+            f"rest {rests_s:g} s after {leg.what}, before the target",
             observed=f"{moved}, {soon[-1].sent - order.sent:.2f} s after the stop"
             if moved
             else f"the target reached all the same: {named(where)}",
@@ -137,6 +151,8 @@ def stop_rests(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
 @rule("motion/stop-lasts", on=(stops,))
 def stop_lasts(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a device that was stopped stays where it is, and does not resume its way."""
+    if motion.stop is None:
+        yield _NO_STOP
     for leg in trace:
         readings, unusable = _stopped(leg, motion)
         if unusable is None:
@@ -144,7 +160,7 @@ def stop_lasts(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
             moved = off(last, where, motion)
             after = readings[-1].sent - leg.commands[1].sent
             yield Case(
-                not moved, leg.commands[1].attempt, f"rest after {leg.what}", f"{moved}, {after:.1f} s after the stop"
+                not moved, leg.commands[1].exchange, f"rest after {leg.what}", f"{moved}, {after:.1f} s after the stop"
             )
 
 
@@ -154,7 +170,7 @@ def new_target(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     for leg in trace:
         first, second = leg.commands[:2]
         if motion.goto.while_moving == "refused":
-            yield Case(second.refused, second.attempt, "4xx for a second move under way")
+            yield Case(second.refused, second.exchange, "4xx for a second move under way")
             if second.refused:
                 yield from reached(leg, first, motion)
         else:
@@ -165,16 +181,16 @@ def new_target(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
 def _given_up(leg: Leg, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a device that has another target gives up the first one within the time to settle."""
     first, second = leg.commands[:2]
-    axis = max(first.targets, key=lambda name: abs(first.targets[name] - leg.start.get(name, 0.0)))
-    ahead = 1 if first.targets[axis] > leg.start[axis] else -1
     readings = leg.after(second.answered + motion.goto.settle_s)
     if not second.accepted or len(readings) < SEVERAL:
         return
+    axis = _moved_axis(leg)
+    ahead = 1 if first.targets[axis] > leg.start[axis] else -1
     places = [ahead * one.values[axis] for one in readings]
     farther = max(places) - places[0]
     yield Case(
         farther <= 2 * motion.tolerance(axis),
-        second.attempt,
+        second.exchange,
         f"{axis} no nearer to the first target {motion.goto.settle_s:g} s after a second one was accepted",
         observed=f"{farther:.3g} nearer after that",
         cause="first target",
@@ -186,7 +202,7 @@ def last_of_many(trace: Leg, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the device ends at the last accepted of many targets."""
     accepted = [one for one in trace.commands if one.accepted]
     if not accepted:
-        yield Case(holds=False, exchange=trace.commands[-1].attempt, expected="a 2xx for one of many moves at least")
+        yield Case(holds=False, exchange=trace.commands[-1].exchange, expected="a 2xx for one of many moves at least")
     else:
         yield from reached(trace, accepted[-1], motion)
 
@@ -209,4 +225,4 @@ def one_client(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
             continue
         here = at(seen, motion)
         fits = any(not off(here, one.targets, motion) for one in accepted)
-        yield Case(fits, accepted[-1].attempt, "the target of one client", observed=named(here))
+        yield Case(fits, accepted[-1].exchange, "the target of one client", observed=named(here))

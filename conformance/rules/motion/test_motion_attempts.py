@@ -3,39 +3,54 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 
 from conformance.rules.motion.judging import ALL, at, legs_of, off, reached, usable
-from conformance.scenarios.motion.plays import attempts_at_rest, clamped_targets
-from conformance.scenarios.motion.trace import SEVERAL, Command, Leg, Quiet, Tried
-from conformance.scenarios.rule import Case, NotTested, Outcome, rule
+from conformance.scenarios.motion.attempts import attempts_at_rest
+from conformance.scenarios.motion.moves import clamped_targets
+from conformance.scenarios.motion.trace import SEVERAL, Leg, Quiet, Tried
+from conformance.scenarios.rule import Case, NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
 
 
-def _still(quiet: Quiet, motion: MotionMap) -> str:
-    """Return how the device moved in a watch; empty if it stayed."""
+def _moved(quiet: Quiet, motion: MotionMap) -> str | None:
+    """Return how the device moved in a watch; empty if it stayed, None if it could not be read."""
     seen = tuple(one for one in quiet.readings if one.values)
-    for index in range(len(seen) - SEVERAL + 1):
-        apart = off(at(seen[index : index + SEVERAL], motion), quiet.where, motion)
-        if apart:
-            return apart
-    return ""
+    if len(seen) < SEVERAL:
+        return None
+    windows = (seen[index : index + SEVERAL] for index in range(len(seen) - SEVERAL + 1))
+    return next(filter(None, (off(at(window, motion), quiet.where, motion) for window in windows)), "")
 
 
 def _nothing_moved(trace: Quiet, motion: MotionMap, *kinds: str) -> Iterator[Outcome]:
-    """Judge that attempts of some kinds moved nothing."""
-    for quiet in trace.alone or (trace,):
-        moved = _still(quiet, motion)
+    """Judge that attempts of some kinds moved nothing: together, or, where the device moved, each alone."""
+    tried = [one for one in trace.tried if one.kind in kinds]
+    together = _moved(trace, motion)
+    if not tried:
+        yield NotClaimed("of the map and the description no such request can be made")
+    elif together is None:
+        yield NotTested("the state could not be read")
+    elif together == "":
+        yield from (Case(True, one.exchange, f"rest after {one.what}") for one in tried)
+    else:
+        yield from _alone(trace, motion, kinds)
+
+
+def _alone(trace: Quiet, motion: MotionMap, kinds: tuple[str, ...]) -> Iterator[Outcome]:
+    """Judge attempts that were made again, one at a time, because the device moved after all of them."""
+    for quiet in trace.alone:
+        moved = _moved(quiet, motion)
         for one in quiet.tried:
-            if one.kind in kinds and (trace.alone or not moved):
-                yield Case(not moved, one.attempt, f"rest after {one.what}", observed=moved, cause=one.kind)
+            if one.kind in kinds and moved is not None:
+                yield Case(not moved, one.exchange, f"rest after {one.what}", observed=moved, cause=one.kind)
+    if len(trace.alone) < len(trace.tried):
+        yield NotTested("the device moved after several attempts, and did not come back for each of them alone")
 
 
-def _refused(tried: Iterable[Tried], expected: str) -> Iterator[Outcome]:
+def _refused(tried: Iterable[Tried], statuses: Container[int], expected: str) -> Iterator[Outcome]:
     for one in tried:
-        attempt = one.attempt
-        holds = attempt is not None and Command(0, 0, {}, attempt).refused
-        yield Case(holds, attempt, f"{expected} for {one.what}", cause=one.kind)
+        holds = one.exchange is not None and one.exchange.response.status in statuses
+        yield Case(holds, one.exchange, f"{expected} for {one.what}", cause=one.kind)
 
 
 @rule("motion/beyond-limits", on=(clamped_targets, attempts_at_rest))
@@ -45,13 +60,20 @@ def beyond_limits(trace: Quiet | tuple[Leg, ...], motion: MotionMap) -> Iterator
         for leg in trace:
             yield from reached(leg, leg.commands[-1], motion)
         return
-    yield from _refused((one for one in trace.tried if one.kind == "beyond"), "4xx")
+    if motion.goto.beyond_limits == "undefined":
+        yield NotClaimed("the map does not say what becomes of a target beyond the limits")
+    yield from _refused((one for one in trace.tried if one.kind == "beyond"), range(400, 500), "4xx")
 
 
 @rule("motion/refused-still", on=(attempts_at_rest,))
 def refused_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a target beyond the limits, or an invalid one, moves nothing."""
     yield from _nothing_moved(trace, motion, "beyond", "invalid")
+    together = _moved(trace, motion)
+    if together and len(trace.alone) == len(trace.tried) and not any(_moved(one, motion) for one in trace.alone):
+        # It moves now and then, or after several of them; which one it was, nobody can say.
+        last = next((one.exchange for one in reversed(trace.tried) if one.exchange is not None), None)
+        yield Case(False, last, f"rest after {len(trace.tried)} attempts in a row", observed=together, cause="together")
 
 
 @rule("motion/incomplete-still", on=(attempts_at_rest,))
@@ -64,9 +86,7 @@ def incomplete_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
 def unauthorised_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a move without credentials is refused, and moves nothing."""
     tried = [one for one in trace.tried if one.kind == "unauthorised"]
-    if not tried:
-        yield NotTested("the statement has no credentials")
-    yield from _refused(tried, "401 or 403")
+    yield from _refused(tried, {401, 403}, "401 or 403")
     yield from _nothing_moved(trace, motion, "unauthorised")
 
 
@@ -76,10 +96,9 @@ def fresh(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     for leg in legs_of(trace):
         seen = usable(leg)
         changed = [i for i in range(1, len(seen)) if seen[i].values != seen[i - 1].values]
-        if len(changed) < SEVERAL or leg.commands[-1].targets == {}:
+        if len(changed) < SEVERAL or not leg.commands[-1].targets:
             continue
-        edges = [changed[0], *changed[1:]]
-        still_s = max(seen[b - 1].sent - seen[a].received for a, b in itertools.pairwise(edges))
+        still_s = max(seen[b - 1].sent - seen[a].received for a, b in itertools.pairwise(changed))
         yield Case(
             still_s <= motion.state.fresh_s,
             seen[-1].exchange,
@@ -93,7 +112,7 @@ def fresh(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
 def stamp(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the stamp of the state goes on, and never back."""
     if not motion.state.stamp:
-        yield NotTested("the map names no stamp")
+        yield NotClaimed("the map names no stamp")
         return
     for leg in legs_of(trace):
         seen = [one for one in leg.readings if one.values]

@@ -9,20 +9,20 @@ from typing import Any, Final
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.json_text import read_json
 from conformance.observe.clock import WALL_CLOCK, Clock
-from conformance.scenarios.motion.templates import NoValueError, at, filled, names_in, seconds_of
-from conformance.scenarios.motion.trace import SEVERAL, Command, Leg, Reading
-from conformance.statement.motion_map import MotionMap
+from conformance.scenarios.motion.templates import NoValueError, at, filled, seconds_of
+from conformance.scenarios.motion.trace import SEVERAL, Command, Leg, Reading, middle_of
+from conformance.scenarios.scenario import NotPossibleError
+from conformance.statement.motion_map import MotionMap, names_in
 from conformance.transport.client import Headers
-from conformance.transport.exchange import Exchange, NoAnswerError
+from conformance.transport.exchange import Exchange
 
+#: For so long a device that has arrived is watched, s.
+STAYS_S: Final = 0.3
+# From one reading to the next, s.
 _PACE_S: Final = 0.02
-# For so long a device that has arrived is watched, s.
-_STAYS_S: Final = 0.3
-# Beyond the time that it has, whoever reads is patient for so long, s.
-_LONGER_S: Final = 0.3
+# The deadline of a stop, s.
 _STOP_S: Final = 2.0
-
-# A device that takes one move at a time may finish the one before, s.
+# A device that takes one move at a time may still finish the one before: it is asked again for so long, so often, s.
 _FINISHES_S: Final = 1.0
 _AGAIN_S: Final = 0.05
 
@@ -34,7 +34,7 @@ def _content(body: Any) -> tuple[Headers, bytes]:
     return ((), b"") if body is None else ((("Content-Type", "application/json"),), json.dumps(body).encode())
 
 
-class Mapped:
+class MappedDevice:
     """One device.
 
     Args:
@@ -43,16 +43,19 @@ class Mapped:
         clock: by which it is watched.
 
     Attributes:
-        home: where it is brought between scenarios: where it was at first, within its limits.
+        home: where it is brought between scenarios: near where it was at first, well within its limits.
+
+    Raises:
+        NotPossibleError: where it is cannot be read.
+        NoAnswerError: there is no response.
     """
 
     def __init__(self, api: RestInterface, motion: MotionMap, clock: Clock = WALL_CLOCK) -> None:
         self.api, self.motion, self.clock = api, motion, clock
         self._answer: Any = None
         self._read_at = 0.0
-        first = self.read().values
-        self.home = {name: self._inside(name, first.get(name, 0.0)) for name in motion.state.axes}
-        api.still = self.stop
+        self.home = {name: self._inside(name, value) for name, value in self.where().items()}
+        api.stop_device = self.stop
 
     def _inside(self, axis: str, value: float) -> float:
         least, greatest = self.motion.state.axes[axis].limits
@@ -93,7 +96,7 @@ class Mapped:
         return Reading(sent, received, values if exchange.response.ok else {}, stamp, exchange)
 
     def request_of(self, targets: Mapping[str, Any]) -> tuple[str, str, Headers, bytes]:
-        """Return method, path, header fields and body of a move; axes without a target stay at home."""
+        """Return method, path, header fields and body of a move; an axis without a target goes home."""
         goto = self.motion.goto
         values = {**self.home, **targets, "seconds": goto.seconds}
         method, _, path = goto.send.partition(" ")
@@ -114,8 +117,8 @@ class Mapped:
         return command
 
     def note(self, exchange: Exchange) -> None:
-        """Keep the response to an accepted move: a stop may name its id."""
-        self._answer = read_json(exchange.response.body).value
+        """Keep the response to an accepted move, if it can be read: a stop may name its id."""
+        self._answer = read_json(exchange.response.body).value or self._answer
 
     def stop(self) -> Command | None:
         """Send the stop; return None if the map has none, or it names what is not known yet.
@@ -156,31 +159,50 @@ class Mapped:
         """Return whether a position is another one, within the tolerances."""
         return bool(here) and all(abs(here[name] - there[name]) <= self.motion.tolerance(name) for name in there)
 
-    def leg(self, what: str, *commands: Command, start: Position, readings: list[Reading] | None = None) -> Leg:
-        """Watch until the last accepted target is reached and kept for a moment, or its time is over."""
-        due = commands[-1].answered + self.takes_s + self.motion.goto.settle_s
-        goal = next((one.targets for one in reversed(commands) if one.accepted and one.targets), None)
-        seen = list(readings or ())
-        if goal is not None:
-            seen += self.watch(due + _LONGER_S, lambda so_far: self.is_at(goal, so_far))
-            # A move with a duration lasts for that, also where the way is short.
-            seen += self.watch(max(self.clock.now() + _STAYS_S, commands[-1].answered + self._lasts_s))
-        return Leg(what, start, commands, tuple(seen), due)
+    def where(self) -> Position:
+        """Return where the device is by the median of several readings.
+
+        Raises:
+            NotPossibleError: it cannot be read. A device that nobody sees is not moved.
+            NoAnswerError: there is no response.
+        """
+        seen = [self.read() for _ in range(SEVERAL)]
+        if not all(one.values for one in seen):
+            places = ", ".join(axis.at for axis in self.motion.state.axes.values())
+            came = seen[-1].exchange.came
+            raise NotPossibleError(f"{self.motion.state.read} got {came}, without numbers at {places}")
+        return {name: middle_of(seen, name) for name in self.motion.state.axes}
+
+    def follow(self, command: Command) -> list[Reading]:
+        """Watch until the target of a command is reached and kept for a moment, or its time is over."""
+        seen = self.watch(self.due(command), lambda so_far: self.is_at(command.targets, so_far))
+        if not self.is_at(command.targets, seen):
+            # One reading after its time decides nothing.
+            return seen + [self.read() for _ in range(SEVERAL)]
+        # A move with a duration lasts for that, also where the way is short.
+        return seen + self.watch(max(self.clock.now() + STAYS_S, command.answered + self._lasts_s))
+
+    def due(self, command: Command) -> float:
+        """Return when the target of a command must have been reached, s of the clock."""
+        return command.answered + self.takes_s + self.motion.goto.settle_s
 
     def go(self, what: str, targets: Mapping[str, float], ends: Mapping[str, float] | None = None) -> Leg:
         """Send one move and watch it; ``ends``: where it must end, if not at the targets."""
-        start, until = self.read().values, self.clock.now() + _FINISHES_S
+        start, until = self.where(), self.clock.now() + _FINISHES_S
         command = self.goto(targets, ends)
         while self.motion.goto.while_moving == "refused" and command.refused and self.clock.now() < until:
             self.clock.sleep(_AGAIN_S)
             command = self.goto(targets, ends)
-        return self.leg(what, command, start=start)
+        return Leg(what, start, (command,), tuple(self.follow(command)) if command.accepted else (), self.due(command))
 
-    def bring_home(self) -> bool:
-        """Stop what goes on, and bring the device home; return whether it is there."""
-        try:
-            self.stop()
-            leg = self.go("home", {})
-        except NoAnswerError:
-            return False
-        return self.is_at(self.home, list(leg.readings))
+    def bring_home(self) -> None:
+        """Stop what goes on, and bring the device home.
+
+        Raises:
+            NotPossibleError: it does not get there.
+            NoAnswerError: there is no response.
+        """
+        self.stop()
+        self.go("home", {})
+        if not self.is_near(self.where(), self.home):
+            raise NotPossibleError("the device does not come back to the position from which the suite begins")

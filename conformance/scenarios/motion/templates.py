@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import datetime as dt
-import re
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
-_NAME: Final = re.compile(r"\{([^{}]+)\}")
+from conformance.statement.motion_map import NAME
 
 
 class NoValueError(LookupError):
@@ -31,19 +30,10 @@ def filled(template: Any, values: Mapping[str, Any], answer: Any = None) -> Any:
         return [filled(item, values, answer) for item in template]
     if not isinstance(template, str):
         return template
-    whole = _NAME.fullmatch(template)
+    whole = NAME.fullmatch(template)
     if whole:
         return _value(whole[1], values, answer)
-    return _NAME.sub(lambda found: str(_value(found[1], values, answer)), template)
-
-
-def names_in(template: Any) -> set[str]:
-    """Return the names that a template contains."""
-    if isinstance(template, Mapping):
-        return set().union(*map(names_in, template.values()))
-    if isinstance(template, list | tuple):
-        return set().union(*map(names_in, template))
-    return set(_NAME.findall(template)) if isinstance(template, str) else set()
+    return NAME.sub(lambda found: str(_value(found[1], values, answer)), template)
 
 
 def _value(name: str, values: Mapping[str, Any], answer: Any) -> Any:

@@ -5,10 +5,11 @@ Times are s of the run's monotonic clock; positions are in the units of the map'
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from conformance.transport.exchange import Attempt, Exchange
+from conformance.transport.exchange import Exchange
 
 #: So many readings in a row show where a device is, whatever one of them says.
 SEVERAL = 3
@@ -39,23 +40,23 @@ class Command:
     Attributes:
         sent, answered: when.
         targets: positions by axis; empty for a stop.
-        attempt: request and response.
+        exchange: request and response.
     """
 
     sent: float
     answered: float
     targets: dict[str, float]
-    attempt: Attempt
+    exchange: Exchange
 
     @property
     def accepted(self) -> bool:
         """Whether it was answered 2xx."""
-        return isinstance(self.attempt, Exchange) and self.attempt.response.ok
+        return self.exchange.response.ok
 
     @property
     def refused(self) -> bool:
         """Whether it was answered 4xx."""
-        return isinstance(self.attempt, Exchange) and 400 <= self.attempt.response.status < 500  # noqa: PLR2004
+        return 400 <= self.exchange.response.status < 500  # noqa: PLR2004
 
 
 @dataclass(frozen=True)
@@ -88,12 +89,12 @@ class Tried:
     Attributes:
         kind: beyond, invalid, incomplete or unauthorised.
         what: as a noun phrase.
-        attempt: request and response; None if no response was awaited, or nothing was sent.
+        exchange: request and response; None: the connection was closed before a response could come.
     """
 
     kind: str
     what: str
-    attempt: Attempt | None
+    exchange: Exchange | None
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,6 @@ class Quiet:
     alone: tuple[Quiet, ...] = ()
 
 
-def place(readings: tuple[Reading, ...], axis: str) -> float:
+def middle_of(readings: Sequence[Reading], axis: str) -> float:
     """Return where an axis is by the median of some readings."""
     return median(one.values[axis] for one in readings)

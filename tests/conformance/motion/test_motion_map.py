@@ -31,6 +31,10 @@ def _of_arm(arm, tmp_path):
 def test_a_right_arm_is_not_blamed(tmp_path):
     done, judged = _of_arm(Arm(noise=0.003), tmp_path)
     assert {id_ for id_, verdict in judged.items() if verdict != "pass"} == {"motion/unauthorised-still"}, done.stdout
+    # Its moves are stored, and can be judged again without it.
+    again = ["replay", "--recorded", str(tmp_path / "out"), "--statement", str(tmp_path / "device.toml")]
+    told = ended(sys.executable, "-m", "roaas", *again)
+    assert (told.returncode, "motion/stop-lasts passes" in told.stdout) == (0, True), told.stdout + told.stderr
 
 
 def test_a_right_rover_that_clamps_and_takes_one_move_at_a_time_is_not_blamed(tmp_path):
@@ -64,11 +68,29 @@ def test_without_permission_nothing_moves(tmp_path):
     assert arm.moves == 0
 
 
-def test_a_map_with_an_unknown_key_is_refused(tmp_path):
-    statement = tmp_path / "arm.toml"
-    with serving_app(Arm().app()) as url:
-        wrong = MAP.replace("settle_s", "settles")
-        statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n{wrong}', encoding="utf-8")
-        done = ended(sys.executable, "-m", "roaas", "certify", str(statement), "--out", str(tmp_path / "out"))
-    assert done.returncode == 2
-    assert "settles" in done.stderr
+@pytest.mark.parametrize(
+    ("right", "wrong", "told"),
+    [
+        ("settle_s", "settles", "settles"),
+        ("POST /move", "POST /moves", "did you mean 'POST /move'"),
+        ('tilt = "{tilt}"', "tilt = 0.0", "no {tilt}"),
+        ("{goto:/id}", "{id}", "{id}"),
+    ],
+)
+def test_a_wrong_map_is_refused_and_nothing_moves(right, wrong, told, tmp_path):
+    arm, statement = Arm(), tmp_path / "arm.toml"
+    with serving_app(arm.app()) as url:
+        changed = MAP.replace(right, wrong)
+        statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n{changed}', encoding="utf-8")
+        more = ["--allow-motion", "--out", str(tmp_path / "out")]
+        done = ended(sys.executable, "-m", "roaas", "certify", str(statement), *more)
+    assert (done.returncode, arm.moves) == (2, 0)
+    assert told in done.stderr
+
+
+def test_a_device_that_the_map_cannot_see_is_not_moved(tmp_path):
+    arm = Arm()
+    done, judged = _judged(serving_app(arm.app()), MAP.replace("/joints/pan", "/joints/pen"), tmp_path)
+    assert (arm.moves, "pass" in judged.values()) == (0, False), done.stdout
+    assert done.returncode == 4
+    assert "/joints/pen" in done.stdout

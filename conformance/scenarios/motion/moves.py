@@ -1,0 +1,210 @@
+"""Scenarios that move a device by its motion map: targets, stops, new targets, several clients."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice, Position
+from conformance.scenarios.motion.trace import Command, Leg, Reading
+from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, PartialTraceError, scenario
+from conformance.scenarios.stage import Need, Stage
+from conformance.transport.exchange import Exchange, NoAnswerError
+from conformance.transport.parallel import Outgoing, send_together
+from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
+
+_NEEDS: Final = (Need.REST, Need.MOTION)
+# Of the way: so far a device has come when it is stopped, or gets another target.
+_UNDER_WAY: Final = 0.3
+_CLIENTS: Final = 4
+# After a stop the device is watched for as long as the rest of its way would take: at least until so long after it
+# must rest, and at most so long in all, s.
+_AT_LEAST_S: Final = 1.5
+_AT_MOST_S: Final = 5.0
+# Beyond the time of a move that was displaced, s.
+_LONGER_S: Final = 0.5
+_COMMANDS: Final = 100
+# Of the range of an axis: so far beyond its limits are targets that the device must not take.
+_BEYOND: Final = (0.05, 0.5)
+
+
+def _recorded(legs: Iterator[Leg]) -> tuple[Leg, ...]:
+    """Return legs as they are made.
+
+    Raises:
+        PartialTraceError: there was no response; what was recorded before is kept.
+    """
+    found: list[Leg] = []
+    try:
+        found.extend(legs)
+    except (NoAnswerError, NotPossibleError) as error:
+        raise PartialTraceError(tuple(found)) from error
+    return tuple(found)
+
+
+@scenario(needs=_NEEDS, stage=Stage.DRIVE)
+def targets(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Leg, ...]:
+    """Send the device to the limits of each axis and back; at standard also to positions of all axes at random."""
+    return _recorded(_to_targets(mapped, effort, run.seed))
+
+
+def _to_targets(mapped: MappedDevice, effort: Effort, seed: int) -> Iterator[Leg]:
+    axes = mapped.motion.state.axes
+    chance = random.Random(f"{seed}/targets")  # noqa: S311 - no secret
+    yield mapped.go("where the suite begins", {})
+    for name, axis in axes.items():
+        for limit in axis.limits:
+            yield mapped.go(f"a limit of {name}", {name: limit})
+        yield mapped.go(f"{name} back", {})
+    for _ in range(0 if effort.name == "quick" else effort.cases(3)):
+        yield mapped.go("all axes", {name: round(chance.uniform(*axis.limits), 3) for name, axis in axes.items()})
+
+
+@scenario(needs=_NEEDS, stage=Stage.DRIVE)
+def clamped_targets(mapped: MappedDevice) -> tuple[Leg, ...]:
+    """Send the device beyond its limits, where the map says that it goes as far as it can."""
+    if mapped.motion.goto.beyond_limits != "clamped":
+        raise NoOccasionError("the map does not say that targets beyond the limits are clamped")
+    mapped.bring_home()
+    return _recorded(
+        mapped.go(f"{name} {value:g}, beyond its limit", {name: value}, {name: limit})
+        for name, limit, value in beyond(mapped)
+    )
+
+
+def beyond(mapped: MappedDevice) -> Iterator[tuple[str, float, float]]:
+    """Yield axes, their limits, and targets beyond these."""
+    for name, axis in mapped.motion.state.axes.items():
+        for part in _BEYOND:
+            room = part * (axis.limits[1] - axis.limits[0])
+            yield name, axis.limits[0], axis.limits[0] - room
+            yield name, axis.limits[1], axis.limits[1] + room
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A move under way: where it began, its command, and the readings since."""
+
+    start: Position
+    command: Command
+    readings: list[Reading]
+
+
+def _ways(mapped: MappedDevice, effort: Effort) -> Iterator[tuple[str, float, _Way]]:
+    """Set out from one end of each axis to the other; yield axis, first end, and a move that is partly done.
+
+    At quick only the first axis is moved.
+    """
+    axes = list(mapped.motion.state.axes.items())
+    for name, axis in axes[:1] if effort.name == "quick" else axes:
+        begin, end = axis.limits
+        mapped.go("one end", {name: begin})
+        start = mapped.where()
+        command = mapped.goto({name: end})
+        part = abs(end - begin) * _UNDER_WAY
+        seen = mapped.watch(
+            command.answered + mapped.takes_s,
+            lambda so_far, name=name, begin=begin, part=part: (  # type: ignore[misc] # bound in its round
+                bool(so_far[-1].values) and abs(so_far[-1].values[name] - begin) > part
+            ),
+        )
+        yield name, begin, _Way(start, command, seen)
+
+
+@scenario(needs=_NEEDS, stage=Stage.MOTION)
+def stops(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
+    """Stop the device under way, and watch it for as long as the rest of the way would have taken, and longer."""
+    stop = mapped.motion.stop
+    return _recorded(_to_stops(mapped, effort, stop.rests_within_s)) if stop else ()
+
+
+def _to_stops(mapped: MappedDevice, effort: Effort, rests_s: float) -> Iterator[Leg]:
+    for name, _, way in _ways(mapped, effort):
+        stop = mapped.stop()
+        if stop is None:
+            raise NotPossibleError("the stop names a value that the response to the move does not have")
+        until = min(mapped.due(stop), stop.answered + _AT_MOST_S)
+        seen = way.readings + mapped.watch(max(until, stop.answered + rests_s + _AT_LEAST_S))
+        yield Leg(f"a stop of {name} under way", way.start, (way.command, stop), tuple(seen), mapped.due(stop))
+
+
+@scenario(needs=_NEEDS, stage=Stage.MOTION)
+def new_targets(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
+    """Send the device back under way, and watch for as long as the first move would have taken, and longer."""
+    return _recorded(_to_new_targets(mapped, effort))
+
+
+def _to_new_targets(mapped: MappedDevice, effort: Effort) -> Iterator[Leg]:
+    for name, begin, way in _ways(mapped, effort):
+        second = mapped.goto({name: begin})
+        last = second if second.accepted else way.command
+        seen = way.readings + mapped.follow(last)
+        seen += mapped.watch(max(mapped.clock.now(), way.command.answered + mapped.takes_s) + _LONGER_S)
+        yield Leg(f"back, with {name} under way", way.start, (way.command, second), tuple(seen), mapped.due(last))
+
+
+@scenario(needs=_NEEDS, stage=Stage.MOTION)
+def many_commands(mapped: MappedDevice, effort: Effort) -> Leg:
+    """Send many targets in a row, without waiting for any of them."""
+    name, axis = next(iter(mapped.motion.state.axes.items()))
+    ends = [axis.limits[turn % 2] for turn in range(effort.cases(_COMMANDS))]
+    return _in_a_row(mapped, f"{len(ends)} targets in a row", [{name: end} for end in ends])
+
+
+@scenario(needs=_NEEDS, stage=Stage.MOTION)
+def repeated(mapped: MappedDevice) -> Leg:
+    """Send one move twice, as a client does that tries again."""
+    name, axis = next(iter(mapped.motion.state.axes.items()))
+    return _in_a_row(mapped, "a move that was sent twice", [{name: axis.limits[0]}] * 2)
+
+
+def _in_a_row(mapped: MappedDevice, what: str, wanted: list[Position]) -> Leg:
+    """Send targets in a row, and follow the last one that is accepted."""
+    start = mapped.where()
+    commands = [mapped.goto(one) for one in wanted]
+    last = next((one for one in reversed(commands) if one.accepted), commands[-1])
+    return Leg(what, start, tuple(commands), tuple(mapped.follow(last)) if last.accepted else (), mapped.due(last))
+
+
+@scenario(needs=_NEEDS, stage=Stage.MOTION)
+def several_clients(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
+    """Send different targets from several clients at the same moment."""
+    return _recorded(_of_clients(mapped) for _ in range(1 if effort.name == "quick" else 3))
+
+
+def _of_clients(mapped: MappedDevice) -> Leg:
+    mapped.bring_home()
+    start, axes = mapped.where(), mapped.motion.state.axes.items()
+    wanted = [
+        {name: axis.limits[0] + (axis.limits[1] - axis.limits[0]) * client / (_CLIENTS - 1) for name, axis in axes}
+        for client in range(_CLIENTS)
+    ]
+    sent = mapped.clock.now()
+    attempts = send_together([[_outgoing(mapped, one) for one in wanted]])[0]
+    answered = mapped.clock.now()
+    # A client whose connection was refused has sent no move.
+    commands = [
+        Command(sent, answered, one, attempt)
+        for one, attempt in zip(wanted, attempts, strict=True)
+        if isinstance(attempt, Exchange)
+    ]
+    if not commands:
+        raise NotPossibleError("none of several clients at once was answered")
+    for one in commands:
+        if one.accepted:
+            mapped.note(one.exchange)
+    due = mapped.due(commands[-1])
+    seen = mapped.watch(due, partial(_is_at_one, mapped, wanted)) + mapped.watch(mapped.clock.now() + STAYS_S)
+    return Leg("targets of several clients", start, tuple(commands), tuple(seen), due)
+
+
+def _outgoing(mapped: MappedDevice, targets: Position) -> Outgoing:
+    return Outgoing(mapped.api.client, *mapped.request_of(targets))
+
+
+def _is_at_one(mapped: MappedDevice, wanted: list[Position], readings: list[Reading]) -> bool:
+    return any(mapped.is_at(one, readings) for one in wanted)
