@@ -1,5 +1,6 @@
 """Whether a request was refused, accepted or cut off, by the status of its response."""
 
+from collections.abc import Callable
 from http import HTTPStatus
 
 from conformance.contract.sizes import LIMIT_OCTETS
@@ -8,6 +9,7 @@ from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Unanswer
 #: By these a server says that it, or one behind it, has failed; 503 says that it cannot now, 501 that it never can.
 CRASHES = frozenset({500, 502, 504})
 # Statuses that refuse a request for another reason than its content.
+_TRIES = 3
 _NO_REFUSALS = frozenset({401, 405, 406, 408, 429})
 
 
@@ -20,6 +22,15 @@ def is_refusal(exchange: Exchange) -> bool:
 def is_taken(exchange: Exchange) -> bool:
     """Return whether a valid request was accepted, or only put off: a goal of the robot's own may be active."""
     return exchange.response.ok or exchange.response.status == HTTPStatus.CONFLICT
+
+
+def usual_status(send: Callable[[], Exchange]) -> int:
+    """Return the status of a request that others are compared with: not that of a server error now and then."""
+    for _ in range(_TRIES):
+        status = send().response.status
+        if status < HTTPStatus.INTERNAL_SERVER_ERROR:
+            break
+    return status
 
 
 def is_cut_off(attempt: Attempt) -> bool:

@@ -1,5 +1,6 @@
 """Targets: unknown paths, trailing slashes, and targets and fields that are too long."""
 
+from functools import partial
 from urllib.parse import urljoin, urlsplit
 
 import pytest
@@ -10,6 +11,7 @@ from conformance.api.rest import by_hand
 from conformance.api.rest.applicable import reads
 from conformance.api.rest.calls import JSON, example_call
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.statuses import usual_status
 from conformance.documents.resources import inside_prefix, known_path, resources_of
 from conformance.transport import raw
 from conformance.transport.client import HttpClient
@@ -106,7 +108,7 @@ def test_long_targets(api: RestInterface, rest: HttpClient, judge: Judge) -> Non
     """Send long targets: the robot must accept or reject them, and still serve the next request."""
     judge.at_risk = ("http/uri-too-long",)
     for call in [call for call in reads(api) if not call.operation.optional]:
-        usual = call.send(api).response.status
+        usual = usual_status(partial(call.send, api))
         mark = "&" if "?" in call.path else "?"
         for length in _LONG_TARGETS:
             path = f"{call.path}{mark}roaas={'a' * length}"
@@ -132,7 +134,7 @@ def test_large_field(api: RestInterface, judge: Judge) -> None:
     """Send a field of 128 KiB: the robot refuses it, closes the connection or ignores it, and never fails with 5xx."""
     judge.at_risk = ("http/header-too-large",)
     for call in [call for call in reads(api) if not call.operation.optional][:3]:
-        usual = call.send(api).response.status
+        usual = usual_status(partial(call.send, api))
         attempt: Attempt
         try:
             attempt = call.send(api, ("X-Roaas", "a" * _LONG_FIELD), fresh=True)
@@ -149,7 +151,7 @@ def test_targets_of_8000_octets(api: RestInterface, rest: HttpClient, judge: Jud
     """Send a target of 8,000 octets where the robot takes a short one: RECOMMENDED (RFC 9110 4.1)."""
     for call in [call for call in reads(api) if not call.operation.optional]:
         path = f"{call.path}{'&' if '?' in call.path else '?'}roaas="
-        usual = rest.send("GET", f"{path}a").response.status
+        usual = usual_status(partial(rest.send, "GET", f"{path}a"))
         exchange = rest.send("GET", path + "a" * (_TARGET_TAKEN - len(rest.prefix) - len(path)))
         when = f"the target has {_TARGET_TAKEN:,} bytes, as with a short one"
         expect(judge, "http/target-length", exchange).status(usual, when=when)
@@ -159,7 +161,7 @@ def test_targets_of_8000_octets(api: RestInterface, rest: HttpClient, judge: Jud
 def test_absolute_form(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Send targets with scheme and authority (RFC 9112 3.2.2)."""
     for call in reads(api):
-        usual = call.send(api, ("Accept", JSON)).response.status
+        usual = usual_status(partial(call.send, api, ("Accept", JSON)))
         head = raw.head(rest, "GET", call.path, f"Accept: {JSON}", "Connection: close")
         absolute = head.replace(b" ", f" {rest.scheme}://{rest.authority}".encode(), 1)
         attempt = by_hand.ask_octets(api, absolute)
