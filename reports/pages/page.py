@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from reports.errors import ResultUnreadableError
@@ -80,6 +80,7 @@ def suite_version() -> str:
 def _environment(*, html: bool) -> Environment:
     environment = Environment(
         loader=FileSystemLoader(TEMPLATE_DIR),
+        bytecode_cache=_compiled(),
         autoescape=html,  # noqa: S701 - off for Markdown alone, where HTML entities would be shown as such
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -98,6 +99,14 @@ def _environment(*, html: bool) -> Environment:
         plain=plain,
     )
     return environment
+
+
+def _compiled() -> FileSystemBytecodeCache | None:
+    """Return Jinja's folder for compiled templates, which is the user's own, or None where there is none."""
+    try:
+        return FileSystemBytecodeCache()
+    except (OSError, RuntimeError):  # no temporary folder, or one that belongs to somebody else
+        return None
 
 
 def _finalize(value: Any) -> Any:
