@@ -16,6 +16,10 @@ class NoOccasionError(NotPossibleError):
     """Raised when the device gave no occasion, such as a goal in reach. What other checks judged stays judged."""
 
 
+class NotDeclaredError(NotPossibleError):
+    """Raised when the statement does not say what the scenario needs. What no other check judges is not claimed."""
+
+
 @dataclass(frozen=True)
 class Scenario:
     """One scenario.

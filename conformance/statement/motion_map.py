@@ -2,7 +2,8 @@
 
 Operations are written as in ``--call``: "METHOD PATH", the path as the description has it. Positions in responses are
 JSON pointers (RFC 6901). Bodies and paths are templates: "{yaw}" is the target of the axis yaw, "{seconds}" the
-duration of a move, and "{goto:/uuid}" a value in the response to the last accepted move.
+duration of a move, "{value}" the value of a switch, and "{goto:/uuid}" a value in the response to the last accepted
+move.
 """
 
 from __future__ import annotations
@@ -56,12 +57,17 @@ class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         axes: by name, as templates name them.
         stamp: where the time of the reading is in the response, a number or a date (RFC 3339); empty: there is none.
         fresh_s: at least so often the position changes while the device moves, s.
+        agrees: other operations that say it as well, each with JSON pointers by axis.
     """
 
     read: Call
     axes: dict[str, Axis]
     stamp: Pointer = ""
     fresh_s: Positive = 0.5
+    agrees: dict[Call, dict[str, Pointer]] = {}
+
+
+Beyond = Literal["refused", "clamped", "undefined"]
 
 
 class Goto(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -70,6 +76,7 @@ class Goto(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         send: the operation.
         body: its JSON, a template; None: it has no body.
+        relative: whether it takes the way from where the device is, in place of the position.
         tolerance: how far from its target an axis may rest, in the axis's unit.
         seconds: the duration that the suite asks for, where a template has "{seconds}".
         within_s: time to reach any target, where no template has "{seconds}".
@@ -81,11 +88,103 @@ class Goto(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     send: Call
     tolerance: Positive
     body: Any = None
+    relative: bool = False
     seconds: Positive = 1.0
     within_s: Positive = 10.0
     settle_s: NotNegative = 0.5
-    beyond_limits: Literal["refused", "clamped", "undefined"] = "undefined"
+    beyond_limits: Beyond = "undefined"
     while_moving: Literal["displaces", "refused"] = "displaces"
+
+
+class Action(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a move says of itself: a resource of its own that a client reads.
+
+    Attributes:
+        read: the operation, a template.
+        at: where the word for its state is in the response.
+        running, succeeded, canceled: these words; an empty list: not judged.
+    """
+
+    read: Call
+    at: Pointer
+    running: tuple[str, ...] = ()
+    succeeded: tuple[str, ...] = ()
+    canceled: tuple[str, ...] = ()
+
+
+class Speed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One velocity that can be commanded.
+
+    Attributes:
+        limits: least and greatest, in units per second.
+        at: where the state's response has the measured velocity; empty: it is the change of the axis ``of``.
+        of: the axis that it changes.
+        tolerance: how far the measured velocity may be off; None: that of the command.
+    """
+
+    limits: tuple[Finite, Finite]
+    at: Pointer = ""
+    of: str = ""
+    tolerance: Positive | None = None
+
+    def __post_init__(self) -> None:
+        """Check the limits, and that the velocity can be measured.
+
+        Raises:
+            ValueError: the limits do not lie on both sides of 0, or neither ``at`` nor ``of`` is given.
+        """
+        if not self.limits[0] <= 0 < self.limits[1]:
+            raise ValueError(f"limits = {list(self.limits)} must be the least velocity, at most 0, and the greatest")
+        if bool(self.at) == bool(self.of):
+            raise ValueError('one of at = "/pointer" and of = "axis" must say how the velocity is measured')
+
+
+class Velocity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How the device is given a velocity; zero stops it.
+
+    Attributes:
+        send: the operation.
+        body: its JSON, a template; None: it has no body.
+        axes: by name, as templates name them.
+        tolerance: how far the measured velocity may be off, in units per second.
+        settle_s: time to reach a velocity, and to rest, s.
+        hold_s: so long after the last command the device goes on, and no longer; None: until it is told otherwise.
+        beyond_limits: what the device does with a velocity beyond its limits: "refused", "clamped", or "undefined".
+    """
+
+    send: Call
+    axes: dict[str, Speed]
+    tolerance: Positive
+    body: Any = None
+    settle_s: Positive = 0.5
+    hold_s: Positive | None = None
+    beyond_limits: Beyond = "undefined"
+
+
+class Switch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What has a few states and no positions between them, such as a gripper.
+
+    Attributes:
+        send: the operation.
+        at: where the state's response has its value.
+        values: what is sent, in any order.
+        read: the operation that says it; empty: that of the state.
+        body: JSON of the command, a template with "{value}"; None: it has no body.
+        shows: what is read for a value that was sent, where it is another.
+        within_s: time until it is there, s.
+    """
+
+    send: Call
+    at: Pointer
+    values: Annotated[tuple[Any, ...], msgspec.Meta(min_length=2)]
+    read: Call | Literal[""] = ""
+    body: Any = None
+    shows: dict[str, Any] = {}
+    within_s: Positive = 2.0
+
+    def shown(self, value: Any) -> Any:
+        """Return what is read once a value was sent."""
+        return self.shows.get(str(value), value)
 
 
 class Stop(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -107,35 +206,74 @@ class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         state: where it is.
-        goto: how it is sent to a position.
-        stop: how it is stopped; None: not declared.
+        goto: how it is sent to a position; None: not declared.
+        velocity: how it is given a velocity; None: not declared.
+        stop: how it is stopped; None: not declared, or by a velocity of zero.
+        action: what a move says of itself; None: not declared.
+        switches: what has a few states, by name.
     """
 
     state: State
-    goto: Goto
+    goto: Goto | None = None
+    velocity: Velocity | None = None
     stop: Stop | None = None
+    action: Action | None = None
+    switches: dict[str, Switch] = {}
 
     def __post_init__(self) -> None:
-        """Check that the templates name each axis, and nothing that is not known.
+        """Check that something moves, and that the templates name each axis and nothing that is not known.
 
         Raises:
             ValueError: they do not.
         """
-        axes, moved = set(self.state.axes), names_in([self.goto.send, self.goto.body])
-        if missing := axes - moved:
-            raise ValueError(f"goto has no {{{min(missing)}}} in send or body, so nothing would move that axis")
-        stopped = names_in([self.stop.send, self.stop.body]) if self.stop else set()
-        if strange := {name for name in moved - axes - {"seconds"} | stopped if not name.startswith("goto:/")}:
-            raise ValueError(f"a template names {{{min(strange)}}}, which is neither an axis nor known")
+        if not (self.goto or self.velocity or self.switches):
+            raise ValueError("nothing would move: it needs [motion.goto], [motion.velocity] or [motion.switches]")
+        axes = set(self.state.axes)
+        if self.goto:
+            _check_names("goto", self.goto, axes, frozenset({"seconds"}))
+        elif loose := [name for name, axis in self.state.axes.items() if axis.tolerance is None]:
+            raise ValueError(f"axis {loose[0]} needs a tolerance, as there is no [motion.goto] that has one")
+        if self.velocity:
+            _check_names("velocity", self.velocity, set(self.velocity.axes))
+            if strange := {one.of for one in self.velocity.axes.values()} - axes - {""}:
+                raise ValueError(f"of = {min(strange)!r} is no axis of [motion.state.axes]")
+        for name, switch in self.switches.items():
+            _check_names(f"switches.{name}", switch, {"value"})
+        for given in filter(None, (self.stop, self.action)):
+            _refuse_strange(names_in(list(msgspec.structs.asdict(given).values())))
+        if strange := {name for pointers in self.state.agrees.values() for name in pointers} - axes:
+            raise ValueError(f"agrees names {min(strange)!r}, which is no axis of [motion.state.axes]")
 
     @property
     def calls(self) -> tuple[str, ...]:
         """The operations that the map names."""
-        return (self.state.read, self.goto.send, *([self.stop.send] if self.stop else ()))
+        given = (self.goto, self.velocity, self.stop, *self.switches.values())
+        sent = [one.send for one in given if one]
+        read = [self.state.read, *self.state.agrees, *(one.read for one in self.switches.values() if one.read)]
+        return (*read, *sent, *([self.action.read] if self.action else ()))
 
     def tolerance(self, axis: str) -> float:
         """Return how far from its target an axis may rest, in the axis's unit."""
-        return self.state.axes[axis].tolerance or self.goto.tolerance
+        own = self.state.axes[axis].tolerance
+        return own if own is not None else self.goto.tolerance if self.goto else 0.0
+
+    def speed_tolerance(self, name: str) -> float:
+        """Return how far a measured velocity may be off, in its unit."""
+        return (self.velocity.axes[name].tolerance or self.velocity.tolerance) if self.velocity else 0.0
+
+
+def _check_names(
+    table: str, given: Goto | Velocity | Switch, needed: set[str], more: frozenset[str] = frozenset()
+) -> None:
+    found = names_in([given.send, given.body])
+    if missing := needed - found:
+        raise ValueError(f"{table} has no {{{min(missing)}}} in send or body, so nothing would move that axis")
+    _refuse_strange(found - needed - more)
+
+
+def _refuse_strange(names: set[str]) -> None:
+    if strange := {name for name in names if not name.startswith("goto:/")}:
+        raise ValueError(f"a template names {{{min(strange)}}}, which is neither an axis nor known")
 
 
 def names_in(template: Any) -> set[str]:

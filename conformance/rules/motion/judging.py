@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from statistics import median
 
 from conformance.scenarios.motion import moves
-from conformance.scenarios.motion.trace import SEVERAL, Command, Leg, Reading, middle_of
+from conformance.scenarios.motion.trace import SEVERAL, Command, Drive, Leg, Reading, middle_of
 from conformance.scenarios.rule import Case, NotTested, Outcome
 from conformance.statement.motion_map import MotionMap
 
@@ -58,6 +59,72 @@ def reached(leg: Leg, goal: Command, motion: MotionMap) -> Iterator[Outcome]:
     yield Case(not apart, goal.exchange, expected, observed=found)
 
 
+def driven(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether the device drove as a drive wants it."""
+    if motion.velocity is None:
+        return
+    refused = next((one for one in drive.commands if not one.accepted), None)
+    if refused is not None:
+        yield Case(holds=False, exchange=refused.exchange, expected=f"a 2xx for {drive.what}")
+        return
+    first = drive.commands[0]
+    seen = [one for one in drive.under_way if one.sent >= first.answered + motion.velocity.settle_s]
+    for name, wanted in drive.wanted.items():
+        found = measured(seen, name, motion)
+        if found is None:
+            yield NotTested("the velocity could not be measured")
+            continue
+        yield Case(
+            abs(found - wanted) <= motion.speed_tolerance(name),
+            first.exchange,
+            f"{name} at {wanted:.4g} per second {motion.velocity.settle_s:g} s after the response ({drive.what})",
+            observed=f"{found:.4g}",
+            cause=name,
+        )
+
+
+def measured(readings: list[Reading], name: str, motion: MotionMap) -> float | None:
+    """Return a velocity by some readings, in units per second; None if they do not show it."""
+    of = motion.velocity.axes[name].of if motion.velocity else ""
+    if not of:
+        speeds = [one.speeds[name] for one in readings if one.speeds]
+        return median(speeds) if len(speeds) >= SEVERAL else None
+    seen = [one for one in readings if one.values]
+    if len(seen) < 2 * SEVERAL:
+        return None
+    first, last = seen[:SEVERAL], seen[-SEVERAL:]
+    lapse_s = (last[1].sent + last[1].received - first[1].sent - first[1].received) / 2
+    return (middle_of(last, of) - middle_of(first, of)) / lapse_s if lapse_s > 0 else None
+
+
+def usual_s(readings: Sequence[Reading]) -> float:
+    """Return how long a reading takes, by the median, s."""
+    return median(one.received - one.sent for one in readings) if readings else 0.0
+
+
 def named(position: dict[str, float]) -> str:
     """Return a position as a noun phrase."""
     return ", ".join(f"{axis} {value:.4g}" for axis, value in position.items())
+
+
+def moved_axis(leg: Leg) -> str:
+    """Return the axis along which the first move goes farthest."""
+    goal = leg.commands[0].targets
+    return max(goal, key=lambda name: abs(goal[name] - leg.start[name]))
+
+
+def stopped(leg: Leg, motion: MotionMap) -> tuple[tuple[Reading, ...], NotTested | Case | None]:
+    """Return the readings from when the device must rest, or why they cannot be judged."""
+    stop, (goal, order) = motion.stop, leg.commands[:2]
+    if stop is None or not order.accepted:
+        return (), Case(holds=False, exchange=order.exchange, expected="a 2xx for a stop under way")
+    before = [one for one in usable(leg) if one.received <= order.sent]
+    if not before:
+        return (), NotTested("the state could not be read before the stop")
+    axis, here = moved_axis(leg), before[-1].values
+    left, done = abs(goal.targets[axis] - here[axis]), abs(here[axis] - leg.start[axis])
+    if left < 4 * motion.tolerance(axis) or done < motion.tolerance(axis):
+        return (), NotTested("the device was not under way when it was stopped")
+    due = order.sent + stop.rests_within_s + usual_s(leg.readings)
+    readings = leg.after(due)
+    return readings, None if len(readings) > 2 * SEVERAL else NotTested("the state could not be read after the stop")

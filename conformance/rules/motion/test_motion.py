@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from statistics import median
 
-from conformance.rules.motion.judging import ALL, at, legs_of, named, off, reached, usable
+from conformance.rules.motion.judging import ALL, at, legs_of, moved_axis, named, off, reached, stopped, usable
 from conformance.scenarios.motion.moves import many_commands, new_targets, repeated, several_clients, stops, targets
 from conformance.scenarios.motion.trace import SEVERAL, Leg, Reading, middle_of
 from conformance.scenarios.rule import Case, NotClaimed, NotTested, Outcome, rule
@@ -18,6 +17,8 @@ _APART_S = 0.15
 _FASTER = 1.1
 # After the time to rest: for so long a device that still moves has not stopped in time; later it has set out again, s.
 _SOON_S = 0.5
+# Of the time that the rest of a way takes by the speed so far.
+_SURELY = 0.7
 _NO_STOP = NotClaimed("the map declares no stop")
 
 
@@ -94,40 +95,13 @@ def speed(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
         )
 
 
-def _moved_axis(leg: Leg) -> str:
-    """Return the axis along which the first move goes farthest."""
-    goal = leg.commands[0].targets
-    return max(goal, key=lambda name: abs(goal[name] - leg.start[name]))
-
-
-def _usual_s(leg: Leg) -> float:
-    return median(one.received - one.sent for one in leg.readings) if leg.readings else 0.0
-
-
-def _stopped(leg: Leg, motion: MotionMap) -> tuple[tuple[Reading, ...], NotTested | Case | None]:
-    """Return the readings from when the device must rest, or why they cannot be judged."""
-    stop, (goal, order) = motion.stop, leg.commands[:2]
-    if stop is None or not order.accepted:
-        return (), Case(holds=False, exchange=order.exchange, expected="a 2xx for a stop under way")
-    before = [one for one in usable(leg) if one.received <= order.sent]
-    if not before:
-        return (), NotTested("the state could not be read before the stop")
-    axis, here = _moved_axis(leg), before[-1].values
-    left, done = abs(goal.targets[axis] - here[axis]), abs(here[axis] - leg.start[axis])
-    if left < 4 * motion.tolerance(axis) or done < motion.tolerance(axis):
-        return (), NotTested("the device was not under way when it was stopped")
-    due = order.sent + stop.rests_within_s + _usual_s(leg)
-    readings = leg.after(due)
-    return readings, None if len(readings) > 2 * SEVERAL else NotTested("the state could not be read after the stop")
-
-
 @rule("motion/stop", on=(stops,))
 def stop_rests(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a stop under way stops the device in time, before its target."""
     if motion.stop is None:
         yield _NO_STOP
     for leg in trace:
-        readings, unusable = _stopped(leg, motion)
+        readings, unusable = stopped(leg, motion)
         if unusable is not None:
             yield unusable
             continue
@@ -154,7 +128,7 @@ def stop_lasts(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     if motion.stop is None:
         yield _NO_STOP
     for leg in trace:
-        readings, unusable = _stopped(leg, motion)
+        readings, unusable = stopped(leg, motion)
         if unusable is None:
             where, last = at(readings[:SEVERAL], motion), at(readings[-SEVERAL:], motion)
             moved = off(last, where, motion)
@@ -167,31 +141,49 @@ def stop_lasts(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
 @rule("motion/new-target", on=(new_targets,))
 def new_target(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge what a second target under way does: it displaces the first for good, or is refused, as declared."""
+    refuses = motion.goto is not None and motion.goto.while_moving == "refused"
     for leg in trace:
         first, second = leg.commands[:2]
-        if motion.goto.while_moving == "refused":
+        if not refuses:
+            yield from reached(leg, second, motion)
+            yield from _given_up(leg, motion)
+        elif second.refused or _arrives_at(leg, motion) > second.answered:
             yield Case(second.refused, second.exchange, "4xx for a second move under way")
             if second.refused:
                 yield from reached(leg, first, motion)
         else:
-            yield from reached(leg, second, motion)
-            yield from _given_up(leg, motion)
+            yield NotTested("the device may have arrived before it got the second move")
+
+
+def _arrives_at(leg: Leg, motion: MotionMap) -> float:
+    """Return when the device arrives at the first target at the earliest, by its speed before the second move."""
+    first, second = leg.commands[:2]
+    seen = [one for one in usable(leg) if one.received <= second.sent]
+    axis = moved_axis(leg)
+    way = [abs(one.values[axis] - leg.start[axis]) for one in seen]
+    moved = [index for index, one in enumerate(way) if one > motion.tolerance(axis)]
+    if not moved or way[-1] == 0:
+        return 0.0
+    since_s = seen[-1].received - first.sent
+    left = abs(first.targets[axis] - seen[-1].values[axis]) - motion.tolerance(axis)
+    return seen[-1].sent + _SURELY * left / way[-1] * since_s
 
 
 def _given_up(leg: Leg, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a device that has another target gives up the first one within the time to settle."""
     first, second = leg.commands[:2]
-    readings = leg.after(second.answered + motion.goto.settle_s)
+    settle_s = motion.goto.settle_s if motion.goto else 0.0
+    readings = leg.after(second.answered + settle_s)
     if not second.accepted or len(readings) < SEVERAL:
         return
-    axis = _moved_axis(leg)
+    axis = moved_axis(leg)
     ahead = 1 if first.targets[axis] > leg.start[axis] else -1
     places = [ahead * one.values[axis] for one in readings]
     farther = max(places) - places[0]
     yield Case(
         farther <= 2 * motion.tolerance(axis),
         second.exchange,
-        f"{axis} no nearer to the first target {motion.goto.settle_s:g} s after a second one was accepted",
+        f"{axis} no nearer to the first target {settle_s:g} s after a second one was accepted",
         observed=f"{farther:.3g} nearer after that",
         cause="first target",
     )

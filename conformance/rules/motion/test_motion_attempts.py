@@ -5,10 +5,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Container, Iterable, Iterator
 
-from conformance.rules.motion.judging import ALL, at, legs_of, off, reached, usable
+from conformance.rules.motion.judging import ALL, at, driven, legs_of, off, reached, usable
 from conformance.scenarios.motion.attempts import attempts_at_rest
 from conformance.scenarios.motion.moves import clamped_targets
-from conformance.scenarios.motion.trace import SEVERAL, Leg, Quiet, Tried
+from conformance.scenarios.motion.trace import SEVERAL, Drive, Leg, Quiet, Tried
+from conformance.scenarios.motion.velocities import clamped_velocities
 from conformance.scenarios.rule import Case, NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
 
@@ -53,14 +54,14 @@ def _refused(tried: Iterable[Tried], statuses: Container[int], expected: str) ->
         yield Case(holds, one.exchange, f"{expected} for {one.what}", cause=one.kind)
 
 
-@rule("motion/beyond-limits", on=(clamped_targets, attempts_at_rest))
-def beyond_limits(trace: Quiet | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether a target beyond the limits is refused or clamped, as the map says."""
+@rule("motion/beyond-limits", on=(clamped_targets, clamped_velocities, attempts_at_rest))
+def beyond_limits(trace: Quiet | tuple[Leg, ...] | tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether a target or a velocity beyond the limits is refused or clamped, as the map says."""
     if not isinstance(trace, Quiet):
-        for leg in trace:
-            yield from reached(leg, leg.commands[-1], motion)
+        for one in trace:
+            yield from driven(one, motion) if isinstance(one, Drive) else reached(one, one.commands[-1], motion)
         return
-    if motion.goto.beyond_limits == "undefined":
+    if all(one is None or one.beyond_limits == "undefined" for one in (motion.goto, motion.velocity)):
         yield NotClaimed("the map does not say what becomes of a target beyond the limits")
     yield from _refused((one for one in trace.tried if one.kind == "beyond"), range(400, 500), "4xx")
 

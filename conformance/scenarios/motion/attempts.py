@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
 
@@ -11,8 +11,9 @@ from conformance.api.rest.validity import INVALID, validity
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.motion.moves import beyond
 from conformance.scenarios.motion.trace import Quiet, Tried
-from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
+from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
+from conformance.statement.motion_map import Axis, Goto, Speed, Velocity
 from conformance.transport.exchange import NoAnswerError
 from conformance.transport.incomplete_request import PartialRequest
 
@@ -44,8 +45,16 @@ def attempts_at_rest(mapped: MappedDevice) -> Quiet:
 def _quiet(mapped: MappedDevice, tries: list[Callable[[], Tried]]) -> Quiet:
     where = mapped.where()
     tried = tuple(one() for one in tries)
-    readings = mapped.watch(mapped.clock.now() + min(mapped.takes_s, _EFFECT_S) + mapped.motion.goto.settle_s)
+    readings = mapped.watch(mapped.clock.now() + _effect_s(mapped))
     return Quiet(where, tried, tuple(readings))
+
+
+def _effect_s(mapped: MappedDevice) -> float:
+    """Return how long the effect of an attempt is awaited, s."""
+    move, velocity = mapped.motion.goto, mapped.motion.velocity
+    moves_s = min(mapped.takes_s, _EFFECT_S) + move.settle_s if move else 0.0
+    drives_s = min(velocity.hold_s or _EFFECT_S, _EFFECT_S) + velocity.settle_s if velocity else 0.0
+    return max(moves_s, drives_s)
 
 
 def _moved(mapped: MappedDevice, quiet: Quiet) -> bool:
@@ -53,53 +62,77 @@ def _moved(mapped: MappedDevice, quiet: Quiet) -> bool:
 
 
 def _tries(mapped: MappedDevice) -> Iterator[Callable[[], Tried]]:
-    """Yield functions that make one attempt each."""
-    goto, axes = mapped.motion.goto, mapped.motion.state.axes
-    if goto.beyond_limits == "refused":
-        for name, _, value in beyond(mapped):
-            yield partial(_send, mapped, "beyond", f"{name} {value:g}, beyond its limit", {name: value})
-    for name, axis in axes.items():
+    """Yield functions that make one attempt each, with moves and with velocities."""
+    move, velocity = mapped.motion.goto, mapped.motion.velocity
+    if not (move or velocity):
+        raise NotDeclaredError("the map has neither [motion.goto] nor [motion.velocity]")
+    if move:
+        yield from _tries_of(_Sender(mapped, move, mapped.motion.state.axes, "a move"))
+    if velocity:
+        yield from _tries_of(_Sender(mapped, velocity, velocity.axes, "a velocity"))
+
+
+def _tries_of(sender: _Sender) -> Iterator[Callable[[], Tried]]:
+    if sender.given.beyond_limits == "refused":
+        for name, _, value in beyond(sender.axes):
+            yield partial(sender.send, "beyond", f"{name} {value:g}, beyond its limit", {name: value})
+    for name, axis in sender.axes.items():
         values: tuple[tuple[str, Any], ...] = (
             (f'the text "far" as {name}', "far"),
             (f"a list as {name}", [axis.limits[1]]),
         )
         for what, value in values:
-            if _is_invalid(mapped, {name: value}):
-                yield partial(_send, mapped, "invalid", what, {name: value})
-    first, axis = next(iter(axes.items()))
+            if sender.is_invalid({name: value}):
+                yield partial(sender.send, "invalid", what, {name: value})
+    first, axis = next(iter(sender.axes.items()))
     away = {first: axis.limits[1]}
-    if mapped.api.client.connection.credentials.items:
-        yield partial(_send, mapped, "unauthorised", "a move without credentials", away, authorized=False)
-    if goto.body is not None:
-        yield partial(_send_broken, mapped, away)
+    if sender.mapped.api.client.connection.credentials.items:
+        yield partial(sender.send, "unauthorised", f"{sender.what} without credentials", away, authorized=False)
+    if sender.given.body is not None:
+        yield partial(sender.send_broken, away)
         for promised in (10, None):
-            yield partial(_vanish, mapped, away, promised)
+            yield partial(sender.vanish, away, promised)
 
 
-def _is_invalid(mapped: MappedDevice, targets: dict[str, Any]) -> bool:
-    """Return whether the description forbids a move."""
-    method, path, fields, octets = mapped.request_of(targets)
-    media_type = "application/json" if fields else ""
-    return validity(mapped.api.run.contract, method, path, media_type, octets).verdict == INVALID
+@dataclass(frozen=True)
+class _Sender:
+    """Sends commands of one kind that must move nothing.
 
+    Attributes:
+        mapped: the device.
+        given: how such a command is sent.
+        axes: what it commands.
+        what: "a move" or "a velocity".
+    """
 
-def _send(mapped: MappedDevice, kind: str, what: str, targets: dict[str, Any], *, authorized: bool = True) -> Tried:
-    method, path, fields, octets = mapped.request_of(targets)
-    exchange = mapped.api.client.send(method, path, headers=fields, body=octets, authorized=authorized)
-    return Tried(kind, what, exchange)
+    mapped: MappedDevice
+    given: Goto | Velocity
+    axes: Mapping[str, Axis | Speed]
+    what: str
 
+    def is_invalid(self, values: dict[str, Any]) -> bool:
+        """Return whether the description forbids a command."""
+        method, path, fields, octets = self.mapped.request_of(self.given, values)
+        media_type = "application/json" if fields else ""
+        return validity(self.mapped.api.run.contract, method, path, media_type, octets).verdict == INVALID
 
-def _send_broken(mapped: MappedDevice, targets: dict[str, Any]) -> Tried:
-    method, path, fields, octets = mapped.request_of(targets)
-    exchange = mapped.api.client.send(method, path, headers=fields, body=octets + b"}")
-    return Tried("invalid", "a body that is not JSON", exchange)
+    def send(self, kind: str, what: str, values: dict[str, Any], *, authorized: bool = True) -> Tried:
+        """Send a command."""
+        method, path, fields, octets = self.mapped.request_of(self.given, values)
+        exchange = self.mapped.api.client.send(method, path, headers=fields, body=octets, authorized=authorized)
+        return Tried(kind, what, exchange)
 
+    def send_broken(self, values: dict[str, Any]) -> Tried:
+        """Send a command whose body is not JSON."""
+        method, path, fields, octets = self.mapped.request_of(self.given, values)
+        exchange = self.mapped.api.client.send(method, path, headers=fields, body=octets + b"}")
+        return Tried("invalid", f"{self.what} whose body is not JSON", exchange)
 
-def _vanish(mapped: MappedDevice, targets: dict[str, Any], promised: int | None) -> Tried:
-    """Send a move of which some bytes are missing, and close the connection."""
-    method, path, _, octets = mapped.request_of(targets)
-    whole = None if promised is None else len(octets) + promised
-    request = PartialRequest(mapped.api.client, method, path, sent=octets, promised=whole)
-    mapped.clock.sleep(_READ_S)
-    request.vanish(reset=promised is None)
-    return Tried("incomplete", "a move of which some bytes were not sent", None)
+    def vanish(self, values: dict[str, Any], promised: int | None) -> Tried:
+        """Send a command of which some bytes are missing, and close the connection."""
+        method, path, _, octets = self.mapped.request_of(self.given, values)
+        whole = None if promised is None else len(octets) + promised
+        request = PartialRequest(self.mapped.api.client, method, path, sent=octets, promised=whole)
+        self.mapped.clock.sleep(_READ_S)
+        request.vanish(reset=promised is None)
+        return Tried("incomplete", f"{self.what} of which some bytes were not sent", None)

@@ -9,10 +9,10 @@ from typing import Any, Final
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.json_text import read_json
 from conformance.observe.clock import WALL_CLOCK, Clock
-from conformance.scenarios.motion.templates import NoValueError, at, filled, seconds_of
+from conformance.scenarios.motion.templates import NoValueError, at, filled, numbers_at, seconds_of
 from conformance.scenarios.motion.trace import SEVERAL, Command, Leg, Reading, middle_of
-from conformance.scenarios.scenario import NotPossibleError
-from conformance.statement.motion_map import MotionMap, names_in
+from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
+from conformance.statement.motion_map import Goto, MotionMap, Switch, Velocity, names_in
 from conformance.transport.client import Headers
 from conformance.transport.exchange import Exchange
 
@@ -25,6 +25,8 @@ _STOP_S: Final = 2.0
 # A device that takes one move at a time may still finish the one before: it is asked again for so long, so often, s.
 _FINISHES_S: Final = 1.0
 _AGAIN_S: Final = 0.05
+# A device that takes no positions comes to rest in that time, s.
+_RESTS_S: Final = 5.0
 
 Position = dict[str, float]
 
@@ -63,18 +65,39 @@ class MappedDevice:
         return min(max(value, least + margin), greatest - margin)
 
     @property
+    def moves(self) -> Goto:
+        """How it is sent to a position.
+
+        Raises:
+            NotDeclaredError: the map does not say it.
+        """
+        if self.motion.goto is None:
+            raise NotDeclaredError("the map has no [motion.goto]")
+        return self.motion.goto
+
+    @property
+    def drives(self) -> Velocity:
+        """How it is given a velocity.
+
+        Raises:
+            NotDeclaredError: the map does not say it.
+        """
+        if self.motion.velocity is None:
+            raise NotDeclaredError("the map has no [motion.velocity]")
+        return self.motion.velocity
+
+    @property
     def takes_s(self) -> float:
         """Time that the device has for a move, without the time to settle, s."""
-        return self._lasts_s or self.motion.goto.within_s
+        return self._lasts_s or self.moves.within_s
 
     @property
     def _lasts_s(self) -> float:
         """How long a move lasts, s; 0: as long as the way takes."""
-        goto = self.motion.goto
-        return goto.seconds if "seconds" in names_in([goto.send, goto.body]) else 0.0
+        return self.moves.seconds if "seconds" in names_in([self.moves.send, self.moves.body]) else 0.0
 
     def read(self) -> Reading:
-        """Read the state.
+        """Read the state, and what the last accepted move says of itself.
 
         Raises:
             NoAnswerError: there is no response.
@@ -82,25 +105,59 @@ class MappedDevice:
         state, wait = self.motion.state, self._read_at + _PACE_S - self.clock.now()
         self.clock.sleep(wait)
         self._read_at = sent = self.clock.now()
-        method, _, path = state.read.partition(" ")
-        exchange = self.api.client.send(method, path, headers=(("Accept", "application/json"),))
-        received, document = self.clock.now(), read_json(exchange.response.body).value
-        try:
-            values = {name: float(at(document, axis.at)) for name, axis in state.axes.items()}
-        except (NoValueError, TypeError, ValueError):
-            values = {}
+        exchange, document = self.get(state.read)
+        received = self.clock.now()
+        values = numbers_at(document, {name: axis.at for name, axis in state.axes.items()})
+        measured = self.motion.velocity.axes.items() if self.motion.velocity else ()
+        speeds = numbers_at(document, {name: speed.at for name, speed in measured if speed.at})
         try:
             stamp = seconds_of(at(document, state.stamp)) if state.stamp else None
         except NoValueError:
             stamp = None
-        return Reading(sent, received, values if exchange.response.ok else {}, stamp, exchange)
+        return Reading(
+            sent, received, values if exchange.response.ok else {}, stamp, exchange, speeds, self._action_state()
+        )
 
-    def request_of(self, targets: Mapping[str, Any]) -> tuple[str, str, Headers, bytes]:
-        """Return method, path, header fields and body of a move; an axis without a target goes home."""
-        goto = self.motion.goto
-        values = {**self.home, **targets, "seconds": goto.seconds}
-        method, _, path = goto.send.partition(" ")
-        return method, filled(path, values, self._answer), *_content(filled(goto.body, values, self._answer))
+    def get(self, call: str) -> tuple[Exchange, Any]:
+        """Send a reading operation of the map; return the exchange and its JSON, None if it is none.
+
+        Raises:
+            NoAnswerError: there is no response.
+        """
+        method, _, path = call.partition(" ")
+        exchange = self.api.client.send(method, path, headers=(("Accept", "application/json"),))
+        return exchange, read_json(exchange.response.body).value
+
+    def _action_state(self) -> str:
+        action = self.motion.action
+        if action is None or self._answer is None:
+            return ""
+        try:
+            return str(at(self.get(filled(action.read, {}, self._answer))[1], action.at))
+        except NoValueError:
+            return ""
+
+    def request_of(self, given: Goto | Velocity | Switch, values: Mapping[str, Any]) -> tuple[str, str, Headers, bytes]:
+        """Return method, path, header fields and body of a command.
+
+        An axis without a value goes home, or stands still.
+        """
+        if isinstance(given, Goto):
+            values = {**self.home, **values}
+            if given.relative:
+                here = self.where()
+                values = {name: value - here[name] if _is_number(value) else value for name, value in values.items()}
+            values = {**values, "seconds": given.seconds}
+        elif isinstance(given, Velocity):
+            values = {**dict.fromkeys(given.axes, 0.0), **values}
+        method, _, path = given.send.partition(" ")
+        return method, filled(path, values, self._answer), *_content(filled(given.body, values, self._answer))
+
+    def _command(self, given: Goto | Velocity, values: Mapping[str, float], targets: Position) -> Command:
+        method, path, fields, octets = self.request_of(given, values)
+        sent = self.clock.now()
+        exchange = self.api.client.send(method, path, headers=fields, body=octets)
+        return Command(sent, self.clock.now(), targets, exchange)
 
     def goto(self, targets: Mapping[str, float], ends: Mapping[str, float] | None = None) -> Command:
         """Send a move; ``ends``: where it must end, if not at the targets.
@@ -108,27 +165,32 @@ class MappedDevice:
         Raises:
             NoAnswerError: there is no response.
         """
-        method, path, fields, octets = self.request_of(targets)
-        sent = self.clock.now()
-        exchange = self.api.client.send(method, path, headers=fields, body=octets)
-        command = Command(sent, self.clock.now(), {**self.home, **(ends or targets)}, exchange)
+        command = self._command(self.moves, targets, {**self.home, **(ends or targets)})
         if command.accepted:
-            self.note(exchange)
+            self.note(command.exchange)
         return command
+
+    def drive(self, speeds: Mapping[str, float]) -> Command:
+        """Command velocities; those without a value are 0.
+
+        Raises:
+            NoAnswerError: there is no response.
+        """
+        return self._command(self.drives, speeds, {**dict.fromkeys(self.drives.axes, 0.0), **speeds})
 
     def note(self, exchange: Exchange) -> None:
         """Keep the response to an accepted move, if it can be read: a stop may name its id."""
         self._answer = read_json(exchange.response.body).value or self._answer
 
     def stop(self) -> Command | None:
-        """Send the stop; return None if the map has none, or it names what is not known yet.
+        """Send the stop, or velocity 0; return None if the map has neither, or it names what is not known yet.
 
         Raises:
             NoAnswerError: there is no response.
         """
         stop = self.motion.stop
         if stop is None:
-            return None
+            return self.drive({}) if self.motion.velocity else None
         method, _, path = stop.send.partition(" ")
         try:
             path, body = filled(path, {}, self._answer), filled(stop.body, {}, self._answer)
@@ -184,25 +246,49 @@ class MappedDevice:
 
     def due(self, command: Command) -> float:
         """Return when the target of a command must have been reached, s of the clock."""
-        return command.answered + self.takes_s + self.motion.goto.settle_s
+        return command.answered + self.takes_s + self.moves.settle_s
 
     def go(self, what: str, targets: Mapping[str, float], ends: Mapping[str, float] | None = None) -> Leg:
         """Send one move and watch it; ``ends``: where it must end, if not at the targets."""
         start, until = self.where(), self.clock.now() + _FINISHES_S
         command = self.goto(targets, ends)
-        while self.motion.goto.while_moving == "refused" and command.refused and self.clock.now() < until:
+        while self.moves.while_moving == "refused" and command.refused and self.clock.now() < until:
             self.clock.sleep(_AGAIN_S)
             command = self.goto(targets, ends)
         return Leg(what, start, (command,), tuple(self.follow(command)) if command.accepted else (), self.due(command))
 
     def bring_home(self) -> None:
-        """Stop what goes on, and bring the device home.
+        """Stop what goes on, and bring the device home; one that takes no positions stays where it comes to rest.
 
         Raises:
             NotPossibleError: it does not get there.
             NoAnswerError: there is no response.
         """
+        if self.motion.goto is None:
+            self.come_to_rest()
+            return
         self.stop()
         self.go("home", {})
         if not self.is_near(self.where(), self.home):
             raise NotPossibleError("the device does not come back to the position from which the suite begins")
+
+    def come_to_rest(self) -> None:
+        """Stop what goes on, and wait until the device rests.
+
+        Raises:
+            NotPossibleError: it does not.
+            NoAnswerError: there is no response.
+        """
+        self.stop()
+        until = self.clock.now() + _RESTS_S
+        while True:
+            before = self.where()
+            self.watch(self.clock.now() + STAYS_S)
+            if self.is_near(self.where(), before):
+                return
+            if self.clock.now() > until:
+                raise NotPossibleError("the device does not come to rest")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float)

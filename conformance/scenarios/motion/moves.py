@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Final
+from typing import Final, TypeVar
 
 from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice, Position
 from conformance.scenarios.motion.trace import Command, Leg, Reading
-from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, PartialTraceError, scenario
+from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
+from conformance.statement.motion_map import Axis, Speed
 from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.transport.parallel import Outgoing, send_together
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
 _NEEDS: Final = (Need.REST, Need.MOTION)
+_Part = TypeVar("_Part")
 # Of the way: so far a device has come when it is stopped, or gets another target.
 _UNDER_WAY: Final = 0.3
 _CLIENTS: Final = 4
@@ -32,15 +34,15 @@ _COMMANDS: Final = 100
 _BEYOND: Final = (0.05, 0.5)
 
 
-def _recorded(legs: Iterator[Leg]) -> tuple[Leg, ...]:
-    """Return legs as they are made.
+def recorded(made: Iterable[_Part]) -> tuple[_Part, ...]:
+    """Return legs or drives as they are made.
 
     Raises:
         PartialTraceError: there was no response; what was recorded before is kept.
     """
-    found: list[Leg] = []
+    found: list[_Part] = []
     try:
-        found.extend(legs)
+        found.extend(made)
     except (NoAnswerError, NotPossibleError) as error:
         raise PartialTraceError(tuple(found)) from error
     return tuple(found)
@@ -49,7 +51,7 @@ def _recorded(legs: Iterator[Leg]) -> tuple[Leg, ...]:
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
 def targets(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Leg, ...]:
     """Send the device to the limits of each axis and back; at standard also to positions of all axes at random."""
-    return _recorded(_to_targets(mapped, effort, run.seed))
+    return recorded(_to_targets(mapped, effort, run.seed))
 
 
 def _to_targets(mapped: MappedDevice, effort: Effort, seed: int) -> Iterator[Leg]:
@@ -67,18 +69,18 @@ def _to_targets(mapped: MappedDevice, effort: Effort, seed: int) -> Iterator[Leg
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
 def clamped_targets(mapped: MappedDevice) -> tuple[Leg, ...]:
     """Send the device beyond its limits, where the map says that it goes as far as it can."""
-    if mapped.motion.goto.beyond_limits != "clamped":
-        raise NoOccasionError("the map does not say that targets beyond the limits are clamped")
+    if mapped.moves.beyond_limits != "clamped":
+        raise NotDeclaredError("the map does not say that targets beyond the limits are clamped")
     mapped.bring_home()
-    return _recorded(
+    return recorded(
         mapped.go(f"{name} {value:g}, beyond its limit", {name: value}, {name: limit})
-        for name, limit, value in beyond(mapped)
+        for name, limit, value in beyond(mapped.motion.state.axes)
     )
 
 
-def beyond(mapped: MappedDevice) -> Iterator[tuple[str, float, float]]:
-    """Yield axes, their limits, and targets beyond these."""
-    for name, axis in mapped.motion.state.axes.items():
+def beyond(axes: Mapping[str, Axis | Speed]) -> Iterator[tuple[str, float, float]]:
+    """Yield axes, their limits, and targets or velocities beyond these."""
+    for name, axis in axes.items():
         for part in _BEYOND:
             room = part * (axis.limits[1] - axis.limits[0])
             yield name, axis.limits[0], axis.limits[0] - room
@@ -119,7 +121,7 @@ def _ways(mapped: MappedDevice, effort: Effort) -> Iterator[tuple[str, float, _W
 def stops(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
     """Stop the device under way, and watch it for as long as the rest of the way would have taken, and longer."""
     stop = mapped.motion.stop
-    return _recorded(_to_stops(mapped, effort, stop.rests_within_s)) if stop else ()
+    return recorded(_to_stops(mapped, effort, stop.rests_within_s)) if stop and mapped.moves else ()
 
 
 def _to_stops(mapped: MappedDevice, effort: Effort, rests_s: float) -> Iterator[Leg]:
@@ -135,7 +137,18 @@ def _to_stops(mapped: MappedDevice, effort: Effort, rests_s: float) -> Iterator[
 @scenario(needs=_NEEDS, stage=Stage.MOTION)
 def new_targets(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
     """Send the device back under way, and watch for as long as the first move would have taken, and longer."""
-    return _recorded(_to_new_targets(mapped, effort))
+    _need_positions(mapped)
+    return recorded(_to_new_targets(mapped, effort))
+
+
+def _need_positions(mapped: MappedDevice) -> None:
+    """Check that a move names its end: where moves are relative, nobody knows where several of them end.
+
+    Raises:
+        NotDeclaredError: it does not.
+    """
+    if mapped.moves.relative:
+        raise NotDeclaredError("moves are relative: where they end when they come together, nobody declares")
 
 
 def _to_new_targets(mapped: MappedDevice, effort: Effort) -> Iterator[Leg]:
@@ -150,6 +163,7 @@ def _to_new_targets(mapped: MappedDevice, effort: Effort) -> Iterator[Leg]:
 @scenario(needs=_NEEDS, stage=Stage.MOTION)
 def many_commands(mapped: MappedDevice, effort: Effort) -> Leg:
     """Send many targets in a row, without waiting for any of them."""
+    _need_positions(mapped)
     name, axis = next(iter(mapped.motion.state.axes.items()))
     ends = [axis.limits[turn % 2] for turn in range(effort.cases(_COMMANDS))]
     return _in_a_row(mapped, f"{len(ends)} targets in a row", [{name: end} for end in ends])
@@ -158,6 +172,7 @@ def many_commands(mapped: MappedDevice, effort: Effort) -> Leg:
 @scenario(needs=_NEEDS, stage=Stage.MOTION)
 def repeated(mapped: MappedDevice) -> Leg:
     """Send one move twice, as a client does that tries again."""
+    _need_positions(mapped)
     name, axis = next(iter(mapped.motion.state.axes.items()))
     return _in_a_row(mapped, "a move that was sent twice", [{name: axis.limits[0]}] * 2)
 
@@ -173,7 +188,8 @@ def _in_a_row(mapped: MappedDevice, what: str, wanted: list[Position]) -> Leg:
 @scenario(needs=_NEEDS, stage=Stage.MOTION)
 def several_clients(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
     """Send different targets from several clients at the same moment."""
-    return _recorded(_of_clients(mapped) for _ in range(1 if effort.name == "quick" else 3))
+    _need_positions(mapped)
+    return recorded(_of_clients(mapped) for _ in range(1 if effort.name == "quick" else 3))
 
 
 def _of_clients(mapped: MappedDevice) -> Leg:
@@ -203,7 +219,7 @@ def _of_clients(mapped: MappedDevice) -> Leg:
 
 
 def _outgoing(mapped: MappedDevice, targets: Position) -> Outgoing:
-    return Outgoing(mapped.api.client, *mapped.request_of(targets))
+    return Outgoing(mapped.api.client, *mapped.request_of(mapped.moves, targets))
 
 
 def _is_at_one(mapped: MappedDevice, wanted: list[Position], readings: list[Reading]) -> bool:

@@ -61,6 +61,14 @@ def at(document: Any, pointer: str) -> Any:
     return value
 
 
+def numbers_at(document: Any, pointers: Mapping[str, str]) -> dict[str, float]:
+    """Return the numbers at JSON pointers by name; empty if one is missing."""
+    try:
+        return {name: float(at(document, pointer)) for name, pointer in pointers.items()}
+    except (NoValueError, TypeError, ValueError):
+        return {}
+
+
 def seconds_of(stamp: Any) -> float | None:
     """Return a stamp as seconds: a number, or a date (RFC 3339); None if it is neither."""
     if isinstance(stamp, bool):

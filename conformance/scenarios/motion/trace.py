@@ -6,8 +6,9 @@ Times are s of the run's monotonic clock; positions are in the units of the map'
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from statistics import median
+from typing import Any
 
 from conformance.transport.exchange import Exchange
 
@@ -24,6 +25,8 @@ class Reading:
         values: positions by axis; empty: the response has not all of them.
         stamp: the device's time, s; None: there is none.
         exchange: request and response.
+        speeds: measured velocities by their names, of those that the response has.
+        action: what the last accepted move said of itself just after; empty: not read.
     """
 
     sent: float
@@ -31,15 +34,17 @@ class Reading:
     values: dict[str, float]
     stamp: float | None
     exchange: Exchange
+    speeds: dict[str, float] = field(default_factory=dict)
+    action: str = ""
 
 
 @dataclass(frozen=True)
 class Command:
-    """A move that was sent, or a stop.
+    """A move or a velocity that was sent, or a stop.
 
     Attributes:
         sent, answered: when.
-        targets: positions by axis; empty for a stop.
+        targets: positions, or velocities, by axis; empty for a stop.
         exchange: request and response.
     """
 
@@ -80,6 +85,60 @@ class Leg:
     def after(self, moment: float) -> tuple[Reading, ...]:
         """Return the usable readings that were requested after a moment."""
         return tuple(one for one in self.readings if one.sent >= moment and one.values)
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A velocity, commanded again and again, and what came after it.
+
+    Attributes:
+        what: as a noun phrase.
+        wanted: velocities by name, as the device must take them.
+        commands: in order; all of them command the same.
+        under_way: the readings until the last of them.
+        end: the command of velocity zero; None: nothing was sent any more.
+        after: the readings after that.
+    """
+
+    what: str
+    wanted: dict[str, float]
+    commands: tuple[Command, ...]
+    under_way: tuple[Reading, ...]
+    end: Command | None
+    after: tuple[Reading, ...]
+
+
+@dataclass(frozen=True)
+class Told:
+    """What several operations tell of one position, at rest.
+
+    Attributes:
+        values: by operation; empty: it has not all of them.
+        exchanges: by operation.
+    """
+
+    values: dict[str, dict[str, float]]
+    exchanges: dict[str, Exchange]
+
+
+@dataclass(frozen=True)
+class Switched:
+    """A value that a switch was set to, and what was read.
+
+    Attributes:
+        switch: its name.
+        value: what was sent.
+        command: request and response.
+        shown: what was read last, within its time and a moment later.
+        arrived, stayed: whether that was the value then.
+    """
+
+    switch: str
+    value: Any
+    command: Exchange
+    shown: Any
+    arrived: bool
+    stayed: bool
 
 
 @dataclass(frozen=True)

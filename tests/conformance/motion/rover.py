@@ -1,20 +1,21 @@
-"""A simulated rover on another framework than the arm: it drives at its speed, takes one move at a time, and clamps."""
+"""A simulated rover on aiohttp: it drives at its speed or a given one, takes one move at a time, and clamps."""
 
 import asyncio
 import datetime as dt
+import json
 import logging
 import math
-import random
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from aiohttp import web
+from body import Body
+from descriptions import answered, content, described, problem
 
-LIMIT = 0.6
-SPEED = 3.0
+LIMIT, SPEED, FASTEST, HOLD_S = 0.6, 3.0, 0.5, 0.4
+LIMITS = {"x": (-LIMIT, LIMIT), "y": (-LIMIT, LIMIT)}
 MAP = f"""
 [motion.state]
 read = "GET /pose"
@@ -33,123 +34,154 @@ tolerance = 0.03
 beyond_limits = "clamped"
 while_moving = "refused"
 
+[motion.velocity]
+send = "PUT /velocity"
+body = {{ ahead = "{{ahead}}", left = "{{left}}" }}
+tolerance = 0.08
+settle_s = 0.2
+hold_s = {HOLD_S}
+beyond_limits = "refused"
+
+[motion.velocity.axes]
+ahead = {{ limits = [-{FASTEST}, {FASTEST}], of = "x" }}
+left = {{ limits = [-{FASTEST}, {FASTEST}], at = "/velocity/1" }}
+
+[motion.switches.gripper]
+send = "PUT /gripper/{{value}}"
+at = "/gripper"
+values = ["open", "closed"]
+shows = {{ open = "OPEN", closed = "CLOSED" }}
+within_s = 0.5
+
 [motion.stop]
 send = "DELETE /goal"
 rests_within_s = 0.3
 """
 _NUMBER = {"type": "number"}
+_TWO = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}
+_SPEED = {"type": "number", "minimum": -FASTEST, "maximum": FASTEST}
+_VELOCITY = {"type": "object", "properties": {"ahead": _SPEED, "left": _SPEED}, "required": ["ahead", "left"]}
 _POSE = {
     "type": "object",
     "properties": {
-        "pose": {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2},
+        "pose": _TWO,
+        "velocity": _TWO,
+        "gripper": {"enum": ["OPEN", "CLOSED"]},
         "time": {"type": "string", "format": "date-time"},
     },
-    "required": ["pose", "time"],
+    "required": ["pose", "velocity", "gripper", "time"],
 }
 
 
-def _described(schema: dict[str, Any]) -> dict[str, Any]:
-    return {"description": "", "content": {"application/json": {"schema": schema}}}
+def _in_path(name: str, schema: dict[str, Any]) -> dict[str, Any]:
+    return {"name": name, "in": "path", "required": True, "schema": schema}
 
 
-_DONE = {"200": _described({"type": "object"})}
-_REFUSED = {"409": _described({"type": "object"}), "422": _described({"type": "object"})}
-DESCRIPTION = {
-    "openapi": "3.0.3",
-    "info": {"title": "Rover", "version": "1"},
-    "paths": {
-        "/pose": {"get": {"responses": {"200": _described(_POSE)}}},
+_DONE = {"200": answered({"type": "object"})}
+_REFUSED = {"409": problem(), "422": problem()}
+DESCRIPTION = described(
+    "Rover",
+    {
+        "/pose": {"get": {"responses": {"200": answered(_POSE)}}},
         "/goal/{x}/{y}": {
-            "put": {
-                "parameters": [{"name": name, "in": "path", "required": True, "schema": _NUMBER} for name in "xy"],
-                "responses": {**_DONE, **_REFUSED},
-            }
+            "put": {"parameters": [_in_path(name, _NUMBER) for name in "xy"], "responses": {**_DONE, **_REFUSED}}
         },
         "/goal": {"delete": {"responses": _DONE}},
+        "/velocity": {
+            "put": {"requestBody": content(_VELOCITY), "responses": {**_DONE, "400": problem(), "422": problem()}}
+        },
+        "/gripper/{state}": {
+            "put": {
+                "parameters": [_in_path("state", {"enum": ["open", "closed"]})],
+                "responses": {**_DONE, "422": problem()},
+            }
+        },
     },
-}
+)
 
 
 class Rover:
-    """The rover: each move is a straight line at its speed.
+    """The rover's API before its body; ``body``: the mechanics, None: right ones."""
 
-    Args:
-        fault: name of what is wrong with it; empty: nothing.
-        noise: standard deviation of what it says of its position, m.
-        seed: of the noise.
-    """
+    def __init__(self, body: Body | None = None) -> None:
+        self.body = body or Body(LIMITS)
 
-    def __init__(self, fault: str = "", noise: float = 0.0, seed: int = 0) -> None:
-        self.fault, self.noise = fault, noise
-        self.chance = random.Random(seed)  # noqa: S311 - no secret
-        self.start = self.target = (0.0, 0.0)
-        self.began = time.monotonic()
-        self.speed = {"crawls": 0.2, "races": 4 * SPEED}.get(fault, SPEED * 0.9)
+    def answer(self, method: str, path: str, octets: bytes) -> tuple[int, Any]:
+        """Return status and JSON of the response to a request."""
+        what, *values = path.strip("/").split("/")
+        if what == "pose":
+            return 200, self._pose()
+        if what == "gripper":
+            return self._grip(values[0])
+        if what == "velocity":
+            return self._drive(octets)
+        if method == "DELETE":
+            self.body.halt(self.body.now())
+            return 200, {}
+        return self._go(values)
 
-    def at(self, now: float) -> tuple[float, float]:
-        """Return where it is."""
-        way = math.dist(self.start, self.target)
-        share = min(1.0, (now - self.began) * self.speed / way) if way else 1.0
-        x, y = (begin + share * (end - begin) for begin, end in zip(self.start, self.target, strict=True))
-        return x, y
+    def _pose(self) -> dict[str, Any]:
+        now = self.body.now()
+        time = dt.datetime.fromtimestamp(self.body.stamp(now), dt.UTC).isoformat()
+        return {
+            "pose": list(self.body.told().values()),
+            "velocity": list(self.body.velocity(now).values()),
+            "gripper": self.body.gripper(now).upper(),
+            "time": time,
+        }
 
-    def go(self, target: tuple[float, float], now: float) -> None:
-        """Set out to a target."""
-        self.start, self.target, self.began = self.at(now), target, now
-
-    def moving(self, now: float) -> bool:
-        """Return whether it is on its way."""
-        return (now - self.began) * self.speed < math.dist(self.start, self.target)
-
-    async def description(self, _: web.Request) -> web.Response:
-        """GET /openapi.json."""
-        return web.json_response(DESCRIPTION)
-
-    async def pose(self, _: web.Request) -> web.Response:
-        """GET /pose."""
-        x, y = self.at(time.monotonic())
-        if self.noise:
-            x, y = x + self.chance.gauss(0, self.noise), y + self.chance.gauss(0, self.noise)
-        return web.json_response({"pose": [x, y], "time": dt.datetime.now(dt.UTC).isoformat()})
-
-    async def goal(self, request: web.Request) -> web.Response:
-        """PUT /goal/{x}/{y}."""
-        now = time.monotonic()
+    def _go(self, values: list[str]) -> tuple[int, dict[str, Any]]:
         try:
-            x, y = (float(request.match_info[name]) for name in "xy")
+            numbers = [float(one) for one in values]
         except ValueError:
-            return web.json_response({"detail": "no number"}, status=422)
-        if not (math.isfinite(x) and math.isfinite(y)):
-            return web.json_response({"detail": "no finite number"}, status=422)
-        if self.moving(now) and self.fault != "takes-second":
-            return web.json_response({"detail": "on its way"}, status=409)
-        limit = 10.0 if self.fault == "does-not-clamp" else LIMIT
-        target = max(-limit, min(limit, x)), max(-limit, min(limit, y))
-        if self.fault == "wrong-sign":
-            target = -target[0], target[1]
-        self.go(target, now)
-        return web.json_response({})
+            return 422, {"detail": "no number"}
+        if not all(map(math.isfinite, numbers)):
+            return 422, {"detail": "no finite number"}
+        if self.body.moving(self.body.now()) and not self.body.takes_second:
+            return 409, {"detail": "on its way"}
+        target = {name: max(-LIMIT, min(LIMIT, one)) for name, one in zip("xy", numbers, strict=True)}
+        here = self.body.at(self.body.now())
+        self.body.go(target, math.dist(list(here.values()), list(target.values())) / (0.9 * SPEED))
+        return 200, {}
 
-    async def stop(self, _: web.Request) -> web.Response:
-        """DELETE /goal."""
-        now = time.monotonic()
-        if self.fault == "coasts":
-            here = self.at(now)
-            ahead = [one + 0.9 * (end - one) for one, end in zip(here, self.target, strict=True)]
-            self.go((ahead[0], ahead[1]), now)
-        elif self.fault != "no-stop":
-            self.go(self.at(now), now)
-        return web.json_response({})
+    def _drive(self, octets: bytes) -> tuple[int, dict[str, Any]]:
+        try:
+            wanted = json.loads(octets)
+        except ValueError:
+            return 400, {"detail": "no JSON"}
+        found = [wanted.get(name) for name in ("ahead", "left")] if isinstance(wanted, dict) else [None]
+        speeds = [one for one in found if isinstance(one, int | float) and not isinstance(one, bool)]
+        if len(speeds) < len(LIMITS):
+            return 422, {"detail": "no velocity"}
+        if not all(abs(one) <= FASTEST for one in speeds):
+            return 422, {"detail": "too fast"}
+        self.body.drive(dict(zip("xy", map(float, speeds), strict=True)), HOLD_S, self.body.now())
+        return 200, {}
+
+    def _grip(self, state: str) -> tuple[int, dict[str, Any]]:
+        if state not in {"open", "closed"}:
+            return 422, {"detail": "open or closed"}
+        self.body.grip(state, self.body.now())
+        return 200, {}
+
+    async def _over_http(self, request: web.Request) -> web.Response:
+        status, document = self.answer(request.method, request.path, await request.read())
+        return web.json_response(document, status=status)
+
+    async def _description(self, _: web.Request) -> web.Response:
+        return web.json_response(DESCRIPTION)
 
     def app(self) -> web.Application:
         """Return the web application."""
         app = web.Application()
         app.add_routes(
             [
-                web.get("/openapi.json", self.description),
-                web.get("/pose", self.pose),
-                web.put("/goal/{x}/{y}", self.goal),
-                web.delete("/goal", self.stop),
+                web.get("/openapi.json", self._description),
+                web.get("/pose", self._over_http),
+                web.put("/goal/{x}/{y}", self._over_http),
+                web.delete("/goal", self._over_http),
+                web.put("/velocity", self._over_http),
+                web.put("/gripper/{state}", self._over_http),
             ]
         )
         return app

@@ -5,7 +5,8 @@ import sys
 
 import pytest
 import rover
-from arm import MAP, Arm
+from arm import LIMITS, MAP, Arm
+from body import Body
 from processes import ended
 from rover import Rover, serving_rover
 from serving_apps import serving_app
@@ -29,8 +30,10 @@ def _of_arm(arm, tmp_path):
 
 
 def test_a_right_arm_is_not_blamed(tmp_path):
-    done, judged = _of_arm(Arm(noise=0.003), tmp_path)
-    assert {id_ for id_, verdict in judged.items() if verdict != "pass"} == {"motion/unauthorised-still"}, done.stdout
+    done, judged = _of_arm(Arm(Body(LIMITS, noise=0.003)), tmp_path)
+    undeclared = {"unauthorised-still", "velocity", "velocity-stop", "watchdog", "hold", "switches"}
+    missing = {f"motion/{name}" for name in undeclared}
+    assert {id_ for id_, verdict in judged.items() if verdict != "pass"} == missing, done.stdout
     # Its moves are stored, and can be judged again without it.
     again = ["replay", "--recorded", str(tmp_path / "out"), "--statement", str(tmp_path / "device.toml")]
     told = ended(sys.executable, "-m", "roaas", *again)
@@ -38,14 +41,15 @@ def test_a_right_arm_is_not_blamed(tmp_path):
 
 
 def test_a_right_rover_that_clamps_and_takes_one_move_at_a_time_is_not_blamed(tmp_path):
-    done, judged = _judged(serving_rover(Rover(noise=0.004)), rover.MAP, tmp_path)
-    missing = {"motion/unauthorised-still", "motion/incomplete-still"}
+    done, judged = _judged(serving_rover(Rover(Body(rover.LIMITS, noise=0.004))), rover.MAP, tmp_path)
+    undeclared = {"unauthorised-still", "agrees", "action-runs", "action-succeeds", "action-canceled"}
+    missing = {f"motion/{name}" for name in undeclared}
     assert {id_ for id_, verdict in judged.items() if verdict != "pass"} == missing, done.stdout
 
 
 @pytest.mark.parametrize(("fault", "requirement"), [("mixes", "one-client"), ("incomplete-moves", "incomplete-still")])
 def test_a_fault_of_the_arm_is_found(fault, requirement, tmp_path):
-    done, judged = _of_arm(Arm(fault), tmp_path)
+    done, judged = _of_arm(Arm(fault=fault), tmp_path)
     assert judged[f"motion/{requirement}"] == "fail", done.stdout
 
 
@@ -65,7 +69,7 @@ def test_without_permission_nothing_moves(tmp_path):
             "--out",
             str(tmp_path / "out"),
         )
-    assert arm.moves == 0
+    assert arm.body.moves == 0
 
 
 @pytest.mark.parametrize(
@@ -84,13 +88,13 @@ def test_a_wrong_map_is_refused_and_nothing_moves(right, wrong, told, tmp_path):
         statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n{changed}', encoding="utf-8")
         more = ["--allow-motion", "--out", str(tmp_path / "out")]
         done = ended(sys.executable, "-m", "roaas", "certify", str(statement), *more)
-    assert (done.returncode, arm.moves) == (2, 0)
+    assert (done.returncode, arm.body.moves) == (2, 0)
     assert told in done.stderr
 
 
 def test_a_device_that_the_map_cannot_see_is_not_moved(tmp_path):
     arm = Arm()
     done, judged = _judged(serving_app(arm.app()), MAP.replace("/joints/pan", "/joints/pen"), tmp_path)
-    assert (arm.moves, "pass" in judged.values()) == (0, False), done.stdout
+    assert (arm.body.moves, "pass" in judged.values()) == (0, False), done.stdout
     assert done.returncode == 4
     assert "/joints/pen" in done.stdout

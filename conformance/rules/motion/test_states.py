@@ -1,0 +1,113 @@
+"""Whether what a device tells of its moves and its position agrees, and whether its switches switch (motion map)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from conformance.rules.motion.judging import off, stopped, usable
+from conformance.scenarios.motion.moves import stops, targets
+from conformance.scenarios.motion.states import agreement, switched
+from conformance.scenarios.motion.trace import SEVERAL, Leg, Reading, Switched, Told
+from conformance.scenarios.rule import Case, NotClaimed, NotTested, Outcome, rule
+from conformance.statement.motion_map import MotionMap
+
+_NO_ACTION = NotClaimed("the map has no [motion.action]")
+
+
+@rule("motion/agrees", on=(agreement,))
+def agrees(trace: tuple[Told, ...], motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether all operations tell the same position at rest: one of several readings in a row is enough."""
+    own = motion.state.read
+    for index in range(0, len(trace) - SEVERAL + 1, SEVERAL):
+        rounds = [told for told in trace[index : index + SEVERAL] if told.values[own]]
+        for call in motion.state.agrees if rounds else ():
+            apart = [_apart(told.values[call], told.values[own], motion) for told in rounds]
+            yield Case(
+                not all(apart),
+                rounds[-1].exchanges[call],
+                f"the same position from {call} as from {own}, at rest",
+                observed=apart[-1],
+                cause=call,
+            )
+
+
+def _apart(values: dict[str, float], own: dict[str, float], motion: MotionMap) -> str:
+    if not values:
+        return "no numbers at the map's pointers"
+    return off(values, {name: own[name] for name in values}, motion)
+
+
+@rule("motion/action-succeeds", on=(targets,))
+def action_succeeds(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether a move says that it succeeded once it is there, and not before."""
+    action = motion.action
+    if action is None or not action.succeeded:
+        yield _NO_ACTION
+        return
+    for leg in trace:
+        goal, seen = leg.commands[-1], usable(leg)
+        early = [
+            seen[index]
+            for index in range(len(seen) - SEVERAL)
+            if seen[index].action in action.succeeded
+            and all(off(one.values, goal.targets, motion, 2) for one in seen[index : index + SEVERAL])
+        ]
+        if goal.accepted and seen:
+            words = " or ".join(action.succeeded)
+            expected = f"{words} at {action.at} when {leg.what} is reached, and not before"
+            found = f"{early[0].action} under way" if early else f"{seen[-1].action or 'nothing'} at the end"
+            yield Case(not early and seen[-1].action in action.succeeded, goal.exchange, expected, observed=found)
+
+
+@rule("motion/action-runs", on=(targets,))
+def action_runs(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether a move under way says that it runs."""
+    action = motion.action
+    if action is None or not action.running:
+        yield _NO_ACTION
+        return
+    for leg in trace:
+        goal = leg.commands[-1]
+        under_way = [one for one in usable(leg) if _is_between(one, leg, motion)]
+        if goal.accepted and len(under_way) >= SEVERAL:
+            words = {one.action for one in under_way}
+            found = " and ".join(sorted(words)) or "nothing"
+            expected = f"{' or '.join(action.running)} at {action.at} under way ({leg.what})"
+            yield Case(bool(words & set(action.running)), goal.exchange, expected, observed=found)
+
+
+def _is_between(one: Reading, leg: Leg, motion: MotionMap) -> bool:
+    """Return whether a reading shows the device off its start and off its target."""
+    return bool(off(one.values, leg.start, motion) and off(one.values, leg.commands[-1].targets, motion, 3))
+
+
+@rule("motion/action-canceled", on=(stops,))
+def action_canceled(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether a move that was stopped says that it was canceled."""
+    action = motion.action
+    if action is None or not action.canceled:
+        yield _NO_ACTION
+        return
+    for leg in trace:
+        readings, unusable = stopped(leg, motion)
+        if isinstance(unusable, NotTested):
+            yield unusable
+        elif readings:
+            yield Case(
+                leg.readings[-1].action in action.canceled,
+                leg.commands[-1].exchange,
+                f"{' or '.join(action.canceled)} at {action.at} after {leg.what}",
+                observed=leg.readings[-1].action or "nothing",
+            )
+
+
+@rule("motion/switches", on=(switched,))
+def switches(trace: tuple[Switched, ...]) -> Iterator[Outcome]:
+    """Judge whether each switch takes each of its values, and keeps it."""
+    for one in trace:
+        expected = f"{one.switch} {one.value!r} shown, and kept"
+        found = f"{one.shown!r}" + (" a moment later" if one.arrived else "")
+        holds = one.command.response.ok and one.arrived and one.stayed
+        yield Case(
+            holds, one.command, expected, observed="" if not one.command.response.ok else found, cause=one.switch
+        )

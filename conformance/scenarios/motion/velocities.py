@@ -1,0 +1,103 @@
+"""Scenarios that give a device velocities by its motion map: at the limits and between, ended by zero or let go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from conformance.scenarios.motion.mapped import MappedDevice, Position
+from conformance.scenarios.motion.moves import beyond, recorded
+from conformance.scenarios.motion.trace import Drive, Reading
+from conformance.scenarios.scenario import NotDeclaredError, scenario
+from conformance.scenarios.stage import Need, Stage
+from conformance.verdict.effort import Effort
+
+_NEEDS: Final = (Need.REST, Need.MOTION)
+# For so long a velocity is measured once it must be reached, s.
+MEASURED_S: Final = 0.5
+# Of the limit: velocities at standard.
+_SHARES: Final = (1.0, 0.4)
+# A device is told its velocity that often within its hold time, at least every so many s.
+_KEPT: Final = 3
+_KEPT_S: Final = 0.1
+# After the time to rest it is watched for so long, s.
+_REST_S: Final = 0.5
+
+
+@scenario(needs=_NEEDS, stage=Stage.DRIVE)
+def velocities(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
+    """Drive each axis at its limits, there and back, and end each drive with velocity 0; at standard slowly as well."""
+    shares = _SHARES[: 1 if effort.name == "quick" else None]
+    return recorded(
+        _drive(mapped, f"{name} {share * limit:g}", {name: share * limit})
+        for name, axis in mapped.drives.axes.items()
+        for share in shares
+        for limit in _there_and_back(mapped, axis.limits, axis.of)
+    )
+
+
+@scenario(needs=_NEEDS, stage=Stage.DRIVE)
+def clamped_velocities(mapped: MappedDevice) -> tuple[Drive, ...]:
+    """Command velocities beyond the limits, where the map says that the device drives as fast as it can."""
+    if mapped.drives.beyond_limits != "clamped":
+        raise NotDeclaredError("the map does not say that velocities beyond the limits are clamped")
+    return recorded(
+        _drive(mapped, f"{name} {value:g}, beyond its limit", {name: value}, {name: limit})
+        for name, limit, value in beyond(mapped.drives.axes)
+        if limit
+    )
+
+
+@scenario(needs=_NEEDS, stage=Stage.DRIVE)
+def let_go(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
+    """Command a velocity, and then nothing any more, as when the client vanishes or the network breaks."""
+    hold_s = mapped.drives.hold_s
+    if hold_s is None:
+        raise NotDeclaredError("the map declares no hold_s: the device goes on until it is told otherwise")
+    axes = list(mapped.drives.axes.items())
+    return recorded(
+        _drive(mapped, f"{name} {limit:g}, let go", {name: limit}, let_go_s=hold_s)
+        for _ in range(1 if effort.name == "quick" else 2)
+        for name, axis in (axes[:1] if effort.name == "quick" else axes)
+        for limit in _there_and_back(mapped, axis.limits, axis.of)
+    )
+
+
+def _there_and_back(mapped: MappedDevice, limits: tuple[float, float], of: str) -> Iterator[float]:
+    """Yield the velocities other than 0, first the one that leads away from the nearer end of the axis."""
+    least, greatest = limits
+    ahead = True
+    if of:
+        ends = mapped.motion.state.axes[of].limits
+        ahead = mapped.where()[of] <= sum(ends) / 2
+    yield from filter(None, (greatest, least) if ahead else (least, greatest))
+
+
+def _drive(
+    mapped: MappedDevice, what: str, speeds: Position, ends: Position | None = None, *, let_go_s: float | None = None
+) -> Drive:
+    """Drive at a velocity.
+
+    Args:
+        mapped: the device.
+        what: the drive, as a noun phrase.
+        speeds: what is commanded.
+        ends: what the device must take instead.
+        let_go_s: its hold time, if nothing is sent after the drive; None: velocity 0 is.
+    """
+    given = mapped.drives
+    mapped.come_to_rest()
+    every_s = min(_KEPT_S, given.hold_s / _KEPT) if given.hold_s else _KEPT_S
+    commands, readings = [mapped.drive(speeds)], list[Reading]()
+    until = commands[0].answered + given.settle_s + MEASURED_S
+    while mapped.clock.now() < until and commands[-1].accepted:
+        if mapped.clock.now() >= commands[-1].sent + every_s:
+            commands.append(mapped.drive(speeds))
+        readings.append(mapped.read())
+    end = None if let_go_s is not None else mapped.drive({})
+    last = end or commands[-1]
+    after = mapped.watch(last.answered + (let_go_s or 0.0) + given.settle_s + _REST_S)
+    if end is None:
+        mapped.stop()
+    wanted = {**dict.fromkeys(given.axes, 0.0), **speeds, **(ends or {})}
+    return Drive(what, wanted, tuple(commands), tuple(readings), end, tuple(after))

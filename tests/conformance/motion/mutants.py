@@ -1,0 +1,363 @@
+"""Mutants of a moving device by rule: an effect, on an axis or in a direction, always or now and then.
+
+Each mutant is a function that changes a body (body.py) in one way.
+"""
+# ruff: noqa: ARG001, ARG005 - effects of one kind have one signature
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from body import Body, Position
+
+Change = Callable[[Body], None]
+_NEAR_S = 0.1
+
+
+def _on_target(
+    effect: Callable[[Body, Position, Position], Position | None], when: Callable[[Body, Position], bool]
+) -> Change:
+    """Return a mutant that aims at another place; None: it does not move."""
+
+    def change(body: Body) -> None:
+        right = body.aim
+
+        def aim(target: Position, seconds: float, now: float) -> None:
+            there: Position | None = target
+            if seconds > _NEAR_S / 10 and when(body, target):  # a stop aims at where it is
+                there = effect(body, target, body.at(now))
+            if there is not None:
+                right(there, seconds, now)
+
+        body.aim = aim  # type: ignore[method-assign]
+
+    return change
+
+
+def _always(_: Body, __: Position) -> bool:
+    return True
+
+
+def _in_three(body: Body, _: Position) -> bool:
+    return body.moves % 3 == 0
+
+
+def _below(body: Body, target: Position) -> bool:
+    return any(value < 0 for value in target.values())
+
+
+def _far(body: Body, target: Position) -> bool:
+    return any(value in body.limits[name] for name, value in target.items())
+
+
+_WHEN = {"": _always, "@third": _in_three, "@negative": _below, "@limits": _far}
+
+
+def _along(axis: str) -> dict[str, Callable[[Body, Position, Position], Position | None]]:
+    """Return the effects on one axis."""
+
+    def but(value: Callable[[float, float], float]) -> Callable[[Body, Position, Position], Position]:
+        return lambda _, target, here: {**target, axis: value(target[axis], here[axis])}
+
+    return {
+        "short": but(lambda target, here: here + 0.85 * (target - here)),
+        "beyond": but(lambda target, _: 1.15 * target),
+        "mirrored": but(lambda target, _: -target),
+        "offset": but(lambda target, _: target + 0.06),
+        "frozen": but(lambda _, here: here),
+    }
+
+
+def target_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
+    """Yield mutants that go elsewhere, in time or not."""
+    for axis in axes:
+        for name, effect in _along(axis).items():
+            yield f"{name}:{axis}", _on_target(effect, _always)
+    first, second = axes
+    swap = lambda _, target, __: {first: target[second], second: target[first]}  # noqa: E731
+    yield "swapped", _on_target(swap, _always)
+    for when in ("@third", "@negative", "@limits"):
+        yield f"short:{first}{when}", _on_target(_along(first)["short"], _WHEN[when])
+    yield "dropped@third", _on_target(lambda *_: None, _in_three)
+    yield "home@third", _on_target(lambda *_: dict.fromkeys(axes, 0.0), _in_three)
+    yield "late", _timed(lambda seconds: seconds * 3 + 0.9)
+    yield "too-fast", _timed(lambda seconds: seconds * 0.08)
+    yield "starts-late", _delayed(1.2)
+    yield "comes-back", _after_move(lambda body, start, target: start, 0.1)
+    yield "drifts", _said_with(lambda body, here, still_s: {**here, first: here[first] + min(0.3, 0.3 * still_s)})
+    yield (
+        "trembles",
+        _said_with(lambda body, here, _: {**here, second: here[second] + (0.1 if int(body.now() * 8) % 2 else -0.1)}),
+    )
+
+
+def _timed(seconds_of: Callable[[float], float]) -> Change:
+    def change(body: Body) -> None:
+        right = body.go
+        body.go = lambda target, seconds: right(target, seconds_of(seconds))  # type: ignore[method-assign]
+
+    return change
+
+
+def _delayed(delay_s: float) -> Change:
+    def change(body: Body) -> None:
+        right = body.aim
+
+        def go(target: Position, seconds: float) -> None:
+            body.moves += 1
+            body.later.append((body.now() + delay_s, lambda due: right(target, seconds, due)))
+
+        body.go = go  # type: ignore[method-assign]
+
+    return change
+
+
+def _after_move(where: Callable[[Body, Position, Position], Position], wait_s: float) -> Change:
+    """Return a mutant that goes on to another place a moment after each move."""
+
+    def change(body: Body) -> None:
+        right = body.go
+
+        def go(target: Position, seconds: float) -> None:
+            start = body.at(body.now())
+            right(target, seconds)
+            there = where(body, start, target)
+            body.later.append((body.now() + seconds + wait_s, lambda due: body.aim(there, 0.3, due)))
+
+        body.go = go  # type: ignore[method-assign]
+
+    return change
+
+
+def _said_with(effect: Callable[[Body, Position, float], Position]) -> Change:
+    """Return a mutant that is elsewhere once it has arrived; the effect gets its position and how long it rests, s."""
+
+    def change(body: Body) -> None:
+        right = body._at  # noqa: SLF001 - the mechanics themselves
+
+        def at(now: float) -> Position:
+            here = right(now)
+            still_s = now - body.began - body.seconds
+            return effect(body, here, still_s) if still_s > 0 and not any(body.speeds.values()) else here
+
+        body._at = at  # type: ignore[method-assign]  # noqa: SLF001
+
+    return change
+
+
+def second_mutants() -> Iterator[tuple[str, Change]]:
+    """Yield mutants that treat a second move under way wrongly."""
+
+    def changed(effect: Callable[[Body, Position, float, Callable[[Position, float, float], None]], None]) -> Change:
+        def change(body: Body) -> None:
+            right, aim = body.go, body.aim
+
+            def go(target: Position, seconds: float) -> None:
+                if body.moving(body.now()):
+                    body.moves += 1
+                    effect(body, target, seconds, aim)
+                else:
+                    right(target, seconds)
+
+            body.go, body.takes_second = go, True  # type: ignore[method-assign]
+
+        return change
+
+    def later(body: Body, target: Position, seconds: float, aim: Any) -> None:
+        body.later.append((body.began + body.seconds, lambda due: aim(target, seconds, due)))
+
+    def back(body: Body, target: Position, seconds: float, aim: Any) -> None:
+        first = dict(body.target)
+        aim(target, seconds, body.now())
+        body.later.append((body.now() + seconds + 0.2, lambda due: aim(first, seconds, due)))
+
+    def between(body: Body, target: Position, seconds: float, aim: Any) -> None:
+        aim({name: (value + body.target[name]) / 2 for name, value in target.items()}, seconds, body.now())
+
+    yield "second-ignored", changed(lambda *_: None)
+    yield "second-queued", changed(later)
+    yield "second-then-first", changed(back)
+    yield "second-between", changed(between)
+    yield "second-stops", changed(lambda body, target, seconds, aim: body.halt(body.now()))
+
+
+def stop_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
+    """Yield mutants that do not stop, or not for good."""
+
+    def changed(effect: Callable[[Body, float, Callable[[float], None]], None]) -> Change:
+        def change(body: Body) -> None:
+            right = body.halt
+            body.halt = lambda now: effect(body, now, right)  # type: ignore[method-assign]
+
+        return change
+
+    def only_moving(
+        effect: Callable[[Body, float, Callable[[float], None]], None],
+    ) -> Callable[[Body, float, Callable[[float], None]], None]:
+        return lambda body, now, right: effect(body, now, right) if body.moving(now) else right(now)
+
+    def then(there: Callable[[Body], Position], wait_s: float) -> Change:
+        def effect(body: Body, now: float, right: Callable[[float], None]) -> None:
+            target = there(body)
+            right(now)
+            body.later.append((now + wait_s, lambda due: body.aim(target, 0.5, due)))
+
+        return changed(only_moving(effect))
+
+    def creep(body: Body, now: float, _: Any) -> None:
+        here, target = body.at(now), body.target
+        body.aim({name: one + 0.4 * (target[name] - one) for name, one in here.items()}, 3.0, now)
+
+    def one_axis(body: Body, now: float, _: Any) -> None:
+        body.aim({**body.at(now), axes[0]: body.target[axes[0]]}, 0.4, now)
+
+    def half(body: Body, now: float, right: Callable[[float], None]) -> None:
+        body.stops = getattr(body, "stops", 0) + 1  # type: ignore[attr-defined]
+        if body.stops % 2 == 0:  # type: ignore[attr-defined]
+            right(now)
+
+    yield "stop-ignored", changed(only_moving(lambda *_: None))
+    yield "stop-late", changed(only_moving(lambda body, now, right: body.later.append((now + 0.6, right))))
+    yield "stop-half", changed(only_moving(half))
+    yield "stop-creeps", changed(only_moving(creep))
+    yield "stop-one-axis", changed(only_moving(one_axis))
+    yield "stop-resumes", then(lambda body: dict(body.target), 0.8)
+    yield "stop-goes-home", then(lambda body: dict.fromkeys(axes, 0.0), 0.4)
+    yield "stop-goes-back", then(lambda body: dict(body.start), 0.3)
+
+
+def reading_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
+    """Yield mutants whose readings are old or wrong."""
+
+    def stale(every_s: float) -> Change:
+        def change(body: Body) -> None:
+            said: list[tuple[float, Position]] = []
+
+            def old(now: float) -> Position:
+                if not said or now - said[-1][0] > every_s:
+                    said.append((now, body.at(now)))
+                return said[-1][1]
+
+            body.said = old  # type: ignore[method-assign]
+
+        return change
+
+    def said(effect: Callable[[Body, float], Position]) -> Change:
+        def change(body: Body) -> None:
+            body.said = lambda now: effect(body, now)  # type: ignore[method-assign]
+
+        return change
+
+    def stamped(stamp: Callable[[float], float]) -> Change:
+        def change(body: Body) -> None:
+            body.stamp = stamp  # type: ignore[method-assign]
+
+        return change
+
+    yield "stale", stale(0.6)
+    yield "frozen-reading", said(lambda body, now: {**body.at(now), axes[1]: 0.0})
+    yield "mirrored-reading", said(lambda body, now: {**body.at(now), axes[0]: -body.at(now)[axes[0]]})
+    yield "scaled-reading", said(lambda body, now: {name: 57.3 * one for name, one in body.at(now).items()})
+    yield "target-as-reading", said(lambda body, now: dict(body.target))
+    yield "stamp-stuck", stamped(lambda _: 5.0)
+    yield "stamp-back", stamped(lambda now: 1e6 - now)
+
+
+def action_mutants() -> Iterator[tuple[str, Change]]:
+    """Yield mutants that say something else of a move."""
+
+    def said(words: dict[str, str]) -> Change:
+        def change(body: Body) -> None:
+            right = body.action
+            body.action = lambda: words.get(right(), right())  # type: ignore[method-assign]
+
+        return change
+
+    yield "action-early", said({"running": "done"})
+    yield "action-endless", said({"done": "running"})
+    yield "action-stopped-as-done", said({"stopped": "done"})
+    yield "action-running-as-stopped", said({"running": "stopped"})
+
+
+def velocity_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
+    """Yield mutants that take a velocity wrongly, or do not let go."""
+
+    def changed(effect: Callable[[Body, Position, float], tuple[Position, float] | None]) -> Change:
+        def change(body: Body) -> None:
+            right = body.drive
+
+            def drive(speeds: Position, hold_s: float, now: float) -> None:
+                found = effect(body, speeds, hold_s)
+                if found is not None:
+                    right(*found, now)
+
+            body.drive = drive  # type: ignore[method-assign]
+
+        return change
+
+    def times(factor: float, axis: str) -> Change:
+        return changed(lambda body, speeds, hold_s: ({**speeds, axis: factor * speeds[axis]}, hold_s))
+
+    def half(body: Body, speeds: Position, hold_s: float) -> tuple[Position, float]:
+        body.drives = getattr(body, "drives", 0) + 1  # type: ignore[attr-defined]
+        return speeds, hold_s if body.drives % 2 else 60.0  # type: ignore[attr-defined]
+
+    for axis in axes:
+        yield f"velocity-slow:{axis}", times(0.7, axis)
+        yield f"velocity-fast:{axis}", times(1.3, axis)
+        yield f"velocity-mirrored:{axis}", times(-1.0, axis)
+        yield f"velocity-ignored:{axis}", times(0.0, axis)
+    yield "velocity-swapped", changed(lambda _, speeds, hold_s: (_swapped(speeds), hold_s))
+    yield "velocity-stop-ignored", changed(lambda _, speeds, hold_s: (speeds, hold_s) if any(speeds.values()) else None)
+    yield (
+        "velocity-stop-creeps",
+        changed(lambda _, speeds, hold_s: (speeds if any(speeds.values()) else dict.fromkeys(axes, 0.15), 60.0)),
+    )
+    yield "watchdog-none", changed(lambda _, speeds, hold_s: (speeds, 60.0))
+    yield "watchdog-late", changed(lambda _, speeds, hold_s: (speeds, 2.5 * hold_s))
+    yield "watchdog-half", changed(half)
+    yield "hold-short", changed(lambda _, speeds, hold_s: (speeds, 0.3 * hold_s))
+
+
+def _swapped(speeds: Position) -> Position:
+    return dict(zip(speeds, reversed(speeds.values()), strict=True))
+
+
+def switch_mutants() -> Iterator[tuple[str, Change]]:
+    """Yield mutants of a gripper."""
+
+    def changed(effect: Callable[[Body, str, float, Callable[[str, float], None]], None]) -> Change:
+        def change(body: Body) -> None:
+            right = body.grip
+            body.grip = lambda state, now: effect(body, state, now, right)  # type: ignore[method-assign]
+
+        return change
+
+    def falls_back(body: Body, state: str, now: float, right: Callable[[str, float], None]) -> None:
+        before = body.gripper(now)
+        right(state, now)
+        body.later.append((now + 0.2, lambda due: right(before, due)))
+
+    def late(body: Body, state: str, now: float, right: Callable[[str, float], None]) -> None:
+        body.later.append((now + 1.0, lambda due: right(state, due)))
+
+    yield "grip-ignored", changed(lambda *_: None)
+    yield (
+        "grip-late",
+        changed(lambda body, state, now, right: body.later.append((now + 1.0, lambda due: right(state, due)))),
+    )
+    yield "grip-falls-back", changed(falls_back)
+    yield "grip-one-way", changed(lambda body, state, now, right: right("open", now))
+
+
+def of_arm() -> dict[str, Change]:
+    """Return the mutants of the arm."""
+    axes = ["pan", "tilt"]
+    groups = (target_mutants(axes), second_mutants(), stop_mutants(axes), reading_mutants(axes), action_mutants())
+    return {name: change for group in groups for name, change in group}
+
+
+def of_rover() -> dict[str, Change]:
+    """Return the mutants of the rover, which refuses a second move."""
+    axes = ["x", "y"]
+    groups = (target_mutants(axes), second_mutants(), stop_mutants(axes), reading_mutants(axes))
+    return {name: change for group in (*groups, velocity_mutants(axes), switch_mutants()) for name, change in group}
