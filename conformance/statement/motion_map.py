@@ -55,7 +55,8 @@ class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         read: the operation that says it.
         axes: by name, as templates name them.
-        stamp: where the time of the reading is in the response, a number or a date (RFC 3339); empty: there is none.
+        stamp: where the time of the reading is in the response: a number, a date (RFC 3339) or a ROS time; empty: there
+            is none.
         fresh_s: at least so often the position changes while the device moves, s.
         agrees: other operations that say it as well, each with JSON pointers by axis.
     """

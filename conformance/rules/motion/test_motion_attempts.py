@@ -93,18 +93,26 @@ def unauthorised_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
 
 @rule("motion/fresh", on=ALL)
 def fresh(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether the position that is read changes as often as declared while the device moves."""
+    """Judge whether the position that is read changes as often as declared while the device moves.
+
+    A device that pauses on its way, or turns on the spot, goes on from where it was. One whose position is old jumps.
+    """
     for leg in legs_of(trace):
         seen = usable(leg)
         changed = [i for i in range(1, len(seen)) if seen[i].values != seen[i - 1].values]
         if len(changed) < SEVERAL or not leg.commands[-1].targets:
             continue
-        still_s = max(seen[b - 1].sent - seen[a].received for a, b in itertools.pairwise(changed))
+        still = [
+            seen[b - 1].sent - seen[a].received
+            for a, b in itertools.pairwise(changed)
+            if off(seen[b].values, seen[b - 1].values, motion)
+        ]
+        longest_s = max(still, default=0.0)
         yield Case(
-            still_s <= motion.state.fresh_s,
+            longest_s <= motion.state.fresh_s,
             seen[-1].exchange,
             f"another position at least every {motion.state.fresh_s:g} s under way",
-            observed=f"the same one for {still_s:.2f} s",
+            observed=f"the same one for {longest_s:.2f} s, and then another place",
             cause="stale",
         )
 

@@ -70,9 +70,12 @@ def numbers_at(document: Any, pointers: Mapping[str, str]) -> dict[str, float]:
 
 
 def seconds_of(stamp: Any) -> float | None:
-    """Return a stamp as seconds: a number, or a date (RFC 3339); None if it is neither."""
+    """Return a stamp as seconds: a number, a date (RFC 3339), or a ROS time with sec and nanosec; None if it is none."""
     if isinstance(stamp, bool):
         return None
+    if isinstance(stamp, Mapping):
+        parts = numbers_at(stamp, {"sec": "/sec", "nanosec": "/nanosec"})
+        return parts["sec"] + parts["nanosec"] / 1e9 if parts else None
     if isinstance(stamp, int | float):
         return float(stamp)
     try:
