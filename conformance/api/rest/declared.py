@@ -9,12 +9,15 @@ from conformance.api.rest.request_context import RequestContext
 from conformance.documents.json_schema import Schema, shape_of
 from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.documents.representation import UnreadableError, read
+from conformance.documents.resources import resource_at
 from conformance.transport.exchange import Exchange, Response
 
 # RFC 9110 and RFC 6585 allow these for any request: authentication and rate. Another requirement judges 5xx.
 _ANY_REQUEST = frozenset({401, 429})
 # ... and these for a request that has more in it than method, path and Accept.
 _ODD_REQUEST = frozenset({400, 408, 411, 413, 414, 415, 417, 431})
+# Methods that a server in front may refuse itself, without a word of the resource.
+_OF_SERVERS = frozenset({"TRACE", "CONNECT"})
 _OK, _NO_CONTENT, _NOT_FOUND, _NO_METHOD, _NOT_ACCEPTABLE, _SERVER_ERROR = 200, 204, 404, 405, 406, 500
 
 
@@ -34,6 +37,26 @@ def judge(api: RestInterface, exchange: Exchange, answer: Response, context: Req
         _judge_body(api, exchange, answer, context)
     if answer.ok and operation.method == "GET":
         _judge_negotiation(api, exchange, answer, context)
+
+
+def judge_refused_method(api: RestInterface, exchange: Exchange, context: RequestContext) -> None:
+    """Judge Allow where a device refuses a method that its description does not have (RFC 9110 10.2.1, 15.5.6)."""
+    contract, method = api.run.contract, exchange.request.method
+    is_own = contract.described and context.usual and context.operation is None and method not in _OF_SERVERS
+    resource = resource_at(contract, context.target.split("?", 1)[0]) if is_own else None
+    if resource is None or exchange.response.status != _NO_METHOD:
+        return
+    if not expect(api.run.judge, "http/allow", exchange).header("Allow"):
+        return
+    allow = exchange.response.header("allow") or ""
+    named = {name.strip() for name in allow.split(",")}
+    wanted = set(resource.methods) - {"HEAD", "OPTIONS", "TRACE"}
+    expect(api.run.judge, "http/allow-agrees", exchange).that(
+        wanted <= named and method not in named,
+        f"Allow: {', '.join(sorted(wanted))} (others may stand beside them, but none that got 405)",
+        f"Allow: {allow}",
+        cause="methods left out",
+    )
 
 
 def _status_fits(operation: Operation, answer: Response, context: RequestContext) -> bool:

@@ -72,6 +72,7 @@ class Observer(Listener):
             expected, found = "an error that shows nothing of the program", f"{inside!r} in the response"
             expect(api.run.judge, "http/no-traceback", exchange).that(not inside, expected, found, cause="traceback")
             problem.judge(api, exchange, answer, context)
+            declared.judge_refused_method(api, exchange, context)
         if context.operation is not None:
             if answer.elapsed_ms > _SLOW_MS:
                 api.slow.add(context.operation.label)
