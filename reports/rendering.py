@@ -8,6 +8,7 @@ from typing import Any
 from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, read_envelope, statement_in
 from reports.attestation.signing import Notary
 from reports.attestation.statement import RESULT_SUBJECT, sha256
+from reports.certificate.moves_drawn import pictures
 from reports.certificate.page import certificate_html, certificate_print
 from reports.certificate.seal import Seal
 from reports.errors import ReportError, ResultMissingError
@@ -71,7 +72,11 @@ def _conformance(path: Path, notary: Notary | None) -> dict[str, str]:
     document = read_result(path)
     digest = sha256(path.read_bytes())
     seal = Seal(digest, notary.key if notary else _signed_by(path, digest))
-    pages = {"certificate.html": certificate_html(document, seal), **_in_formats(document, ("markdown", "junit"))}
+    drawn = pictures(path.parent, document) if "motion" in document["classes"] else []
+    pages = {
+        "certificate.html": certificate_html(document, seal, drawn),
+        **_in_formats(document, ("markdown", "junit")),
+    }
     if seal.key:
         pages["certificate-print.html"] = certificate_print(document, seal)
     return {**pages, ENVELOPE_NAME: notary.envelope(path, document, pages)} if notary else pages

@@ -6,11 +6,12 @@ certificate only if every claimed class passed.
 Over 300 lines because the templates take everything from one object.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from reports.certificate.described import WORDS, Described, described
+from reports.certificate.moves_drawn import Picture
 from reports.certificate.seal import Seal
 from reports.findings import Finding, by_cause, by_requirement, findings
 from reports.pages.page import html_page
@@ -273,9 +274,15 @@ def _untested(classes: tuple[ClassSummary, ...]) -> Iterator[Untested]:
         yield Untested(reason, because_of, tuple(requirements))
 
 
-def certificate_html(result: Mapping[str, Any], seal: Seal | None = None) -> str:
-    """Return the certificate of a result as an HTML page; `seal` holds the fingerprints to show."""
-    return html_page("certificate.html.j2", seal=seal, **page_values(result))
+def certificate_html(result: Mapping[str, Any], seal: Seal | None = None, drawn: Sequence[Picture] = ()) -> str:
+    """Return the certificate of a result as an HTML page.
+
+    Args:
+        result: a valid `roaas-result/1` document.
+        seal: the fingerprints to show.
+        drawn: how the device moved.
+    """
+    return html_page("certificate.html.j2", seal=seal, drawn=drawn, **page_values(result))
 
 
 def certificate_print(result: Mapping[str, Any], seal: Seal) -> str:

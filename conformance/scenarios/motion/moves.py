@@ -174,7 +174,10 @@ def repeated(mapped: MappedDevice) -> Leg:
     """Send one move twice, as a client does that tries again."""
     _need_positions(mapped)
     name, axis = next(iter(mapped.motion.state.axes.items()))
-    return _in_a_row(mapped, "a move that was sent twice", [{name: axis.limits[0]}] * 2)
+    here = mapped.where()[name]
+    return _in_a_row(
+        mapped, "a move that was sent twice", [{name: max(axis.limits, key=lambda end: abs(end - here))}] * 2
+    )
 
 
 def _in_a_row(mapped: MappedDevice, what: str, wanted: list[Position]) -> Leg:
@@ -195,10 +198,12 @@ def several_clients(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
 def _of_clients(mapped: MappedDevice) -> Leg:
     mapped.bring_home()
     start, axes = mapped.where(), mapped.motion.state.axes.items()
-    wanted = [
+    several = (
         {name: axis.limits[0] + (axis.limits[1] - axis.limits[0]) * client / (_CLIENTS - 1) for name, axis in axes}
         for client in range(_CLIENTS)
-    ]
+    )
+    # A target where the device is already would be reached whatever becomes of the others.
+    wanted = [one for one in several if not mapped.is_near(start, one)]
     sent = mapped.clock.now()
     attempts = send_together([[_outgoing(mapped, one) for one in wanted]])[0]
     answered = mapped.clock.now()

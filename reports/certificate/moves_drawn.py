@@ -1,0 +1,148 @@
+"""Pictures of how a device moved, drawn from the traces of a run (traces.json.gz) as SVG for the certificate."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+TRACES_NAME: Final = "traces.json.gz"
+# So many pictures at most; so many points of a line; size of the drawing of one axis, in CSS pixels.
+_MOST, _POINTS = 30, 160
+WIDTH, HEIGHT = 300, 64
+_MARGIN: Final = 4
+# Of an axis' values: smaller differences are not drawn larger.
+_LEAST: Final = 0.005
+
+
+@dataclass(frozen=True)
+class Line:
+    """One axis in a picture.
+
+    Attributes:
+        name: of the axis.
+        points: of the device's way, as an SVG polyline.
+        wanted: of the targets, as SVG polylines.
+        low, high: the values at the lower and the upper edge.
+    """
+
+    name: str
+    points: str
+    wanted: tuple[str, ...]
+    low: str
+    high: str
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One move or drive.
+
+    Attributes:
+        what: it was, as a noun phrase.
+        lines: one for each axis that moved, or was to move.
+        commands: where commands were accepted on the time axis, in CSS pixels.
+        refused: where they were refused.
+        seconds: how long it lasted.
+        failed: whether a finding names it.
+    """
+
+    what: str
+    lines: tuple[Line, ...]
+    commands: tuple[float, ...]
+    refused: tuple[float, ...]
+    seconds: float
+    failed: bool
+
+
+def pictures(folder: Path, result: Mapping[str, Any]) -> list[Picture]:
+    """Return pictures of the moves of a run, those that a finding names first.
+
+    Args:
+        folder: where the run's files are; without readable traces there are no pictures.
+        result: the run's result, with the class ``motion``.
+    """
+    try:
+        traces = json.loads(gzip.decompress((folder / TRACES_NAME).read_bytes()))
+        named = [
+            failure.get("message", "")
+            for one in result["requirements"]
+            if one["class"] == "motion"
+            for failure in one.get("failures", ())
+        ]
+        drawn = [_picture(one, named) for one in _moves(traces)]
+    except (OSError, EOFError, ValueError, LookupError, TypeError, AttributeError):
+        return []
+    return sorted(filter(None, drawn), key=lambda one: not one.failed)[:_MOST]
+
+
+def _moves(traces: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    """Yield what is a move or a drive: it has commands, and readings with positions."""
+    for trace in traces.values():
+        for one in trace if isinstance(trace, list) else [trace]:
+            if isinstance(one, dict) and "what" in one and ("readings" in one or "under_way" in one):
+                yield one
+
+
+def _picture(move: Mapping[str, Any], named: Iterable[str]) -> Picture | None:
+    readings = [*move.get("readings", ()), *move.get("under_way", ()), *move.get("after", ())]
+    commands = [*move["commands"], *([move["end"]] if move.get("end") else [])]
+    if not readings or not commands:
+        return None
+    start, end = commands[0]["sent"], max(one["received"] for one in readings)
+    if end <= start:
+        return None
+
+    def x_of(moment: float) -> float:
+        return float(round(max(0.0, moment - start) / (end - start) * WIDTH, 1))
+
+    is_drive = "wanted" in move
+    wanted = [(x_of(one["sent"]), one["targets"]) for one in commands if _ok(one)]
+    lines = []
+    for name in _axes(readings, "speeds" if is_drive else "values") or _axes(readings, "values"):
+        key = "speeds" if name in readings[0].get("speeds", {}) else "values"
+        seen = [((one["sent"] + one["received"]) / 2, one[key][name]) for one in readings if name in one.get(key, {})]
+        lines.append(_line(name, [(x_of(moment), value) for moment, value in seen], wanted))
+    return Picture(
+        what=move["what"],
+        lines=tuple(filter(None, lines)),
+        commands=tuple(x_of(one["sent"]) for one in commands if _ok(one)),
+        refused=tuple(x_of(one["sent"]) for one in commands if not _ok(one)),
+        seconds=end - start,
+        failed=any(move["what"] in text for text in named),
+    )
+
+
+def _axes(readings: Sequence[Mapping[str, Any]], key: str) -> list[str]:
+    return list(dict.fromkeys(name for one in readings for name in one.get(key, {})))
+
+
+def _ok(command: Mapping[str, Any]) -> bool:
+    status: int = command["exchange"]["response"]["status"]
+    return 200 <= status < 300  # noqa: PLR2004 - RFC 9110 15.3
+
+
+def _line(name: str, seen: list[tuple[float, float]], targets: list[tuple[float, dict[str, float]]]) -> Line | None:
+    """Draw one axis; None if nothing was read of it."""
+    if not seen:
+        return None
+    aims = [(x, given[name]) for x, given in targets if name in given]
+    values = [value for _, value in [*seen, *aims]]
+    low, high = min(values), max(values)
+    span = max(high - low, _LEAST * max(abs(low), abs(high))) or 1.0
+    base = (low + high - span) / 2
+
+    def at(x: float, value: float) -> str:
+        return f"{x:g},{HEIGHT - _MARGIN - (value - base) / span * (HEIGHT - 2 * _MARGIN):.1f}"
+
+    thin = max(1, len(seen) // _POINTS)
+    ends = [*(x for x, _ in aims[1:]), float(WIDTH)]
+    return Line(
+        name=name,
+        points=" ".join(at(x, value) for x, value in [*seen[::thin], seen[-1]]),
+        wanted=tuple(f"{at(x, value)} {at(end, value)}" for (x, value), end in zip(aims, ends, strict=True)),
+        low=f"{low:.3g}",
+        high=f"{high:.3g}",
+    )
