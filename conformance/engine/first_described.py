@@ -13,6 +13,7 @@ from conformance.contract.toml_file import basic_string
 from conformance.documents.description import Description, DescriptionError, is_url
 from conformance.documents.json_schema import UnresolvedError, kinds_of
 from conformance.documents.openapi import Operation, read_operations
+from conformance.engine.first_motion import proposed_map
 from conformance.statement.statement import Api, Calls
 
 _TEMPLATE = """\
@@ -41,9 +42,8 @@ allow = [
 # Operations that must never be called, whatever else is said.
 never = [{never}]
 
-# [motion.state], [motion.goto] and [motion.stop] say how the device moves, so that its motion is judged as well:
-# docs/motion.md.
-
+# How the device moves, so that its motion is judged as well: docs/motion.md.
+{motion}
 [values]
 # Values for parameters that the description gives none for. Without them, ids are taken from what the device lists.
 {values}"""
@@ -80,10 +80,18 @@ def write_described_statement(path: Path, found: Description, api: Api, calls: C
             count=f"Called are {called} of {len(operations)} operations. Take the # from a line to call it as well.",
             allow="".join(f"  {line}\n" for line in _groups(operations, rules)),
             never=", ".join(map(basic_string, calls.never)),
+            motion="".join(f"# {line}".rstrip() + "\n" for line in _motion(operations)),
             values="".join(f"{line}\n" for line in _values(operations)) or "# id = [1, 2]\n",
         ),
         encoding="utf-8",
     )
+
+
+def _motion(operations: Sequence[Operation]) -> list[str]:
+    """Return the lines of a motion map that the names suggest."""
+    found = list(proposed_map(operations))
+    lead = "Names in the description suggest this map. Complete it, and take the # away:"
+    return [lead, *found] if found else []
 
 
 def _api(folder: Path, found: Description, api: Api) -> Iterator[str]:

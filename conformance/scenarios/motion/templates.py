@@ -70,7 +70,7 @@ def numbers_at(document: Any, pointers: Mapping[str, str]) -> dict[str, float]:
 
 
 def seconds_of(stamp: Any) -> float | None:
-    """Return a stamp as seconds: a number, a date (RFC 3339), or a ROS time with sec and nanosec; None if it is none."""
+    """Return a stamp in seconds: a number, a date (RFC 3339), or a ROS time (sec, nanosec); None if it is none."""
     if isinstance(stamp, bool):
         return None
     if isinstance(stamp, Mapping):

@@ -83,10 +83,11 @@ class Arm:
     Args:
         body: the mechanics; None: right ones.
         fault: what is wrong with the API: "mixes" clients' targets, or "incomplete-moves"; empty: nothing.
+        relative: whether a move is the way from where it is; without limits then.
     """
 
-    def __init__(self, body: Body | None = None, fault: str = "") -> None:
-        self.body, self.fault = body or Body(LIMITS), fault
+    def __init__(self, body: Body | None = None, fault: str = "", *, relative: bool = False) -> None:
+        self.body, self.fault, self.relative = body or Body(LIMITS), fault, relative
 
     def app(self) -> Starlette:
         """Return the web application."""
@@ -137,9 +138,12 @@ class Arm:
 
     def _move(self, wanted: Any) -> tuple[int, dict[str, Any]]:
         wrong = _problem(wanted)
-        if wrong:
+        if wrong and not self.relative:
             return 422, {"detail": wrong}
         target = {name: float(wanted[name]) for name in LIMITS}
+        if self.relative:
+            here = self.body.at(self.body.now())
+            target = {name: here[name] + way for name, way in target.items()}
         if self.fault == "mixes" and self.body.moving(self.body.now()):
             target["tilt"] = self.body.target["tilt"]
         self.body.go(target, float(wanted["seconds"]))

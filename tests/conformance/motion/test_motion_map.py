@@ -2,14 +2,21 @@
 
 import json
 import sys
+import tomllib
 
+import msgspec
+import mutants
 import pytest
 import rover
-from arm import LIMITS, MAP, Arm
+from arm import DESCRIPTION, LIMITS, MAP, Arm
 from body import Body
 from processes import ended
 from rover import Rover, serving_rover
 from serving_apps import serving_app
+
+from conformance.documents.openapi import read_operations
+from conformance.engine.first_motion import proposed_map
+from conformance.statement.motion_map import MotionMap
 
 
 def _judged(serving, motion, tmp_path):
@@ -98,3 +105,27 @@ def test_a_device_that_the_map_cannot_see_is_not_moved(tmp_path):
     assert (arm.body.moves, "pass" in judged.values()) == (0, False), done.stdout
     assert done.returncode == 4
     assert "/joints/pen" in done.stdout
+
+
+def test_init_proposes_a_map_that_the_names_suggest():
+    proposed = tomllib.loads("\n".join(proposed_map(read_operations(DESCRIPTION))))["motion"]
+    motion = msgspec.convert(proposed, MotionMap)
+    given = tomllib.loads(MAP)["motion"]
+    assert (motion.state.read, set(motion.state.axes)) == ("GET /state", {"pan", "tilt"})
+    assert motion.state.axes["tilt"].limits == (-0.4, 0.6)
+    assert motion.goto is not None
+    assert (motion.goto.send, motion.goto.body) == (given["goto"]["send"], given["goto"]["body"])
+    assert motion.stop is not None
+    assert motion.stop.send == "POST /stop"
+
+
+def test_the_certificate_draws_how_it_moved(tmp_path):
+    """A stop that is ignored: its picture stands first."""
+    body = Body(LIMITS)
+    mutants.of_arm()["stop-ignored"](body)
+    done, judged = _of_arm(Arm(body), tmp_path)
+    assert judged["motion/stop"] == "fail", done.stdout
+    page = (tmp_path / "out" / "certificate.html").read_text(encoding="utf-8")
+    first = page.index('<figure class="move')
+    assert "A stop of pan under way" in page[first : page.index("</figcaption>", first)]
+    assert page.count('<polyline class="way"') > 10

@@ -1,6 +1,7 @@
 """The rules of motion on recorded moves of simulated devices, by a simulated clock: without HTTP, in no time."""
 
 import tomllib
+from functools import partial
 
 import msgspec
 import mutants
@@ -32,8 +33,18 @@ _RULES = [
     for one in vars(module).values()
     if isinstance(one, Rule)
 ]
-_DEVICES = {"arm": (Arm, LIMITS, MAP), "rover": (Rover, rover.LIMITS, rover.MAP)}
-_MUTANTS = {"arm": mutants.of_arm(), "rover": mutants.of_rover()}
+_RELATIVE = MAP.replace('beyond_limits = "refused"', "relative = true")
+_DEVICES = {
+    "arm": (Arm, LIMITS, MAP),
+    "rover": (Rover, rover.LIMITS, rover.MAP),
+    "relative": (partial(Arm, relative=True), LIMITS, _RELATIVE),
+}
+# A move that is relative begins where the last one ended, and none is sent under way.
+_MUTANTS = {
+    "arm": mutants.of_arm(),
+    "rover": mutants.of_rover(),
+    "relative": {name: change for name, change in mutants.of_arm().items() if not name.startswith("second")},
+}
 
 
 class _Api:
