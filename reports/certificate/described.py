@@ -6,6 +6,8 @@ from typing import Any
 
 WORDS = {"conformant": "Keeps its own description", "not-conformant": "Does not keep its own description"}
 """The verdict in words: such a device conforms to no contract, and its report is no certificate of conformance."""
+DESCRIBED_CLASS = "description"
+"""The class that only such a device has."""
 _MEASURES = {
     "operations": "Operations called",
     "parameters": "Parameters sent",

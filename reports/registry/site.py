@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from reports.attestation.statement import RESULT_SUBJECT, Run
+from reports.certificate.described import DESCRIBED_CLASS, WORDS
 from reports.certificate.difference import MEANINGS, Kind
 from reports.certificate.difference_page import SHOWN, headline
 from reports.errors import ResultUnreadableError
@@ -68,6 +69,7 @@ def _robot_html(history: History, now: dt.datetime) -> str:
         "registry-robot.html.j2",
         history=history,
         runs=[(standing, *_word(standing), _envelope(standing)) for standing in history.standings],
+        verdict=_verdict,
         marks=_marks(history.current),
         changes=[
             (change, headline(change.found) if change.found else "") for change in firmware_changes(history.firmwares)
@@ -111,8 +113,14 @@ def _word(standing: Standing) -> tuple[str, str]:
     """Return tone and words: the verdict of a certificate that counts, or the first reason against it."""
     if not standing.stands:
         return "quiet", standing.against[0]
-    verdict = standing.certificate.run.verdict
-    return _TONES.get(verdict, "warning"), verdict.replace("-", " ")
+    run = standing.certificate.run
+    return _TONES.get(run.verdict, "warning"), _verdict(run)
+
+
+def _verdict(run: Run) -> str:
+    """Return the verdict in words; a device that is judged by its own description conforms to no contract."""
+    words = WORDS.get(run.verdict) if DESCRIBED_CLASS in run.classes else None
+    return words[0].lower() + words[1:] if words else run.verdict.replace("-", " ")
 
 
 def _judged_by(run: Run) -> str:
