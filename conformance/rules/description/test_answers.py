@@ -61,9 +61,17 @@ def _in_question(probe: Probe, status: int) -> bool:
     if status in _ASKED_FOR:
         names = {name.lower() for name, _ in probe.exchange.request.headers} if probe.exchange else _ASKING
         return not names & _ASKING
-    if probe.kind is Kind.MALFORMED and status == _BAD_REQUEST:
+    if status == _BAD_REQUEST and (probe.kind is Kind.MALFORMED or _is_unreadable(probe)):
         return False  # any server may say so of content that it cannot read (RFC 9110 15.5.1)
     return status not in _ANY_TIME and (probe.kind in _PLAIN or status not in _OF_REQUEST)
+
+
+def _is_unreadable(probe: Probe) -> bool:
+    """Return whether a request's content is not JSON, although its Content-Type says so."""
+    request = probe.exchange.request if probe.exchange else None
+    named = {name.lower(): value for name, value in request.headers} if request else {}
+    media_type = named.get("content-type", "").partition(";")[0].strip().lower()
+    return request is not None and is_json(media_type) and bool(request.body and read_json(request.body).unreadable)
 
 
 @rule("description/status-declared", on=_ON)
