@@ -27,6 +27,7 @@ class Reason(StrEnum):
     """Why an operation is called or not."""
 
     SAFE = "its method is safe"
+    READS = "by its name it only reads"
     ALLOWED = "--call allows it"
     CHANGES = "it may change something: --call allows it"
     MOVES = "it moves the device: --allow-motion allows it"
@@ -37,7 +38,7 @@ class Reason(StrEnum):
     @property
     def may(self) -> bool:
         """Whether the operation is called."""
-        return self in {Reason.SAFE, Reason.ALLOWED}
+        return self in {Reason.SAFE, Reason.READS, Reason.ALLOWED}
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class CallRules:
         if not named and harmful_words(operation):
             return Reason.HARMFUL
         if operation.safe and not operation.motion:
-            return Reason.SAFE
+            return Reason.READS if operation.reads else Reason.SAFE
         if not any(matches(pattern, operation) for pattern in self.allow) and not operation.safe:
             return Reason.CHANGES
         return Reason.ALLOWED if self.motion or not operation.motion else Reason.MOVES

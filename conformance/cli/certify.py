@@ -46,6 +46,7 @@ _OBJECTS = 20_000
 @click.option(
     "--openapi", metavar="URL|FILE", help="The device's own OpenAPI or Swagger description: judge it by that."
 )
+@click.option("--wsdl", metavar="URL|FILE", help="The device's own WSDL: judge it by that.")
 @click.option(
     "--overlay", "overlays", multiple=True, metavar="FILE", help="OpenAPI Overlay to apply to it; repeatable."
 )
@@ -102,6 +103,9 @@ _OBJECTS = 20_000
 @click.option("--token-file", type=_FILE, help="File with the bearer token to send.")
 @click.option("--basic-file", type=_FILE, help="File with user:password for basic authentication.")
 @click.option(
+    "--username-token-file", type=_FILE, help="File with user:password for WS-Security's UsernameToken (SOAP)."
+)
+@click.option(
     "--api-key", metavar="'PLACE NAME'", help="Where the API key goes: header, query or cookie, and its name."
 )
 @click.option("--api-key-file", type=_FILE, help="File with the API key.")
@@ -144,7 +148,7 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **options: Any) -> Com
         return certify_fleet(Path(options["fleet"]), options)
     if options["parallel"] is not None:
         raise click.UsageError("--parallel says how many robots of a --fleet are judged at once: give --fleet")
-    source, statement = told_apart(targets, options["openapi"])
+    source, statement = told_apart(targets, options["openapi"] or options["wsdl"])
     try:
         done = _judge(door, source, statement, options)
     except UnreachableError as unreachable:

@@ -13,7 +13,7 @@ from conformance.contract.pack import Contract
 from conformance.documents.description import is_url
 from conformance.documents.openapi import operations_of
 from conformance.engine.connecting import connection_of, keyed
-from conformance.engine.describing import described_contract
+from conformance.engine.describing import described_contract, soap_contract
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.motion_map import shape_of
 from conformance.statement.statement import (
@@ -35,7 +35,7 @@ def told_apart(targets: tuple[str, ...], openapi: str | None) -> tuple[str | Non
     Raises:
         click.UsageError: two descriptions or two statements are named.
     """
-    described = [one for one in targets if is_url(one) or one.endswith((".json", ".yaml", ".yml"))]
+    described = [one for one in targets if is_url(one) or one.endswith((".json", ".yaml", ".yml", ".wsdl"))]
     statements = [one for one in targets if one not in described]
     described += [openapi] if openapi else []
     for what, named in (("descriptions", described), ("statements", statements)):
@@ -53,11 +53,16 @@ def what_is_judged(source: str | None, statement: Path | None, options: dict[str
     """
     contract = Contract.load(options["pack"])
     api = api_of(statement) if statement else None
-    source = source or (api.openapi if api else None)
+    source = source or (api.openapi or api.wsdl if api else None)
     if source is not None:
         return _described(source, api, statement, options)
     declared = load_statement(statement, contract) if statement else empty_statement(contract)
     return _apply(declared, options, contract), contract
+
+
+def is_wsdl(source: str) -> bool:
+    """Return whether a URL or file is named as a WSDL is."""
+    return source.lower().endswith((".wsdl", "?wsdl", "?singlewsdl"))
 
 
 def _described(
@@ -77,9 +82,12 @@ def _described(
         # Where an API key goes, the description may say, so that it is read without one.
         connection = connection_of(where if where.api_key else msgspec.structs.replace(where, api_key_file=None))
         moves = statement is not None and has_motion_map(statement)
-        contract, where, remarks = described_contract(
-            source, overlays, base_url, where, connection, options["out"], moves=moves
-        )
+        if is_wsdl(source) or source in {options["wsdl"], api.wsdl if api else None}:
+            contract, where, remarks = soap_contract(source, base_url, where, connection, options["out"])
+        else:
+            contract, where, remarks = described_contract(
+                source, overlays, base_url, where, connection, options["out"], moves=moves
+            )
     except OSError as error:
         raise StatementError(str(error)) from error
     options["remarks"] = remarks

@@ -74,6 +74,7 @@ class Operation:
         security: names of the security schemes of each alternative; empty: none is needed.
         never: whether the description says that a test must not send it (x-roaas-never).
         stop: whether it stops the device (x-roaas-stop).
+        reads: whether it only reads, whatever its method (x-roaas-reads).
     """
 
     id: str
@@ -90,6 +91,7 @@ class Operation:
     security: tuple[tuple[str, ...], ...] = ()
     never: bool = False
     stop: bool = False
+    reads: bool = False
 
     @property
     def label(self) -> str:
@@ -98,8 +100,8 @@ class Operation:
 
     @property
     def safe(self) -> bool:
-        """Whether the method is safe (RFC 9110 9.2.1)."""
-        return self.method in SAFE
+        """Whether it only reads: its method is safe (RFC 9110 9.2.1), or it says so."""
+        return self.method in SAFE or self.reads
 
     def declared(self, status: int) -> dict[str, Schema] | None:
         """Return the schemas by media type for a status; None if the status is not declared."""
@@ -211,6 +213,7 @@ def _operation(
         security=tuple(tuple(alternative) for alternative in given["security"]),
         never=bool(given.get("x-roaas-never", False)),
         stop=bool(given.get("x-roaas-stop", False)),
+        reads=bool(given.get("x-roaas-reads", False)),
     )
 
 

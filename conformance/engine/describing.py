@@ -129,3 +129,48 @@ def described_contract(
     Contract.load.cache_clear()
     remarks = () if base_url or endpoints.rest else found.remarks
     return Contract.load(folder), msgspec.structs.replace(endpoints, rest=base), remarks
+
+
+def soap_contract(
+    source: str, base_url: str | None, endpoints: Endpoints, connection: Connection, out: Path
+) -> tuple[Contract, Endpoints, tuple[str, ...]]:
+    """Return the contract of a device's WSDL, the endpoints with its address, and remarks.
+
+    Args:
+        source: URL or file of the WSDL.
+        base_url: scheme and host to use in place of those in the WSDL; None: as the WSDL says.
+        endpoints: what the statement or the options say.
+        connection: deadline, credentials and TLS.
+        out: folder of the results, in which the pack is written.
+
+    Raises:
+        DescriptionError: there is no usable WSDL.
+        UnreachableError: its server does not respond.
+        OSError: the pack cannot be written.
+    """
+    import msgspec  # noqa: PLC0415 - read already where this is used
+
+    from conformance.documents.soap_services import WsdlError, base_of, moved, read_services  # noqa: PLC0415
+
+    # xmlschema and lxml take a third of a second, which other devices need not pay.
+    from conformance.documents.wsdl_pack import write_soap_pack  # noqa: PLC0415
+
+    load, documents = _Loader(connection), dict[str, bytes]()
+
+    def fetch(place: str) -> bytes:
+        documents[place] = load(place)
+        return documents[place]
+
+    try:
+        found = read_services(fetch(source), source, fetch)
+    except (WsdlError, ValueError) as error:
+        raise DescriptionError(str(error)) from error
+    base = (base_url or endpoints.rest or base_of(found)).rstrip("/")
+    remarks = tuple(
+        f"Port {port.name} is at {port.url}, another server, and is not called."
+        for port in found.ports
+        if not moved(port.url, base_of(found), base).startswith(base)
+    )
+    folder = write_soap_pack(out / FOLDER, found, source, documents)
+    Contract.load.cache_clear()
+    return Contract.load(folder), msgspec.structs.replace(endpoints, rest=base), remarks

@@ -38,6 +38,7 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         ca_file: certificate authorities to trust.
         token_file: file with the bearer token.
         basic_file: file with ``user:password`` for HTTP's basic authentication.
+        username_token_file: file with ``user:password`` for WS-Security's UsernameToken.
         api_key: where the API key goes: ``header NAME``, ``query NAME`` or ``cookie NAME``.
         api_key_file: file with the API key.
         headers_file: file with fixed headers, ``Name: value`` in each line; their values are secrets.
@@ -56,6 +57,7 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ca_file: Text | None = None
     token_file: Text | None = None
     basic_file: Text | None = None
+    username_token_file: Text | None = None
     api_key: Text | None = None
     api_key_file: Text | None = None
     headers_file: Text | None = None

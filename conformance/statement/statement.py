@@ -45,6 +45,7 @@ class Api(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         openapi: URL or file of its OpenAPI or Swagger description.
+        wsdl: URL or file of its WSDL, in place of that.
         overlays: files of OpenAPI Overlays to apply to it.
         base_url: where its operations are, if the description does not say it.
     """
@@ -52,6 +53,7 @@ class Api(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     openapi: Text | None = None
     overlays: tuple[Text, ...] = ()
     base_url: Text | None = None
+    wsdl: Text | None = None
 
 
 class Statement(msgspec.Struct, frozen=True):
@@ -229,7 +231,12 @@ def api_of(path: Path) -> Api:
     def beside_it(name: str) -> str:
         return name if "://" in name else str(path.parent / name)
 
-    return Api(beside_it(api.openapi) if api.openapi else None, tuple(map(beside_it, api.overlays)), api.base_url)
+    return Api(
+        openapi=beside_it(api.openapi) if api.openapi else None,
+        overlays=tuple(map(beside_it, api.overlays)),
+        base_url=api.base_url,
+        wsdl=beside_it(api.wsdl) if api.wsdl else None,
+    )
 
 
 def endpoints_of(path: Path) -> Endpoints:

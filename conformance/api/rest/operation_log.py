@@ -14,6 +14,7 @@ from conformance.api.rest.branches import branches_in, branches_of
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.documents.resources import matching, resource_at
+from conformance.documents.wsdl_pack import label_in, services_of
 from conformance.transport.exchange import Exchange, Listener, Request, Unanswered
 from conformance.verdict.finding import Finding
 
@@ -43,6 +44,7 @@ class OperationLog(Listener):
 
     def __init__(self, contract: Contract, base_url: str) -> None:
         self._contract, self._base_url = contract, base_url
+        self._services = services_of(contract)
         self._records: dict[str, _Record] = {item.label: _Record() for item in operations_of(contract)}
         self._branches = {
             (item.label, status, name): {f"{status}{branch}" for branch in branches_of(schema)}
@@ -70,6 +72,9 @@ class OperationLog(Listener):
     def _operation(self, request: Request) -> Operation | None:
         if not request.url.startswith(self._base_url) or request.method in {"HEAD", "OPTIONS"}:
             return None
+        if self._services is not None:
+            label = label_in(self._services, self._path(request), request.body)
+            return next((item for item in operations_of(self._contract) if item.label == label), None)
         return matching(self._contract, request.method, self._path(request))
 
     def _path(self, request: Request) -> str:

@@ -1,0 +1,254 @@
+"""Read any WSDL 1.1: its ports over HTTP, SOAP 1.1 or 1.2, document or rpc style, and the types of their messages.
+
+An rpc message has a wrapper that no schema declares (WSDL 1.1, 3.5). One is made for it, so that its messages are built
+and validated as all others are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+from urllib.parse import urlsplit
+
+from lxml import etree
+
+from conformance.documents.wsdl_imports import Fetch, collect
+from conformance.documents.xml_names import ENVELOPE, WSDL, WSDL_SOAP, XSD, clark
+from conformance.documents.xsd import SchemaDocument, SchemaError, Types
+
+ENVELOPE_12: Final = "http://www.w3.org/2003/05/soap-envelope"
+_WSDL_SOAP_12: Final = "http://schemas.xmlsoap.org/wsdl/soap12/"
+_SPACES: Final = {WSDL_SOAP: ENVELOPE, _WSDL_SOAP_12: ENVELOPE_12}
+_PREFIXES: Final = {"w": WSDL, "xs": XSD}
+
+
+class WsdlError(ValueError):
+    """Raised for a WSDL that describes no service that can be called; the message says what is missing."""
+
+
+@dataclass(frozen=True)
+class SoapOperation:
+    """One operation of a port.
+
+    Attributes:
+        name: in the port type.
+        action: soapAction, or empty.
+        request: tag of the request's element, in Clark notation; empty: the Body is empty.
+        response: tag of the response's element; None for a one-way operation.
+        remark: why it cannot be called, or empty.
+    """
+
+    name: str
+    action: str
+    request: str
+    response: str | None
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class SoapPort:
+    """One port.
+
+    Attributes:
+        service, name: its names.
+        url: soap:address.
+        envelope: namespace of SOAP 1.1 or 1.2.
+        operations: in the binding's order.
+    """
+
+    service: str
+    name: str
+    url: str
+    envelope: str
+    operations: tuple[SoapOperation, ...]
+
+    @property
+    def is_12(self) -> bool:
+        """Whether it speaks SOAP 1.2."""
+        return self.envelope == ENVELOPE_12
+
+
+@dataclass(frozen=True)
+class SoapDescription:
+    """What a WSDL describes.
+
+    Attributes:
+        name: of the definitions or the first service.
+        ports: those over HTTP.
+        types: the compiled schemas.
+        faults: what is wrong with the WSDL itself: documents that are missing, references without a target.
+    """
+
+    name: str
+    ports: tuple[SoapPort, ...]
+    types: Types
+    faults: tuple[str, ...] = ()
+
+
+def read_services(wsdl: bytes, location: str, fetch: Fetch) -> SoapDescription:
+    """Read a WSDL and what it refers to.
+
+    Raises:
+        WsdlError: it is none, has no port over HTTP, or its schemas do not compile.
+    """
+    try:
+        found = collect(wsdl, location, fetch)
+    except ValueError as error:
+        raise WsdlError(f"{location} is no WSDL: {error}") from error
+    reader = _Reader(found.definitions)
+    ports = tuple(reader.ports())
+    if not ports:
+        raise WsdlError(f"{location} has no port with a SOAP binding over HTTP")
+    faults = [f"{place} could not be read: {reason}" for place, reason in found.missing.items()]
+    try:
+        types = Types.compiled([*found.schemas, *reader.wrappers])
+    except SchemaError as error:
+        raise WsdlError(f"the schemas of {location} do not compile: {error}") from error
+    faults += [f"its schemas are refused by one of two compilers: {problem}" for problem in types.problems]
+    faults += reader.faults
+    for port in ports:
+        for operation in port.operations:
+            for tag in filter(None, (operation.request, operation.response)):
+                if types.shape(tag) is None:
+                    faults.append(
+                        f"{operation.name} of port {port.name} names the element {tag}, which no schema declares"
+                    )
+    name = found.definitions[0].get("name") or ports[0].service
+    return SoapDescription(name, ports, types, tuple(dict.fromkeys(faults)))
+
+
+class _Reader:
+    """Reads definitions elements; ``wrappers`` are the schemas made for rpc, ``faults`` what refers to nothing."""
+
+    def __init__(self, definitions: list[etree._Element]) -> None:
+        self._definitions = definitions
+        self.wrappers: list[SchemaDocument] = []
+        self.faults: list[str] = []
+        self._made: set[str] = set()
+
+    def _all(self, path: str) -> list[etree._Element]:
+        found: list[etree._Element] = []
+        for root in self._definitions:
+            result = root.xpath(path, namespaces=_PREFIXES)
+            found += [one for one in result if etree.iselement(one)] if isinstance(result, list) else []
+        return found
+
+    def _named(self, path: str, reference: etree._Element, attribute: str) -> etree._Element | None:
+        """Return what a QName in an attribute refers to."""
+        wanted = _qname(reference, reference.get(attribute) or "")
+        for element in self._all(path):
+            space = next((root.get("targetNamespace") or "" for root in self._definitions if _has(root, element)), "")
+            if clark(space, element.get("name") or "") == wanted:
+                return element
+        self.faults.append(f"{attribute} of {reference.get('name') or 'a port'} names {wanted}, which is not there")
+        return None
+
+    def ports(self) -> Iterator[SoapPort]:
+        """Yield the ports over HTTP."""
+        for port in self._all("w:service/w:port"):
+            address = next((one for space in _SPACES for one in port.iterfind(clark(space, "address"))), None)
+            url = address.get("location", "") if address is not None else ""
+            if not url.startswith(("http://", "https://")):
+                continue
+            binding = self._named("w:binding", port, "binding")
+            soap = _soap(binding, "binding") if binding is not None else None
+            kind = self._named("w:portType", binding, "type") if binding is not None else None
+            if binding is None or soap is None or kind is None:
+                continue
+            service = port.getparent()
+            yield SoapPort(
+                service=service.get("name", "") if service is not None else "",
+                name=port.get("name", ""),
+                url=url,
+                envelope=_SPACES[etree.QName(soap).namespace or ""],
+                operations=tuple(self._operations(binding, soap, kind)),
+            )
+
+    def _operations(
+        self, binding: etree._Element, soap: etree._Element, kind: etree._Element
+    ) -> Iterator[SoapOperation]:
+        abstract = {one.get("name"): one for one in kind.iterfind(clark(WSDL, "operation"))}
+        for bound in binding.iterfind(clark(WSDL, "operation")):
+            name, own = bound.get("name", ""), _soap(bound, "operation")
+            declared = abstract.get(bound.get("name"))
+            if declared is None:
+                self.faults.append(f"the binding has the operation {name}, which its port type has not")
+                continue
+            style = (own.get("style") if own is not None else None) or soap.get("style") or "document"
+            tags: dict[str, str] = {}
+            remark = ""
+            for way in ("input", "output"):
+                message = declared.find(clark(WSDL, way))
+                if message is None:
+                    continue
+                part = bound.find(clark(WSDL, way))
+                body = _soap(part, "body") if part is not None else None
+                if body is not None and body.get("use") == "encoded":
+                    remark = "its messages are encoded (WS-I BP R2706 allows literal alone)"
+                    break
+                tags[way] = self._tag(message, style, name if way == "input" else f"{name}Response", body)
+            action = (own.get("soapAction") if own is not None else None) or ""
+            yield SoapOperation(name, action, tags.get("input", ""), tags.get("output"), remark)
+
+    def _tag(self, reference: etree._Element, style: str, wrapper: str, body: etree._Element | None) -> str:
+        """Return the tag of a message's element; empty if the Body is empty."""
+        message = self._named("w:message", reference, "message")
+        parts = list(message.iterfind(clark(WSDL, "part"))) if message is not None else []
+        listed = body.get("parts") if body is not None else None
+        if listed is not None:
+            parts = [part for part in parts if part.get("name") in listed.split()]
+        if style == "rpc":
+            return self._wrapper(wrapper, (body.get("namespace") if body is not None else None) or "", parts)
+        element = parts[0].get("element") if parts else None
+        return _qname(parts[0], element) if element else ""
+
+    def _wrapper(self, name: str, space: str, parts: list[etree._Element]) -> str:
+        """Make a schema with the wrapper of an rpc message; return its tag."""
+        tag = clark(space, name)
+        if tag in self._made:
+            return tag
+        self._made.add(tag)
+        root = etree.Element(clark(XSD, "schema"), {"targetNamespace": space} if space else {}, nsmap={"xs": XSD})
+        spaces = dict.fromkeys(etree.QName(_qname(one, one.get("type") or "")).namespace for one in parts)
+        for other in filter(lambda one: one and one not in {XSD, space}, spaces):
+            etree.SubElement(root, clark(XSD, "import"), namespace=str(other))
+        element = etree.SubElement(root, clark(XSD, "element"), name=name)
+        whole = etree.SubElement(element, clark(XSD, "complexType"))
+        inside = etree.SubElement(whole, clark(XSD, "sequence"))
+        for part in parts:
+            kind = etree.QName(_qname(part, part.get("type") or "xs:anyType"))
+            nsmap = {"t": kind.namespace} if kind.namespace else None
+            etree.SubElement(
+                inside,
+                clark(XSD, "element"),
+                {"name": part.get("name", ""), "type": f"t:{kind.localname}" if nsmap else kind.localname},
+                nsmap=nsmap,
+            )
+        self.wrappers.append(SchemaDocument(f"rpc:{name}", root, inline=True))
+        return tag
+
+
+def _soap(parent: etree._Element, name: str) -> etree._Element | None:
+    return next((one for space in _SPACES for one in parent.iterfind(clark(space, name))), None)
+
+
+def _has(root: etree._Element, element: etree._Element) -> bool:
+    return element.getroottree().getroot() is root
+
+
+def _qname(element: etree._Element, text: str) -> str:
+    """Return a QName in an attribute in Clark notation."""
+    prefix, colon, name = text.strip().rpartition(":")
+    return clark(element.nsmap.get(prefix if colon else None), name)
+
+
+def base_of(description: SoapDescription) -> str:
+    """Return scheme and host of the first port."""
+    parts = urlsplit(description.ports[0].url)
+    return f"{parts.scheme}://{parts.netloc}"
+
+
+def moved(url: str, old: str, new: str) -> str:
+    """Return a port's URL with another scheme and host: a device behind a front does not know its own."""
+    return new + url[len(old) :] if url.startswith(old) else url

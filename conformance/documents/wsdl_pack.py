@@ -1,0 +1,114 @@
+"""A contract pack made from a WSDL: its operations, and the documents that describe them."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import urlsplit
+
+from conformance.contract.described import TITLE
+from conformance.contract.locating import MANIFEST
+from conformance.contract.pack import Contract
+from conformance.contract.toml_file import basic_string
+from conformance.documents.soap_services import SoapDescription, SoapOperation, SoapPort, read_services
+from conformance.documents.xml_names import local
+
+#: The documents of the WSDL, by location, and which of them comes first.
+DOCUMENTS_NAME: Final = "wsdl.json"
+CLASS: Final = "soap"
+# Operations that only read, by their first word.
+_READS: Final = re.compile(
+    r"(?:[Gg]et|[Ll]ist|[Dd]escribe|[Rr]ead|[Qq]uery|[Ff]ind|[Ii]s|[Hh]as|[Cc]ount|[Ss]earch)(?![a-z])"
+)
+# The first child of a Body, whatever the prefixes.
+_PAYLOAD: Final = re.compile(rb"<(?:[\w.-]+:)?Body\b[^>]*>\s*<(?:[\w.-]+:)?([\w.-]+)")
+
+
+def label_of(port: SoapPort, operation: SoapOperation) -> str:
+    """Return how an operation is called in patterns and on pages: as if it were a resource of its port."""
+    return f"POST /{port.name}/{operation.name}"
+
+
+def write_soap_pack(folder: Path, found: SoapDescription, location: str, documents: Mapping[str, bytes]) -> Path:
+    """Write a contract pack for a WSDL; return its folder.
+
+    Args:
+        folder: where; made if it is not there.
+        found: what the WSDL describes.
+        location: that of the WSDL.
+        documents: all documents by location.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    lines = [
+        f"name = {basic_string(re.sub(r'[^a-z0-9]+', '-', found.name.lower()).strip('-') or 'soap')}",
+        'version = "0"',
+        f"title = {basic_string(TITLE)}",
+        "closed_answers = true",
+        "described = true",
+        f'\n[[class]]\nname = "{CLASS}"',
+    ]
+    (folder / MANIFEST).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (folder / "openapi.json").write_text(json.dumps(_operations(found)), encoding="utf-8")
+    kept = {"location": location, "documents": {place: text.decode("latin-1") for place, text in documents.items()}}
+    (folder / DOCUMENTS_NAME).write_text(json.dumps(kept), encoding="utf-8")
+    return folder
+
+
+def _operations(found: SoapDescription) -> dict[str, Any]:
+    """Return the operations in the form in which those of other APIs are known."""
+    paths: dict[str, Any] = {}
+    for port, operation in each(found.ports):
+        marks = {"x-roaas-reads": True} if _READS.match(operation.name) else {}
+        marks |= {"x-roaas-never": True} if operation.remark else {}
+        paths[label_of(port, operation).partition(" ")[2]] = {
+            "post": {"operationId": operation.name, "tags": [port.name], "responses": {}, **marks}
+        }
+    return {"openapi": "3.1.0", "info": {"title": found.name, "version": ""}, "paths": paths}
+
+
+def label_in(found: SoapDescription, path: str, body: bytes) -> str | None:
+    """Return the operation that a message to a path is for, or None."""
+    payload = _PAYLOAD.search(body)
+    name = payload[1].decode() if payload else ""
+    return next(
+        (
+            label_of(port, operation)
+            for port, operation in each(found.ports)
+            if urlsplit(port.url).path == path and local(operation.request) == name
+        ),
+        None,
+    )
+
+
+def each(ports: Iterable[SoapPort]) -> Iterable[tuple[SoapPort, SoapOperation]]:
+    """Yield each operation with its port."""
+    return ((port, operation) for port in ports for operation in port.operations)
+
+
+@lru_cache(maxsize=4)
+def services_of(contract: Contract) -> SoapDescription | None:
+    """Return what the WSDL of a pack describes; None if the pack has none.
+
+    Raises:
+        WsdlError: it describes no service.
+    """
+    path = contract.directory / DOCUMENTS_NAME
+    if not path.is_file():
+        return None
+    kept = json.loads(path.read_text(encoding="utf-8"))
+    documents = {place: text.encode("latin-1") for place, text in kept["documents"].items()}
+
+    def fetch(place: str) -> bytes:
+        if place not in documents:
+            raise ValueError("it was not there when the WSDL was read")
+        found: bytes = documents[place]
+        return found
+
+    return read_services(documents[kept["location"]], kept["location"], fetch)

@@ -1,0 +1,1 @@
+"""Rules on any SOAP service, by its WSDL."""

@@ -1,0 +1,299 @@
+"""Whether a SOAP service keeps SOAP, its WSDL and its composure, whatever it is sent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING
+
+from conformance.documents.soap_services import ENVELOPE_12
+from conformance.documents.traceback import inside_shown
+from conformance.documents.wsdl_pack import services_of
+from conformance.documents.xml import NotXmlError, elements, parse, text_of
+from conformance.documents.xml_names import clark, local
+from conformance.scenarios.rule import Case, Outcome, rule
+from conformance.scenarios.soap_survey import Kind, SoapProbe, soap_survey, wsdl_faults
+from conformance.transport.exchange import Response
+from conformance.verdict.run import Run
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+_ON = (soap_survey,)
+_OK, _BAD, _FAILED = 200, 400, 500
+# SOAP 1.2 Part 1, 5.4.6.
+_CODES_12 = frozenset({"VersionMismatch", "MustUnderstand", "DataEncodingUnknown", "Sender", "Receiver"})
+# What shows no version of SOAP may be answered by a fault of any, or by none.
+_OF_NO_VERSION = frozenset({Kind.VERSION, Kind.UNREADABLE, Kind.EMPTY})
+Trace = tuple[SoapProbe, ...]
+
+
+class _NotSoapError(ValueError):
+    """Raised for content that is no message of the port's SOAP version; the message says why."""
+
+
+def _body(answer: Response, envelope: str) -> list[etree._Element]:
+    """Return the children of a response's Body.
+
+    Raises:
+        _NotSoapError: there is none.
+    """
+    try:
+        root = parse(answer.body, doctype=True)
+    except NotXmlError as error:
+        raise _NotSoapError(f"content that is not well-formed XML: {error}") from error
+    if root.tag != clark(envelope, "Envelope"):
+        raise _NotSoapError(f"the root element {root.tag}")
+    body = [one for one in elements(root) if one.tag == clark(envelope, "Body")]
+    if len(body) != 1:
+        raise _NotSoapError(f"an Envelope with {len(body)} Body elements")
+    return elements(body[0])
+
+
+def _fault(probe: SoapProbe) -> etree._Element | None:
+    """Return the fault in a response, or None."""
+    try:
+        inside = _body(probe.exchange.response, probe.envelope) if probe.exchange else []
+    except _NotSoapError:
+        return None
+    return next((one for one in inside if one.tag == clark(probe.envelope, "Fault")), None)
+
+
+def _succeeded(probe: SoapProbe) -> bool:
+    return probe.exchange is not None and probe.exchange.response.ok and _fault(probe) is None
+
+
+def _told(
+    trace: Iterable[SoapProbe], expected: str, wrong: Callable[[SoapProbe], str | None], *, by_kind: bool = False
+) -> Iterator[Outcome]:
+    """Yield a case for each probe of which ``wrong`` returns what is wrong, or an empty text; not where it is None."""
+    for probe in trace:
+        found = wrong(probe)
+        if found is not None:
+            name = probe.operation.rpartition("/")[2]
+            yield Case(
+                not found,
+                probe.exchange or probe.unanswered,
+                f"{expected} for {probe.says} of {name}",
+                observed=found,
+                cause=f"{found.partition(':')[0]} {probe.kind if by_kind else ''}",
+                subject=name,
+                operations=(probe.operation,),
+            )
+
+
+@rule("soap/wsdl", on=(wsdl_faults,))
+def wsdl(trace: tuple[str, ...]) -> Iterator[Outcome]:
+    """Judge whether the WSDL holds together: its documents are there, and each reference has a target."""
+    expected = "a WSDL that holds together"
+    for wrong in trace:
+        yield Case(holds=False, exchange=None, expected=expected, observed=wrong, subject="the WSDL")
+    if not trace:
+        yield Case(holds=True, exchange=None, expected=expected)
+
+
+@rule("soap/answered", on=_ON)
+def answered(trace: Trace) -> Iterator[Outcome]:
+    """Judge whether each request gets an HTTP response."""
+    return _told(trace, "a response", lambda one: one.unanswered.problem if one.unanswered else "")
+
+
+@rule("soap/message", on=_ON)
+def message(trace: Trace) -> Iterator[Outcome]:
+    """Judge whether a success, and XML with status 500, is a well-formed message of the port's SOAP version."""
+
+    def wrong(probe: SoapProbe) -> str | None:
+        answer = probe.exchange.response if probe.exchange else None
+        if answer is None or not (answer.status == _OK or (answer.status == _FAILED and "xml" in answer.media_type)):
+            return None
+        if probe.response is None and not answer.body:
+            return None
+        try:
+            _body(answer, probe.envelope)
+        except _NotSoapError as error:
+            return None if probe.kind in _OF_NO_VERSION else str(error)
+        return ""
+
+    return _told(trace, "a SOAP message", wrong)
+
+
+@rule("soap/media-type", on=_ON)
+def media_type(trace: Trace) -> Iterator[Outcome]:
+    """Judge whether a message has the media type of its SOAP version."""
+
+    def wrong(probe: SoapProbe) -> str | None:
+        answer = probe.exchange.response if probe.exchange else None
+        if answer is None or not answer.body or probe.kind in _OF_NO_VERSION:
+            return None
+        try:
+            _body(answer, probe.envelope)
+        except _NotSoapError:
+            return None
+        wanted = "application/soap+xml" if probe.envelope == ENVELOPE_12 else "text/xml"
+        return "" if answer.media_type == wanted else f"Content-Type: {answer.media_type or '(none)'}"
+
+    return _told(trace, "the media type of the SOAP version", wrong)
+
+
+@rule("soap/response-valid", on=_ON)
+def response_valid(trace: Trace, run: Run) -> Iterator[Outcome]:
+    """Judge whether the Body of a success has the element that the WSDL names, valid by its schema."""
+    found = services_of(run.contract)
+
+    def wrong(probe: SoapProbe) -> str | None:
+        if found is None or not _succeeded(probe) or probe.exchange is None or probe.response is None:
+            return None
+        try:
+            inside = _body(probe.exchange.response, probe.envelope)
+        except _NotSoapError:
+            return None
+        if not probe.response:
+            return "" if not inside else f"{inside[0].tag} in a Body that must be empty"
+        if len(inside) != 1 or inside[0].tag != probe.response:
+            return f"{inside[0].tag if inside else 'an empty Body'} in place of {probe.response}"
+        return found.types.invalid(inside[0])
+
+    return _told(trace, "a response that is valid by the WSDL", wrong)
+
+
+@rule("soap/fault", on=_ON)
+def fault(trace: Trace) -> Iterator[Outcome]:
+    """Judge whether a fault has what its SOAP version demands: a code that is a QName, and a text."""
+
+    def wrong(probe: SoapProbe) -> str | None:
+        found = _fault(probe)
+        if found is None or probe.kind in _OF_NO_VERSION:
+            return None
+        return _wrong_fault_12(found) if probe.envelope == ENVELOPE_12 else _wrong_fault_11(found)
+
+    return _told(trace, "a well-made fault", wrong)
+
+
+def _wrong_fault_11(found: etree._Element) -> str:
+    """Return what is wrong with a fault of SOAP 1.1 (4.4; WS-I BP R1000, R1001)."""
+    by_name = {str(one.tag): one for one in elements(found)}
+    for name in ("faultcode", "faultstring"):
+        if name not in by_name:
+            return f"no {name} without a namespace"
+    prefix, colon, _ = text_of(by_name["faultcode"]).strip().rpartition(":")
+    return (
+        f"faultcode with the prefix {prefix!r}, which is not declared"
+        if colon and not (by_name["faultcode"].nsmap.get(prefix))
+        else ""
+    )
+
+
+def _wrong_fault_12(found: etree._Element) -> str:
+    """Return what is wrong with a fault of SOAP 1.2 (Part 1, 5.4)."""
+    by_name = {local(str(one.tag)): one for one in elements(found) if str(one.tag).startswith(f"{{{ENVELOPE_12}}}")}
+    if "Code" not in by_name or "Reason" not in by_name:
+        return "no Code and Reason of SOAP 1.2"
+    value = next(iter(elements(by_name["Code"])), None)
+    prefix, _, name = (text_of(value).strip() if value is not None else "").rpartition(":")
+    if value is None or value.nsmap.get(prefix or None) != ENVELOPE_12 or name not in _CODES_12:
+        return f"the code {text_of(value).strip() if value is not None else ''!r}, which SOAP 1.2 does not have"
+    texts = [one for one in elements(by_name["Reason"]) if local(str(one.tag)) == "Text"]
+    return "" if texts and text_of(texts[0]).strip() else "a Reason without Text"
+
+
+@rule("soap/fault-status", on=_ON)
+def fault_status(trace: Trace) -> Iterator[Outcome]:
+    """Judge whether a fault of SOAP 1.1 has status 500 (SOAP 1.1, 6.2), and one of SOAP 1.2 has 400 or 500."""
+
+    def wrong(probe: SoapProbe) -> str | None:
+        if _fault(probe) is None or probe.exchange is None:
+            return None
+        status = probe.exchange.response.status
+        allowed = {_BAD, _FAILED} if probe.envelope == ENVELOPE_12 else {_FAILED}
+        return "" if status in allowed else f"status {status}"
+
+    return _told(trace, "a fault with its status", wrong)
+
+
+@rule("soap/valid-accepted", on=_ON)
+def valid_accepted(trace: Trace) -> Iterator[Outcome]:
+    """Judge whether a message that the WSDL allows is accepted."""
+    usual = [one for one in trace if one.kind is Kind.USUAL]
+    return _told(usual, "success", lambda one: None if one.exchange is None else "" if _succeeded(one) else _came(one))
+
+
+def _came(probe: SoapProbe) -> str:
+    found = _fault(probe)
+    if found is None:
+        return f"status {probe.exchange.response.status}" if probe.exchange else "no response"
+    return f"a fault: {' '.join(' '.join(map(str, found.itertext())).split())[:200]}"
+
+
+def _refused(trace: Trace, expected: str, *kinds: Kind) -> Iterator[Outcome]:
+    def wrong(probe: SoapProbe) -> str | None:
+        return None if probe.exchange is None else "success" if _succeeded(probe) else ""
+
+    return _told((one for one in trace if one.kind in kinds), expected, wrong, by_kind=True)
+
+
+@rule("soap/malformed-refused", on=_ON)
+def malformed_refused(trace: Trace) -> Iterator[Outcome]:
+    """Judge whether what is no message is refused."""
+    return _refused(trace, "a fault or a status of 400 and above", Kind.UNREADABLE, Kind.EMPTY)
+
+
+@rule("soap/invalid-refused", on=_ON)
+def invalid_refused(trace: Trace) -> Iterator[Outcome]:
+    """Judge whether a message that the schema forbids is refused."""
+    return _refused(trace, "a fault", Kind.INVALID)
+
+
+@rule("soap/version-mismatch", on=_ON)
+def version_mismatch(trace: Trace) -> Iterator[Outcome]:
+    """Judge whether a message of an unknown SOAP version is refused."""
+    return _refused(trace, "a fault", Kind.VERSION)
+
+
+@rule("soap/must-understand", on=_ON)
+def must_understand(trace: Trace) -> Iterator[Outcome]:
+    """Judge whether a message with a header block that must be understood, and is unknown, is refused."""
+    return _refused(trace, "a MustUnderstand fault", Kind.UNDERSTAND)
+
+
+@rule("soap/doctype-refused", on=_ON)
+def doctype_refused(trace: Trace) -> Iterator[Outcome]:
+    """Judge whether a message with a DOCTYPE is refused."""
+    return _refused(trace, "a fault", Kind.DOCTYPE)
+
+
+@rule("soap/no-bare-error", on=_ON)
+def no_bare_error(trace: Trace) -> Iterator[Outcome]:
+    """Judge whether a server error is told by a fault: a bare 500 says that the service itself failed."""
+
+    def wrong(probe: SoapProbe) -> str | None:
+        status = probe.exchange.response.status if probe.exchange else 0
+        if status < _FAILED or probe.kind in _OF_NO_VERSION:
+            return None if status == 0 else ""
+        return "" if _fault(probe) is not None else f"status {status} without a fault"
+
+    return _told(trace, "a fault, if it fails", wrong)
+
+
+@rule("soap/recovers", on=_ON)
+def recovers(trace: Trace) -> Iterator[Outcome]:
+    """Judge whether a valid message is answered after wrong ones as it was before them."""
+    before = {one.operation: _succeeded(one) for one in trace if one.kind is Kind.USUAL}
+
+    def wrong(probe: SoapProbe) -> str | None:
+        if not before.get(probe.operation) or probe.exchange is None:
+            return None
+        return "" if _succeeded(probe) else _came(probe)
+
+    return _told((one for one in trace if one.kind is Kind.AGAIN), "success, as before", wrong)
+
+
+@rule("soap/no-internals", on=_ON)
+def no_internals(trace: Trace) -> Iterator[Outcome]:
+    """Judge whether a response shows a traceback."""
+
+    def wrong(probe: SoapProbe) -> str | None:
+        if probe.exchange is None or probe.exchange.response.ok:
+            return None
+        shown = inside_shown(probe.exchange.response.body)
+        return f"{shown!r}" if shown else ""
+
+    return _told(trace, "an error that shows nothing of the program", wrong)

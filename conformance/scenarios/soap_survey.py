@@ -1,0 +1,215 @@
+"""Call each operation of a WSDL that may be called: rightly, with one thing wrong, and rightly again."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Final
+from urllib.parse import urlsplit
+
+from conformance.api.rest.interface import RestInterface
+from conformance.api.soap.envelope import envelope
+from conformance.api.soap.messages import declarations, ordinary, simple_leaves, with_text
+from conformance.api.soap.username_token import UsernameToken
+from conformance.documents.openapi import operations_of
+from conformance.documents.soap_services import SoapDescription, SoapOperation, SoapPort, base_of
+from conformance.documents.wsdl_pack import each, label_of, services_of
+from conformance.documents.xml import parse
+from conformance.documents.xml_names import clark
+from conformance.documents.xml_node import Node
+from conformance.documents.xsd_lexical import outside, unreadable
+from conformance.documents.xsd_shapes import Element
+from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.transport.client import Headers
+from conformance.transport.exchange import Exchange, NoAnswerError, Unanswered
+from conformance.verdict.run import Run
+
+_STRANGE: Final = "urn:example:roaas"
+# Of one operation, at standard: invalid messages of each kind; and how often the usual one is sent.
+_MOST: Final = 12
+_USUAL: Final = 6
+# One operation may take so long, s.
+_BUDGET_S: Final = 20.0
+
+
+class Kind(StrEnum):
+    """What a message shows."""
+
+    USUAL = "usual"
+    AGAIN = "again"
+    INVALID = "invalid"
+    UNREADABLE = "unreadable"
+    VERSION = "version"
+    UNDERSTAND = "understand"
+    DOCTYPE = "doctype"
+    EMPTY = "empty"
+
+
+@dataclass(frozen=True)
+class SoapProbe:
+    """One message and what came of it.
+
+    Attributes:
+        operation: label.
+        kind: what it shows.
+        says: what is special about it, as a noun phrase.
+        envelope: namespace of the port's SOAP version.
+        response: tag of the element that a success has in its Body; None: one-way.
+        exchange: request and response, or None.
+        unanswered: the request without a response, or None.
+    """
+
+    operation: str
+    kind: Kind
+    says: str
+    envelope: str
+    response: str | None
+    exchange: Exchange | None = None
+    unanswered: Unanswered | None = None
+
+
+@dataclass
+class _Caller:
+    """Sends messages and records them."""
+
+    api: RestInterface
+    found: SoapDescription
+    token: UsernameToken | None = None
+    probes: list[SoapProbe] = field(default_factory=list)
+
+    def message(self, port: SoapPort, node: Node | None, *more: Node, space: str = "") -> bytes:
+        """Return a message, with further header blocks, or in another namespace than that of the port's Envelope."""
+        blocks = (*([self.token.block(space or port.envelope)] if self.token else ()), *more)
+        whole = envelope((node,) if node else (), blocks or None, space or port.envelope)
+        return b'<?xml version="1.0" encoding="utf-8"?>\n' + whole.written()
+
+    def send(self, port: SoapPort, operation: SoapOperation, kind: Kind, says: str, octets: bytes) -> SoapProbe:
+        """Send octets to a port.
+
+        Raises:
+            PartialTraceError: the device does not respond any more.
+        """
+        parts = urlsplit(port.url)  # the path alone: a device behind a front does not know its own address
+        path = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
+        fields: Headers = (("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", f'"{operation.action}"'))
+        if port.is_12:
+            fields = (("Content-Type", f'application/soap+xml; charset=utf-8; action="{operation.action}"'),)
+        probe = SoapProbe(label_of(port, operation), kind, says, port.envelope, operation.response)
+        try:
+            probe = replace(probe, exchange=self.api.client.send("POST", path, headers=fields, body=octets))
+        except NoAnswerError as none:
+            self.probes.append(replace(probe, unanswered=none.unanswered))
+            if not self.api.alive():
+                raise PartialTraceError(tuple(self.probes)) from none
+            return self.probes[-1]
+        self.probes.append(probe)
+        return probe
+
+    def usual(self, operation: SoapOperation) -> tuple[Element | None, Node | None]:
+        """Return the declaration of an operation's request, and a valid message of it; None if its Body is empty.
+
+        Raises:
+            NotPossibleError: none can be made.
+        """
+        if not operation.request:
+            return None, None
+        declared = self.found.types.shape(operation.request)
+        if declared is None:
+            raise NotPossibleError(f"no schema declares {operation.request}")
+        values = self.api.run.statement.values
+        fault = ""
+        for optional in (False, True):
+            node = ordinary(declared, optional=optional)
+            for path, _ in simple_leaves(declared, node):
+                given = values.get(node.at(path).name)
+                if given:
+                    node = with_text(node, path, str(given[0]))
+            fault = self.found.types.invalid(parse(node.written()))
+            if not fault:
+                return declared, node
+        raise NotPossibleError(f"no valid message can be made for {operation.name}: {fault}")
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.READING)
+def wsdl_faults(run: Run) -> tuple[str, ...]:
+    """Return what is wrong with the WSDL itself; nothing is called."""
+    found = services_of(run.contract)
+    if found is None:
+        raise NotPossibleError("the device has no WSDL")
+    return found.faults
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.READING)
+def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
+    """Call each operation that may be called, with valid messages and with wrong ones."""
+    found = services_of(api.run.contract)
+    if found is None:
+        raise NotPossibleError("the device has no WSDL")
+    try:
+        token = UsernameToken.of(api.run.statement.endpoints.username_token_file)
+    except (OSError, ValueError) as error:
+        raise NotPossibleError(str(error)) from error
+    caller = _Caller(api, found, token)
+    if token is not None:
+        token.set_clock(api.client.send("GET", "/").response.header("date"))
+    may = {item.label for item in operations_of(api.run.contract) if api.call_rules.decide(item).may}
+    reasons: list[str] = []
+    for port, operation in each(found.ports):
+        if label_of(port, operation) in may and port.url.startswith(base_of(found)):
+            try:
+                _explore(caller, port, operation)
+            except NotPossibleError as error:
+                reasons.append(str(error))
+    if not caller.probes:
+        raise NotPossibleError(reasons[0] if reasons else "no operation of the WSDL may be called")
+    return tuple(caller.probes)
+
+
+def _explore(caller: _Caller, port: SoapPort, operation: SoapOperation) -> None:
+    """Send the messages of one operation."""
+    declared, node = caller.usual(operation)
+    effort = caller.api.run.effort
+    for _ in range(1 if effort.name == "quick" else _USUAL):
+        caller.send(port, operation, Kind.USUAL, "a valid message", caller.message(port, node))
+    until = time.monotonic() + _BUDGET_S
+    invalid = list(_invalid(caller.found, declared, node)) if declared and node else []
+    for says, wrong in effort.draw(invalid, _MOST, f"{caller.api.run.seed}/{label_of(port, operation)}"):
+        if time.monotonic() < until:
+            caller.send(port, operation, Kind.INVALID, says, caller.message(port, wrong))
+    for kind, says, octets in _odd(caller, port, node):
+        if time.monotonic() < until:
+            caller.send(port, operation, kind, says, octets)
+            caller.send(port, operation, Kind.AGAIN, f"a valid message after {says}", caller.message(port, node))
+
+
+def _invalid(found: SoapDescription, declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
+    """Yield messages that the schema forbids, each wrong in one thing."""
+    tried: list[tuple[str, Node]] = []
+    for path, part in declarations(declared, node):
+        if part.minimum:
+            tried.append((f"a message without {node.at(path).name}", node.replaced(path)))
+    for path, simple in simple_leaves(declared, node):
+        for text in [*unreadable(simple)[:2], *outside(simple)[:2]]:
+            name = node.at(path).name if path else node.name
+            tried.append((f"{text!r} as {name}", with_text(node, path, text)))
+    strange = Node(clark(_STRANGE, "Unknown"), "1")
+    tried.append(("a message with an element more", replace(node, children=(*node.children, strange))))
+    for says, wrong in tried:
+        if found.types.invalid(parse(wrong.written())):
+            yield says, wrong
+
+
+def _odd(caller: _Caller, port: SoapPort, node: Node | None) -> Iterator[tuple[Kind, str, bytes]]:
+    """Yield messages that are wrong whatever the operation is."""
+    whole = caller.message(port, node)
+    yield Kind.UNREADABLE, "XML that is not well-formed", whole[: len(whole) * 2 // 3]
+    yield Kind.UNREADABLE, "octets that are no XML", b"roaas"
+    yield Kind.EMPTY, "an empty body", b""
+    yield Kind.VERSION, "an Envelope of an unknown namespace", caller.message(port, node, space=_STRANGE)
+    block = Node(clark(_STRANGE, "Strange"), "1", (), ((clark(port.envelope, "mustUnderstand"), "1"),))
+    yield Kind.UNDERSTAND, "a header block that must be understood", caller.message(port, node, block)
+    head, rest = caller.message(port, node).split(b"\n", 1)
+    yield Kind.DOCTYPE, "a DOCTYPE", head + b'\n<!DOCTYPE e [<!ENTITY a "b">]>' + rest

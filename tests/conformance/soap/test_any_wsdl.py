@@ -1,0 +1,250 @@
+"""The class soap of devices that are known by their WSDL: right ones are not blamed, mutants by rule are killed."""
+
+import contextlib
+import json
+import re
+import socketserver
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import count
+from types import SimpleNamespace
+from wsgiref.simple_server import WSGIRequestHandler, WSGIServer, make_server
+
+import pytest
+from processes import ended
+from soap_devices import PASSWORD, SOAP_11, USER, Device, camera, scale, table
+
+from conformance.api.call_rules import CallRules
+from conformance.contract.pack import Contract
+from conformance.documents.soap_services import WsdlError, read_services
+from conformance.documents.wsdl_pack import write_soap_pack
+from conformance.rules.soap import test_soap
+from conformance.scenarios.rule import Case, Rule
+from conformance.scenarios.scenario import NotPossibleError
+from conformance.scenarios.soap_survey import soap_survey, wsdl_faults
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import Statement
+from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
+
+_DEVICES = {"camera": camera, "scale": scale, "table": table}
+_RULES = [one for one in vars(test_soap).values() if isinstance(one, Rule)]
+
+
+class _Server(socketserver.ThreadingMixIn, WSGIServer):
+    daemon_threads = True
+
+
+class _Quiet(WSGIRequestHandler):
+    def log_message(self, *_):
+        pass
+
+
+@contextmanager
+def _serving(device: Device) -> Iterator[str]:
+    server = make_server("127.0.0.1", 0, device.app, _Server, _Quiet)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}"
+    server.shutdown()
+    server.server_close()
+
+
+@pytest.fixture
+def secret(tmp_path):
+    path = tmp_path / "user"
+    path.write_text(f"{USER}:{PASSWORD}", encoding="utf-8")
+    return path
+
+
+def _judged(device, tmp_path, secret):
+    """Return the requirements that a device breaks, without HTTP, and those that were judged."""
+    documents = {
+        "d.wsdl": device.wsdl.replace("ADDRESS", "http://device").encode(),
+        f"{device.name}.xsd": device.xsd.encode(),
+    }
+
+    def fetch(place):
+        if place not in documents:
+            raise ValueError("404")
+        return documents[place]
+
+    found = read_services(documents["d.wsdl"], "d.wsdl", fetch)
+    contract = Contract.load(write_soap_pack(tmp_path / device.name, found, "d.wsdl", documents))
+
+    def send(method, path, *, headers=(), body=b""):
+        if method == "GET":
+            altered = 404, "text/plain", b""
+        else:
+            status, octets = device.respond(body)
+            media_type = "text/xml" if device.soap == SOAP_11 else "application/soap+xml"
+            altered = device.alter(body, status, media_type, octets)
+        status, media_type, octets = altered
+        fields = (("Content-Type", media_type),) if media_type else ()
+        return Exchange(Request(method, f"http://device{path}", headers, body), Response(status, fields, octets, 1.0))
+
+    statement = Statement(endpoints=Endpoints(rest="http://device", username_token_file=str(secret)))
+    run = Run(statement, contract, effort=Effort("standard"))
+    client = SimpleNamespace(send=send, base_url="http://device")
+    api = SimpleNamespace(run=run, client=client, alive=lambda: True, call_rules=CallRules(("*",)))
+    traces = {wsdl_faults: wsdl_faults.play(run)}
+    with contextlib.suppress(NotPossibleError):
+        traces[soap_survey] = soap_survey.play(api)
+    cases = [
+        (rule.requirement, one)
+        for rule in _RULES
+        for scenario in rule.on
+        if scenario in traces
+        for one in rule.outcomes(traces[scenario], {"run": run}.get)
+        if isinstance(one, Case)
+    ]
+    return {name for name, one in cases if not one.holds}, {name for name, _ in cases}
+
+
+@pytest.mark.parametrize("name", _DEVICES)
+def test_a_right_service_breaks_nothing(name, tmp_path, secret):
+    broken, judged = _judged(_DEVICES[name](), tmp_path, secret)
+    assert broken == set()
+    assert len(judged) == len(_RULES)
+
+
+def _replacing(old, new, *, faults=False):
+    """Return a mutant that changes the body of successes, or of faults."""
+
+    def alter(_, status, media_type, body):
+        concerned = (status != 200) is faults
+        return status, media_type, re.sub(old, new, body, count=1) if concerned else body
+
+    return alter
+
+
+def _on_faults(change):
+    return lambda _, *answer: change(*answer) if answer[0] != 200 else answer
+
+
+def _on_success(change):
+    return lambda _, *answer: change(*answer) if answer[0] == 200 else answer
+
+
+def _taking(pattern, device):
+    """Return a mutant that answers messages with a pattern as if they were right."""
+    right = device.envelope(next(iter(device.answers.values())))
+
+    def alter(request, status, media_type, body):
+        return (200, media_type, right) if status != 200 and re.search(pattern, request) else (status, media_type, body)
+
+    return alter
+
+
+def _now_and_then(change, every):
+    calls = count(1)
+    return lambda _, *answer: change(*answer) if next(calls) % every == 0 else answer
+
+
+def _after_refusal(change):
+    """Return a mutant that changes successes once it has refused a message."""
+    refused = []
+
+    def alter(_, *answer):
+        if answer[0] != 200:
+            refused.append(1)
+            return answer
+        return change(*answer) if refused else answer
+
+    return alter
+
+
+def _mutants(device):
+    page = (b"<html><body>busy</body></html>", "text/html")
+    fault = device.fault("Server" if device.soap == SOAP_11 else "Receiver", "it broke")
+    trace = b'Traceback (most recent call last):\n  File "/srv/app.py", line 3, in do\nKeyError: 1'
+    yield "cut", _on_success(lambda status, media, body: (status, media, body[:-9]))
+    yield "cut-faults", _on_faults(lambda _, media, body: (500, media, body[:-9]))
+    yield "page", _on_success(lambda status, _, __: (status, page[1], page[0]))
+    yield "empty", _on_success(lambda status, media, _: (status, media, b""))
+    yield "no-envelope", _replacing(rb"s:Envelope", b"s:Letter")
+    yield "other-version", _replacing(device.soap.encode(), b"urn:other")
+    yield "two-bodies", _replacing(rb"<s:Body>", b"<s:Body/><s:Body>")
+    yield "no-body", _replacing(rb"s:Body(.*)s:Body", rb"s:Corpse\1s:Corpse")
+    yield "undeclared-prefix", _replacing(rb"c:(\w+Response) ", rb"z:\1 ")
+    yield "json", _on_success(lambda status, _, body: (status, "application/json", body))
+    yield "media-type-of-faults", _on_faults(lambda status, _, body: (status, "text/html", body))
+    yield "other-payload", _replacing(rb"(\w+)Response", rb"\1Result")
+    yield "other-namespace", _replacing(rb'xmlns:c="urn:', b'xmlns:c="urn:not-')
+    yield "payload-twice", _replacing(rb"<s:Body>(<c:.*)</s:Body>", rb"<s:Body>\1\1</s:Body>")
+    yield "strange-child", _replacing(rb"(<c:\w+Response[^/>]*>)", rb"\1<Strange/>")
+    yield "text-for-number", _replacing(rb"(pan=\"|<grams>|<c:Angle>)[\d.]+", rb"\1far")
+    yield "fault-as-200", _on_faults(lambda _, media, body: (200, media, body))
+    yield "fault-as-404", _on_faults(lambda _, media, body: (404, media, body))
+    yield "fault-without-code", _replacing(rb"<faultcode>.*</faultcode>|<s:Code>.*</s:Code>", b"", faults=True)
+    yield "fault-without-text", _replacing(rb"<faultstring>.*</faultstring>|<s:Reason>.*</s:Reason>", b"", faults=True)
+    yield "fault-of-unknown-prefix", _replacing(rb">s:(Client|Sender)<", rb">q:\1<", faults=True)
+    yield (
+        "fault-with-namespace",
+        _replacing(rb"faultcode>(.*)faultcode>|s:Value", rb"s:faultcode>\1s:faultcode>", faults=True),
+    )
+    yield "traceback", _replacing(rb"not valid", trace, faults=True)
+    yield "bare-error", _on_faults(lambda _, __, ___: (500, *reversed(page)))
+    yield "bare-error-at-times", _now_and_then(lambda *_: (500, *reversed(page)), 7)
+    yield "refuses-all", _on_success(lambda _, media, __: (fault[0], media, fault[1]))
+    yield "fails-at-times", _now_and_then(lambda *answer: (fault[0], answer[1], fault[1]), 5)
+    yield "fails-after-refusal", _after_refusal(lambda _, media, __: (fault[0], media, fault[1]))
+    yield "old-answer-after-refusal", _after_refusal(lambda status, media, _: (status, media, b""))
+    yield "takes-garbage", _taking(rb"^roaas$", device)
+    yield "takes-nothing", _taking(rb"^$", device)
+    yield (
+        "takes-other-versions",
+        _taking(rb"<n\d:Envelope|urn:example:roaas\W+><\w+:Header|Envelope xmlns:\w+=.urn:example", device),
+    )
+    yield "understands-all", _taking(rb"Strange", device)
+    yield "takes-doctypes", _taking(rb"DOCTYPE", device)
+    yield "takes-unknown-elements", _taking(rb"Unknown", device)
+
+
+@pytest.mark.parametrize("name", _DEVICES)
+def test_mutants_by_rule_are_killed(name, tmp_path, secret):
+    """At least 95 %, on each device."""
+    survivors, number = [], 0
+    for mutant, alter in _mutants(_DEVICES[name]()):
+        device = _DEVICES[name]()
+        device.alter = alter
+        number += 1
+        if not _judged(device, tmp_path, secret)[0]:
+            survivors.append(mutant)
+    assert number >= 35
+    assert len(survivors) <= 0.05 * number, survivors
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ('schemaLocation="camera.xsd"', 'schemaLocation="other.xsd"'),
+        ('element="c:GetStatusResponse"', 'element="c:GetState"'),
+        ('message="c:GetStatusOut"', 'message="c:GetStatusOff"'),
+        ('<operation name="AbsoluteMove"><soap', '<operation name="Move"><soap'),
+    ],
+)
+def test_a_wsdl_that_does_not_hold_together_is_told(right, wrong, tmp_path, secret):
+    device = camera()
+    device.wsdl = device.wsdl.replace(right, wrong, 1)
+    try:
+        broken, _ = _judged(device, tmp_path, secret)
+    except WsdlError:
+        return  # nothing can be called by it
+    assert "soap/wsdl" in broken
+
+
+@pytest.mark.parametrize("name", _DEVICES)
+def test_certify_by_a_wsdl(name, tmp_path, secret):
+    """Over HTTP: right services pass, and only what reads is called."""
+    with _serving(_DEVICES[name]()) as url:
+        more = ["--username-token-file", str(secret), "--effort", "quick", "--out", str(tmp_path / "out")]
+        done = ended(sys.executable, "-m", "roaas", "certify", "--wsdl", f"{url}/{name}.wsdl", *more)
+    assert done.returncode == 0, done.stdout + done.stderr
+    result = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+    called = {one["operation"].rpartition("/")[2] for one in result["api"]["operations"] if one["requests"]}
+    assert called == {one for one in ("GetStatus", "GetLoad", "GetAngle") if one in str(result["api"])}
+    assert {one["verdict"] for one in result["requirements"]} == {"pass"}
+    assert PASSWORD not in (tmp_path / "out" / "result.json").read_text(encoding="utf-8")
