@@ -155,9 +155,8 @@ def _assemble(documents: Sequence[SchemaDocument], folder: Path) -> Path:
 
 def _relocated(schema: etree._Element, collected: dict[str, str]) -> bytes:
     """Return a schema document whose imports refer to the written files, without includes."""
-    # An inline schema may use prefixes that the WSDL around it declares, and a copy loses them.
-    root = etree.Element(schema.tag, dict(schema.attrib), nsmap=schema.nsmap)
-    root.extend(copy.deepcopy(list(schema)))
+    # An inline schema may use prefixes that the WSDL around it declares. A copy loses them, a text has them.
+    root = etree.fromstring(etree.tostring(schema, with_tail=False))
     for reference in [*root.iter(_IMPORT), *root.iter(_INCLUDE)]:
         space = reference.get("namespace") or ""
         if reference.tag == _INCLUDE:
