@@ -11,7 +11,7 @@ from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult
 from conformance.contract.pack import Contract
 from conformance.engine.connecting import connection_of
-from conformance.engine.describing import fetch_description
+from conformance.engine.describing import fetch_description, is_wsdl
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Api, Calls, Statement, StatementError
 
@@ -56,6 +56,8 @@ def init_described(path: Path | None, source: str, options: dict[str, Any]) -> C
     """
     from conformance.engine.first_described import write_described_statement  # noqa: PLC0415 - only --init needs it
 
+    if is_wsdl(source) or source == options["wsdl"]:
+        raise click.UsageError(f'--init reads OpenAPI descriptions: for {source}, write [api] and wsdl = "{source}"')
     path = _new_file(path, force=options["force"])
     given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) is not None}
     api = Api(overlays=tuple(options["overlays"]), base_url=options["base_url"] or options["rest"])

@@ -13,7 +13,7 @@ from conformance.contract.pack import Contract
 from conformance.documents.description import is_url
 from conformance.documents.openapi import operations_of
 from conformance.engine.connecting import connection_of, keyed
-from conformance.engine.describing import described_contract, soap_contract
+from conformance.engine.describing import described_contract, is_wsdl, soap_contract
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.motion_map import shape_of
 from conformance.statement.statement import (
@@ -58,11 +58,6 @@ def what_is_judged(source: str | None, statement: Path | None, options: dict[str
         return _described(source, api, statement, options)
     declared = load_statement(statement, contract) if statement else empty_statement(contract)
     return _apply(declared, options, contract), contract
-
-
-def is_wsdl(source: str) -> bool:
-    """Return whether a URL or file is named as a WSDL is."""
-    return source.lower().endswith((".wsdl", "?wsdl", "?singlewsdl"))
 
 
 def _described(

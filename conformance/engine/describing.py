@@ -24,6 +24,11 @@ _REDIRECTS: Final = 4
 _OK, _REDIRECT, _CLIENT_ERROR = 200, 300, 400
 
 
+def is_wsdl(source: str) -> bool:
+    """Return whether a URL or file is named as a WSDL is."""
+    return source.lower().endswith((".wsdl", "?wsdl", "?singlewsdl"))
+
+
 class UnreachableError(Exception):
     """Raised when the server of a description does not respond; the message says why."""
 

@@ -6,6 +6,7 @@ Over 300 lines because the survey and the generated requests share one surveyor.
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Final
@@ -36,6 +37,8 @@ _ACTING: Final = 12
 #: At standard effort the usual request is sent and timed so often before the groups of others and after each: a failure
 #: in one call of twenty is met.
 TIMED: Final = 5
+# How often a thing is created and deleted.
+_CYCLES: Final = 24
 # An operation that once took more than a second gets this part of the requests.
 _SLOW_SHARE: Final = 4
 # Statuses of an operation that is not there.
@@ -225,6 +228,26 @@ class _Surveyor:
             self._time(operation, usual, effort, until)
         self.send(operation, Variation(Kind.AGAIN, "", "", usual))
 
+    def create_and_delete(self, operations: Sequence[Operation]) -> None:
+        """At standard, create things and delete them, so often that a failure in one call of twenty is met."""
+        if self.api.run.effort.name == "quick":
+            return
+        by_label = {item.label: item for item in operations}
+        for operation in operations:
+            maker = by_label.get(f"POST {operation.template.rpartition('/')[0]}")
+            if operation.method != "DELETE" or maker is None or not operation.parameter("path"):
+                continue
+            until = time.monotonic() + self.api.run.effort.budget_s
+            for _ in range(_CYCLES):
+                if time.monotonic() > until or {operation.label, maker.label} & self.given_up:
+                    break
+                made = self.send(maker, Variation(Kind.AGAIN, "", "", self.usual[maker.label])).ok
+                which = operation.parameter("path")[-1]
+                known = self.values.known_ids(operation, which)
+                if made and known:
+                    deleted = self.usual[operation.label].having("path", which.name, known[0])
+                    self.send(operation, Variation(Kind.AGAIN, "", "", deleted))
+
     def _time(self, operation: Operation, usual: Inputs, effort: Effort, until: float) -> None:
         """Send the usual request a few times, to compare response times; DELETE would find nothing the second time."""
         for _ in range(0 if effort.name == "quick" or operation.method == "DELETE" else TIMED):
@@ -252,6 +275,7 @@ def survey(api: RestInterface, values: Values) -> Survey:
         surveyor.begin(operation)
         if operation.label not in surveyor.given_up:
             surveyor.vary(operation, run.effort, run.seed)
+    surveyor.create_and_delete(operations)
     for operation in operations:
         if operation.method == "GET" and operation.parameter("path") and operation.label not in surveyor.given_up:
             # What was created meanwhile has an id now.

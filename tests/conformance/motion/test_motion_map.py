@@ -1,63 +1,18 @@
-"""The class motion of devices with a map, over HTTP: right ones are not blamed, wrong ones are found."""
+"""Maps: what they permit, what is wrong with them, and what --init proposes."""
 
-import json
 import sys
 import tomllib
 
 import msgspec
-import mutants
 import pytest
-import rover
-from arm import DESCRIPTION, LIMITS, MAP, Arm
-from body import Body
+from arm import DESCRIPTION, MAP, Arm
+from judged_devices import judged_by_map
 from processes import ended
-from rover import Rover, serving_rover
 from serving_apps import serving_app
 
 from conformance.documents.openapi import read_operations
 from conformance.engine.first_motion import proposed_map
 from conformance.statement.motion_map import MotionMap
-
-
-def _judged(serving, motion, tmp_path):
-    """Return what a run says of a device, by requirement of the class motion."""
-    statement, out = tmp_path / "device.toml", tmp_path / "out"
-    with serving as url:
-        statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n{motion}', encoding="utf-8")
-        more = ["--allow-motion", "--effort", "quick", "--class", "motion", "--out", str(out)]
-        done = ended(sys.executable, "-m", "roaas", "certify", str(statement), *more)
-    assert "Traceback" not in done.stdout + done.stderr, done.stderr
-    result = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    return done, {one["id"]: one["verdict"] for one in result["requirements"] if one["id"].startswith("motion/")}
-
-
-def _of_arm(arm, tmp_path):
-    quick = MAP.replace("seconds = 0.5", "seconds = 0.25").replace("speed = 4", "speed = 8")
-    return _judged(serving_app(arm.app()), quick, tmp_path)
-
-
-def test_a_right_arm_is_not_blamed(tmp_path):
-    done, judged = _of_arm(Arm(Body(LIMITS, noise=0.003)), tmp_path)
-    undeclared = {"unauthorised-still", "velocity", "velocity-stop", "watchdog", "hold", "switches"}
-    missing = {f"motion/{name}" for name in undeclared}
-    assert {id_ for id_, verdict in judged.items() if verdict != "pass"} == missing, done.stdout
-    # Its moves are stored, and can be judged again without it.
-    again = ["replay", "--recorded", str(tmp_path / "out"), "--statement", str(tmp_path / "device.toml")]
-    told = ended(sys.executable, "-m", "roaas", *again)
-    assert (told.returncode, "motion/stop-lasts passes" in told.stdout) == (0, True), told.stdout + told.stderr
-
-
-def test_a_right_rover_that_clamps_and_takes_one_move_at_a_time_is_not_blamed(tmp_path):
-    done, judged = _judged(serving_rover(Rover(Body(rover.LIMITS, noise=0.004))), rover.MAP, tmp_path)
-    undeclared = {"unauthorised-still", "agrees", "action-runs", "action-succeeds", "action-canceled"}
-    missing = {f"motion/{name}" for name in undeclared}
-    assert {id_ for id_, verdict in judged.items() if verdict != "pass"} == missing, done.stdout
-
-
-@pytest.mark.parametrize(("fault", "requirement"), [("mixes", "one-client"), ("incomplete-moves", "incomplete-still")])
-def test_a_fault_of_the_arm_is_found(fault, requirement, tmp_path):
-    done, judged = _of_arm(Arm(fault=fault), tmp_path)
-    assert judged[f"motion/{requirement}"] == "fail", done.stdout
 
 
 def test_without_permission_nothing_moves(tmp_path):
@@ -101,7 +56,7 @@ def test_a_wrong_map_is_refused_and_nothing_moves(right, wrong, told, tmp_path):
 
 def test_a_device_that_the_map_cannot_see_is_not_moved(tmp_path):
     arm = Arm()
-    done, judged = _judged(serving_app(arm.app()), MAP.replace("/joints/pan", "/joints/pen"), tmp_path)
+    done, judged = judged_by_map(serving_app(arm.app()), MAP.replace("/joints/pan", "/joints/pen"), tmp_path)
     assert (arm.body.moves, "pass" in judged.values()) == (0, False), done.stdout
     assert done.returncode == 4
     assert "/joints/pen" in done.stdout
@@ -117,15 +72,3 @@ def test_init_proposes_a_map_that_the_names_suggest():
     assert (motion.goto.send, motion.goto.body) == (given["goto"]["send"], given["goto"]["body"])
     assert motion.stop is not None
     assert motion.stop.send == "POST /stop"
-
-
-def test_the_certificate_draws_how_it_moved(tmp_path):
-    """A stop that is ignored: its picture stands first."""
-    body = Body(LIMITS)
-    mutants.of_arm()["stop-ignored"](body)
-    done, judged = _of_arm(Arm(body), tmp_path)
-    assert judged["motion/stop"] == "fail", done.stdout
-    page = (tmp_path / "out" / "certificate.html").read_text(encoding="utf-8")
-    first = page.index('<figure class="move')
-    assert "A stop of pan under way" in page[first : page.index("</figcaption>", first)]
-    assert page.count('<polyline class="way"') > 10

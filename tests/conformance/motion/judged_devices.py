@@ -1,0 +1,27 @@
+"""Run ``roaas certify`` with a motion map on a simulated device, over HTTP."""
+
+import json
+import sys
+
+from arm import MAP
+from processes import ended
+from serving_apps import serving_app
+
+QUICK = MAP.replace("seconds = 0.5", "seconds = 0.25").replace("speed = 4", "speed = 8")
+
+
+def judged_by_map(serving, motion, tmp_path):
+    """Return what a run says of a device, by requirement of the class motion."""
+    statement, out = tmp_path / "device.toml", tmp_path / "out"
+    with serving as url:
+        statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n{motion}', encoding="utf-8")
+        more = ["--allow-motion", "--effort", "quick", "--class", "motion", "--out", str(out)]
+        done = ended(sys.executable, "-m", "roaas", "certify", str(statement), *more)
+    assert "Traceback" not in done.stdout + done.stderr, done.stderr
+    result = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    return done, {one["id"]: one["verdict"] for one in result["requirements"] if one["id"].startswith("motion/")}
+
+
+def of_arm(arm, tmp_path):
+    """Return the same of the arm, whose moves are short."""
+    return judged_by_map(serving_app(arm.app()), QUICK, tmp_path)
