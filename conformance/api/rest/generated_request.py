@@ -36,4 +36,6 @@ class GeneratedRequest:
             NoAnswerError: no HTTP response was received.
         """
         fields = [*self.headers, *([("Content-Type", self.content_type)] if self.content_type else [])]
-        return api.client.send(self.method, self.target, headers=fields, body=self.body)
+        # Clients send these again when a kept connection ends (RFC 9112 9.3.1), which hides a device that hangs up.
+        fresh = self.method in {"PUT", "DELETE"}
+        return api.client.send(self.method, self.target, headers=fields, body=self.body, fresh=fresh)
