@@ -188,7 +188,7 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
     notary = door.notary(Path(options["key"])) if options["key"] else None
     if options["plan"]:
         return _plan(chosen, options, contract)
-    outcome = _certify(chosen, options, contract, statement)
+    outcome = _certify(door, chosen, options, contract, statement)
     print_summary(outcome)
     return CommandResult(outcome.exit_code, outcome.path, notary)
 
@@ -210,7 +210,9 @@ def _check_nonce(nonce: str) -> None:
         raise click.UsageError("--seed follows from --nonce: give one of the two")
 
 
-def _certify(chosen: Statement, options: dict[str, Any], contract: Contract, statement: Path | None) -> Certification:
+def _certify(
+    door: FrontDoor | None, chosen: Statement, options: dict[str, Any], contract: Contract, statement: Path | None
+) -> Certification:
     # Imported here: Schemathesis and its like cost a second that --help and wrong usage need not pay.
     from conformance.engine.certification import certify as judge  # noqa: PLC0415
     from conformance.engine.connecting import connection_of  # noqa: PLC0415
@@ -238,6 +240,7 @@ def _certify(chosen: Statement, options: dict[str, Any], contract: Contract, sta
         raise StatementError(str(error)) from error
     run = _run(chosen, options, contract)
     run.requirement_set, run.given = requirements, given
+    run.prepare = door.prepare if door else None  # there is none where the command runs without roaas.py
     notes = (*options.get("remarks", ()), *_notes(run))
     command = shlex.join(["roaas", *sys.argv[1:]])
     robot, calls = RobotUnderTest(run, connection), tuple(told(*_rules(run))) if contract.described else ()

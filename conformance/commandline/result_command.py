@@ -26,6 +26,9 @@ class FrontDoor(Protocol):
     def notary(self, key: Path) -> Any:
         """Return a signer with a private key; raise a usage error if the key cannot be read."""
 
+    def prepare(self) -> None:
+        """Load what render() needs, at a moment when nobody waits for it."""
+
     def render(self, written: Path, notary: Any) -> None:
         """Write the pages of a result file, and sign it if there is a signer."""
 

@@ -72,21 +72,23 @@ def mapped(interfaces: Interfaces, motion: MotionMap) -> MappedDevice:
 
 
 @pytest.fixture
-def _prepared(interfaces: Interfaces) -> Iterator[None]:
+def _prepared(interfaces: Interfaces, run: Run) -> Iterator[None]:
     """Import modules that later checks need in a background thread, while the current check waits for the robot."""
     services = tuple(interfaces.soap.there.values())
     for service in services:
         _ = service.own  # may send requests: here, and not at any moment of a drive
-    thread = threading.Thread(target=_prepare, args=(services,), name="preparing")
+    thread = threading.Thread(target=_prepare, args=(services, run), name="preparing")
     thread.start()
     yield
     thread.join()
 
 
-def _prepare(services: Iterable[SoapService]) -> None:
+def _prepare(services: Iterable[SoapService], run: Run) -> None:
     # What fails here fails again in the check that needs it, and is judged there.
     with suppress(Exception):
         for service in services:
             _ = service.described.types, service.contract.types
         for module in _NEEDED_LATER:
             importlib.import_module(module)
+        if run.prepare is not None:
+            run.prepare()

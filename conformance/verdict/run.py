@@ -1,6 +1,7 @@
 """The data of one run: the statement, what is judged and allowed, and the evidence so far."""
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -56,6 +57,7 @@ class Run:
         interrupted: whether the user interrupted the run.
         unreachable: why an interface was not reachable at the start.
         tally: the generated cases of all explorations, and those that time did not allow.
+        prepare: loads what is needed after the run; called while a check waits for the robot.
     """
 
     statement: Statement = field(default_factory=lambda: empty_statement(Contract.load()))
@@ -71,6 +73,7 @@ class Run:
     interrupted: bool = False
     unreachable: dict[Interface, str] = field(default_factory=dict)
     tally: Tally = field(default_factory=Tally)
+    prepare: Callable[[], object] | None = None
 
     def __post_init__(self) -> None:
         self.judge = Judge(self.contract.ledger)
