@@ -68,9 +68,20 @@ def _operations(found: SoapDescription) -> dict[str, Any]:
         marks = {"x-roaas-reads": True} if _READS.match(operation.name) else {}
         marks |= {"x-roaas-never": True} if operation.remark else {}
         paths[label_of(port, operation).partition(" ")[2]] = {
-            "post": {"operationId": operation.name, "tags": [port.name], "responses": {}, **marks}
+            "post": {
+                "operationId": operation.name,
+                "tags": [port.name],
+                "responses": _statuses(port, operation),
+                **marks,
+            }
         }
     return {"openapi": "3.1.0", "info": {"title": found.name, "version": ""}, "paths": paths}
+
+
+def _statuses(port: SoapPort, operation: SoapOperation) -> dict[str, Any]:
+    """Return the statuses that SOAP's HTTP binding knows (SOAP 1.1, 6.2; SOAP 1.2 Part 2, 7.5)."""
+    known = [*(["202"] if operation.response is None else []), "200", *(["400"] if port.is_12 else []), "500"]
+    return {status: {"description": ""} for status in known}
 
 
 def label_in(found: SoapDescription, path: str, body: bytes) -> str | None:
