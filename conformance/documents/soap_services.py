@@ -7,7 +7,7 @@ and validated as all others are.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 from urllib.parse import urlsplit
 
@@ -86,8 +86,14 @@ class SoapDescription:
     faults: tuple[str, ...] = ()
 
 
-def read_services(wsdl: bytes, location: str, fetch: Fetch) -> SoapDescription:
+def read_services(wsdl: bytes, location: str, fetch: Fetch, address: str = "") -> SoapDescription:
     """Read a WSDL and what it refers to.
+
+    Args:
+        wsdl: the document.
+        location: its URL or file.
+        fetch: loads the documents that it refers to.
+        address: where the service is, whatever the WSDL says; a standard's WSDL (ONVIF) says nothing or an example.
 
     Raises:
         WsdlError: it is none, has no port over HTTP, or its schemas do not compile.
@@ -98,8 +104,10 @@ def read_services(wsdl: bytes, location: str, fetch: Fetch) -> SoapDescription:
         raise WsdlError(f"{location} is no WSDL: {error}") from error
     reader = _Reader(found.definitions)
     ports = tuple(reader.ports())
+    if address:
+        ports = tuple(replace(port, url=address) for port in ports) or tuple(reader.bindings(address))
     if not ports:
-        raise WsdlError(f"{location} has no port with a SOAP binding over HTTP")
+        raise WsdlError(f"{location} has no port over HTTP: name the address of the service with --base-url")
     faults = [f"{place} could not be read: {reason}" for place, reason in found.missing.items()]
     try:
         types = Types.compiled([*found.schemas, *reader.wrappers])
@@ -152,18 +160,21 @@ class _Reader:
             if not url.startswith(("http://", "https://")):
                 continue
             binding = self._named("w:binding", port, "binding")
-            soap = _soap(binding, "binding") if binding is not None else None
-            kind = self._named("w:portType", binding, "type") if binding is not None else None
-            if binding is None or soap is None or kind is None:
-                continue
             service = port.getparent()
-            yield SoapPort(
-                service=service.get("name", "") if service is not None else "",
-                name=port.get("name", ""),
-                url=url,
-                envelope=_SPACES[etree.QName(soap).namespace or ""],
-                operations=tuple(self._operations(binding, soap, kind)),
-            )
+            if binding is not None:
+                of = service.get("name", "") if service is not None else ""
+                yield from self._port(binding, of, port.get("name", ""), url)
+
+    def bindings(self, address: str) -> Iterator[SoapPort]:
+        """Yield each SOAP binding as a port at an address."""
+        for binding in self._all("w:binding"):
+            yield from self._port(binding, "", binding.get("name", ""), address)
+
+    def _port(self, binding: etree._Element, service: str, name: str, url: str) -> Iterator[SoapPort]:
+        soap, kind = _soap(binding, "binding"), self._named("w:portType", binding, "type")
+        if soap is not None and kind is not None:
+            envelope = _SPACES[etree.QName(soap).namespace or ""]
+            yield SoapPort(service, name, url, envelope, tuple(self._operations(binding, soap, kind)))
 
     def _operations(
         self, binding: etree._Element, soap: etree._Element, kind: etree._Element

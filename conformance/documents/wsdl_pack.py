@@ -33,7 +33,9 @@ def label_of(port: SoapPort, operation: SoapOperation) -> str:
     return f"POST /{port.name}/{operation.name}"
 
 
-def write_soap_pack(folder: Path, found: SoapDescription, location: str, documents: Mapping[str, bytes]) -> Path:
+def write_soap_pack(
+    folder: Path, found: SoapDescription, location: str, documents: Mapping[str, bytes], address: str = ""
+) -> Path:
     """Write a contract pack for a WSDL; return its folder.
 
     Args:
@@ -41,6 +43,7 @@ def write_soap_pack(folder: Path, found: SoapDescription, location: str, documen
         found: what the WSDL describes.
         location: that of the WSDL.
         documents: all documents by location.
+        address: where the service is, whatever the WSDL says; empty: as it says.
 
     Raises:
         OSError: it cannot be written.
@@ -56,7 +59,8 @@ def write_soap_pack(folder: Path, found: SoapDescription, location: str, documen
     ]
     (folder / MANIFEST).write_text("\n".join(lines) + "\n", encoding="utf-8")
     (folder / "openapi.json").write_text(json.dumps(_operations(found)), encoding="utf-8")
-    kept = {"location": location, "documents": {place: text.decode("latin-1") for place, text in documents.items()}}
+    texts = {place: text.decode("latin-1") for place, text in documents.items()}
+    kept = {"location": location, "address": address, "documents": texts}
     (folder / DOCUMENTS_NAME).write_text(json.dumps(kept), encoding="utf-8")
     return folder
 
@@ -122,4 +126,4 @@ def services_of(contract: Contract) -> SoapDescription | None:
         found: bytes = documents[place]
         return found
 
-    return read_services(documents[kept["location"]], kept["location"], fetch)
+    return read_services(documents[kept["location"]], kept["location"], fetch, kept["address"])

@@ -143,7 +143,8 @@ def soap_contract(
 
     Args:
         source: URL or file of the WSDL.
-        base_url: scheme and host to use in place of those in the WSDL; None: as the WSDL says.
+        base_url: scheme and host to use in place of those in the WSDL, or with a path the address of the service; None:
+            as the WSDL says.
         endpoints: what the statement or the options say.
         connection: deadline, credentials and TLS.
         out: folder of the results, in which the pack is written.
@@ -167,15 +168,16 @@ def soap_contract(
         return documents[place]
 
     try:
-        found = read_services(fetch(source), source, fetch)
+        address = base_url if base_url and urlsplit(base_url).path.strip("/") else ""
+        found = read_services(fetch(source), source, fetch, address)
     except (WsdlError, ValueError) as error:
         raise DescriptionError(str(error)) from error
-    base = (base_url or endpoints.rest or base_of(found)).rstrip("/")
+    base = (base_of(found) if address else base_url or endpoints.rest or base_of(found)).rstrip("/")
     remarks = tuple(
         f"Port {port.name} is at {port.url}, another server, and is not called."
         for port in found.ports
         if not moved(port.url, base_of(found), base).startswith(base)
     )
-    folder = write_soap_pack(out / FOLDER, found, source, documents)
+    folder = write_soap_pack(out / FOLDER, found, source, documents, address)
     Contract.load.cache_clear()
     return Contract.load(folder), msgspec.structs.replace(endpoints, rest=base), remarks

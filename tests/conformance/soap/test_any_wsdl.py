@@ -248,3 +248,16 @@ def test_certify_by_a_wsdl(name, tmp_path, secret):
     assert called == {one for one in ("GetStatus", "GetLoad", "GetAngle") if one in str(result["api"])}
     assert {one["verdict"] for one in result["requirements"]} == {"pass"}
     assert PASSWORD not in (tmp_path / "out" / "result.json").read_text(encoding="utf-8")
+
+
+def test_an_address_takes_the_place_of_what_the_wsdl_says(tmp_path, secret):
+    """As for the WSDL of a standard, which names an example, or has bindings alone."""
+    for without in ("<service.*</service>", "never"):
+        device = camera()
+        device.wsdl = re.sub(without, "", device.wsdl.replace("ADDRESS", "http://www.example.org"))
+        (tmp_path / "camera.wsdl").write_text(device.wsdl, encoding="utf-8")
+        (tmp_path / "camera.xsd").write_text(device.xsd, encoding="utf-8")
+        with _serving(device) as url:
+            more = ["--base-url", f"{url}/services/camera", "--effort", "quick", "--out", str(tmp_path / "out")]
+            done = ended(sys.executable, "-m", "roaas", "certify", str(tmp_path / "camera.wsdl"), *more)
+        assert (done.returncode, "1 of 2 operations called" in done.stdout) == (0, True), done.stdout + done.stderr
