@@ -250,7 +250,7 @@ def test_certify_by_a_wsdl(name, tmp_path, secret):
     assert PASSWORD not in (tmp_path / "out" / "result.json").read_text(encoding="utf-8")
 
 
-def test_an_address_takes_the_place_of_what_the_wsdl_says(tmp_path, secret):
+def test_an_address_takes_the_place_of_what_the_wsdl_says(tmp_path):
     """As for the WSDL of a standard, which names an example, or has bindings alone."""
     for without in ("<service.*</service>", "never"):
         device = camera()
