@@ -237,12 +237,17 @@ class MappedDevice:
 
     def follow(self, command: Command) -> list[Reading]:
         """Watch until the target of a command is reached and kept for a moment, or its time is over."""
-        seen = self.watch(self.due(command), lambda so_far: self.is_at(command.targets, so_far))
-        if not self.is_at(command.targets, seen):
-            # One reading after its time decides nothing.
-            return seen + [self.read() for _ in range(SEVERAL)]
-        # A move with a duration lasts for that, also where the way is short.
-        return seen + self.watch(max(self.clock.now() + STAYS_S, command.answered + self._lasts_s))
+        seen: list[Reading] = []
+        while True:
+            seen += self.watch(self.due(command), lambda so_far: self.is_at(command.targets, so_far))
+            if self.is_at(command.targets, seen):
+                # A move with a duration lasts for that, also where the way is short.
+                seen += self.watch(max(self.clock.now() + STAYS_S, command.answered + self._lasts_s))
+                if self.is_at(command.targets, seen):
+                    return seen
+            if self.clock.now() > self.due(command):
+                # One reading after its time decides nothing.
+                return seen + [self.read() for _ in range(SEVERAL)]
 
     def due(self, command: Command) -> float:
         """Return when the target of a command must have been reached, s of the clock."""
