@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +15,8 @@ TRACES_NAME: Final = "traces.json.gz"
 _MOST, _POINTS = 30, 160
 WIDTH, HEIGHT = 300, 64
 _MARGIN: Final = 4
-# Of an axis' values: smaller differences are not drawn larger.
-_LEAST: Final = 0.005
+# Of what an axis moves in the whole run: less is not drawn larger.
+_LEAST: Final = 0.2
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,9 @@ def pictures(folder: Path, result: Mapping[str, Any]) -> list[Picture]:
             if one["class"] == "motion"
             for failure in one.get("failures", ())
         ]
-        drawn = [_picture(one, named) for one in _moves(traces)]
+        moves = list(_moves(traces))
+        ranges = _ranges(moves)
+        drawn = [_picture(one, named, ranges) for one in moves]
     except (OSError, EOFError, ValueError, LookupError, TypeError, AttributeError):
         return []
     return sorted(filter(None, drawn), key=lambda one: not one.failed)[:_MOST]
@@ -86,8 +89,21 @@ def _moves(traces: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
                 yield one
 
 
-def _picture(move: Mapping[str, Any], named: Iterable[str]) -> Picture | None:
-    readings = [*move.get("readings", ()), *move.get("under_way", ()), *move.get("after", ())]
+def _readings(move: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    return [*move.get("readings", ()), *move.get("under_way", ()), *move.get("after", ())]
+
+
+def _ranges(moves: Iterable[Mapping[str, Any]]) -> dict[str, float]:
+    """Return how far each axis, and each velocity, ranges in the whole run."""
+    found: dict[str, list[float]] = {}
+    for one in (reading for move in moves for reading in _readings(move)):
+        for name, value in (*one.get("values", {}).items(), *one.get("speeds", {}).items()):
+            found.setdefault(name, []).append(value)
+    return {name: max(values) - min(values) for name, values in found.items()}
+
+
+def _picture(move: Mapping[str, Any], named: Iterable[str], ranges: Mapping[str, float]) -> Picture | None:
+    readings = _readings(move)
     commands = [*move["commands"], *([move["end"]] if move.get("end") else [])]
     if not readings or not commands:
         return None
@@ -104,7 +120,7 @@ def _picture(move: Mapping[str, Any], named: Iterable[str]) -> Picture | None:
     for name in _axes(readings, "speeds" if is_drive else "values") or _axes(readings, "values"):
         key = "speeds" if name in readings[0].get("speeds", {}) else "values"
         seen = [((one["sent"] + one["received"]) / 2, one[key][name]) for one in readings if name in one.get(key, {})]
-        lines.append(_line(name, [(x_of(moment), value) for moment, value in seen], wanted))
+        lines.append(_line(name, [(x_of(moment), value) for moment, value in seen], wanted, _LEAST * ranges[name]))
     return Picture(
         what=move["what"],
         lines=tuple(filter(None, lines)),
@@ -124,15 +140,18 @@ def _ok(command: Mapping[str, Any]) -> bool:
     return 200 <= status < 300  # noqa: PLR2004 - RFC 9110 15.3
 
 
-def _line(name: str, seen: list[tuple[float, float]], targets: list[tuple[float, dict[str, float]]]) -> Line | None:
-    """Draw one axis; None if nothing was read of it."""
+def _line(
+    name: str, seen: list[tuple[float, float]], targets: list[tuple[float, dict[str, float]]], least: float
+) -> Line | None:
+    """Draw one axis, from edge to edge at least so much; None if nothing was read of it."""
     if not seen:
         return None
     aims = [(x, given[name]) for x, given in targets if name in given]
     values = [value for _, value in [*seen, *aims]]
     low, high = min(values), max(values)
-    span = max(high - low, _LEAST * max(abs(low), abs(high))) or 1.0
+    span = max(high - low, least) or 1.0
     base = (low + high - span) / 2
+    digits = max(0, min(6, 2 - math.floor(math.log10(span))))
 
     def at(x: float, value: float) -> str:
         return f"{x:g},{HEIGHT - _MARGIN - (value - base) / span * (HEIGHT - 2 * _MARGIN):.1f}"
@@ -143,6 +162,6 @@ def _line(name: str, seen: list[tuple[float, float]], targets: list[tuple[float,
         name=name,
         points=" ".join(at(x, value) for x, value in [*seen[::thin], seen[-1]]),
         wanted=tuple(f"{at(x, value)} {at(end, value)}" for (x, value), end in zip(aims, ends, strict=True)),
-        low=f"{low:.3g}",
-        high=f"{high:.3g}",
+        low=f"{round(base, digits) + 0.0:.{digits}f}",
+        high=f"{round(base + span, digits) + 0.0:.{digits}f}",
     )
