@@ -2,6 +2,7 @@
 
 import sys
 import tomllib
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -13,6 +14,8 @@ from serving_apps import serving_app
 from conformance.documents.openapi import read_operations
 from conformance.engine.first_motion import proposed_map
 from conformance.statement.motion_map import MotionMap
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
 
 
 def test_without_permission_nothing_moves(tmp_path):
@@ -60,6 +63,13 @@ def test_a_device_that_the_map_cannot_see_is_not_moved(tmp_path):
     assert (arm.body.moves, "pass" in judged.values()) == (0, False), done.stdout
     assert done.returncode == 4
     assert "/joints/pen" in done.stdout
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*/*.toml")), ids=lambda path: path.stem)
+def test_the_examples_are_maps(path):
+    given = tomllib.loads(path.read_text(encoding="utf-8"))
+    if "motion" in given:
+        assert len(msgspec.convert(given["motion"], MotionMap).calls) > 1
 
 
 def test_init_proposes_a_map_that_the_names_suggest():
