@@ -15,7 +15,7 @@ from conformance.verdict.effort import Effort
 _NEEDS: Final = (Need.REST, Need.MOTION)
 # For so long a velocity is measured once it must be reached, s.
 MEASURED_S: Final = 0.5
-# Of the limit: velocities at standard.
+# Of the limit: velocities.
 _SHARES: Final = (1.0, 0.4)
 # A device is told its velocity that often within its hold time, at least every so many s.
 _KEPT: Final = 3
@@ -26,14 +26,21 @@ _REST_S: Final = 0.5
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
 def velocities(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
-    """Drive each axis at its limits, there and back, and end each drive with velocity 0; at standard slowly as well."""
-    shares = _SHARES[: 1 if effort.name == "quick" else None]
+    """Drive each axis at its limits and slowly, there and back; end each drive with velocity 0.
+
+    At quick there at one limit, and back slowly.
+    """
     return recorded(
-        _drive(mapped, f"{name} {share * limit:g}", {name: share * limit})
+        _drive(mapped, f"{name} {speed:g}", {name: speed})
         for name, axis in mapped.drives.axes.items()
-        for share in shares
-        for limit in _there_and_back(mapped, axis.limits, axis.of)
+        for speed in _speeds(list(_there_and_back(mapped, axis.limits, axis.of)), effort)
     )
+
+
+def _speeds(limits: list[float], effort: Effort) -> list[float]:
+    if effort.name == "quick" and len(limits) == len(_SHARES):
+        return [share * limit for share, limit in zip(_SHARES, limits, strict=True)]
+    return [share * limit for share in _SHARES for limit in limits]
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
