@@ -20,10 +20,8 @@ from conformance.documents.xml_names import local
 #: The documents of the WSDL, by location, and which of them comes first.
 DOCUMENTS_NAME: Final = "wsdl.json"
 CLASS: Final = "soap"
-# Operations that only read, by their first word.
-_READS: Final = re.compile(
-    r"(?:[Gg]et|[Ll]ist|[Dd]escribe|[Rr]ead|[Qq]uery|[Ff]ind|[Ii]s|[Hh]as|[Cc]ount|[Ss]earch)(?![a-z])"
-)
+# Operations that only read, by their first word. Others may sound so and move: FindHome, SearchReference.
+_READS: Final = re.compile(r"(?:[Gg]et|[Ll]ist|[Dd]escribe)(?![a-z])")
 # The first child of a Body, whatever the prefixes.
 _PAYLOAD: Final = re.compile(rb"<(?:[\w.-]+:)?Body\b[^>]*>\s*<(?:[\w.-]+:)?([\w.-]+)")
 
