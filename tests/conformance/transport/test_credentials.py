@@ -87,7 +87,8 @@ def test_raw_and_partial_requests_carry_them_and_do_not_show_them(heard):
     shown = raw.shown(client, octets)
     assert not any(secret in repr(one) for secret in _SECRETS for one in (shown, partial.request))
     send_again(shown, client.connection)
-    assert got[-1] == got[0]
+    # The partial request, which nobody waits for, may be heard before or after it.
+    assert got.count(got[0]) == 2
 
 
 def test_the_shell_expands_nothing_but_variables():
