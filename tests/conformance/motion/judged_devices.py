@@ -8,6 +8,8 @@ from processes import ended
 from serving_apps import serving_app
 
 QUICK = MAP.replace("seconds = 0.5", "seconds = 0.25").replace("speed = 4", "speed = 8")
+#: The same without what is tried beyond limits, and without what a move says and how it is stopped.
+MOVES = QUICK[: QUICK.index("[motion.action]")].replace('beyond_limits = "refused"\n', "")
 
 
 def judged_by_map(serving, motion, tmp_path):
@@ -22,6 +24,6 @@ def judged_by_map(serving, motion, tmp_path):
     return done, {one["id"]: one["verdict"] for one in result["requirements"] if one["id"].startswith("motion/")}
 
 
-def of_arm(arm, tmp_path):
+def of_arm(arm, tmp_path, motion=QUICK):
     """Return the same of the arm, whose moves are short."""
-    return judged_by_map(serving_app(arm.app()), QUICK, tmp_path)
+    return judged_by_map(serving_app(arm.app()), motion, tmp_path)

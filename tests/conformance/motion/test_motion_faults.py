@@ -1,24 +1,21 @@
 """Faults that only HTTP shows, and the picture of a fault on the certificate."""
 
 import mutants
-import pytest
 from arm import LIMITS, Arm
 from body import Body
-from judged_devices import of_arm
+from judged_devices import MOVES, of_arm
 
 
-@pytest.mark.parametrize(("fault", "requirement"), [("mixes", "one-client"), ("incomplete-moves", "incomplete-still")])
-def test_a_fault_of_the_arm_is_found(fault, requirement, tmp_path):
-    done, judged = of_arm(Arm(fault=fault), tmp_path)
-    assert judged[f"motion/{requirement}"] == "fail", done.stdout
+def test_an_incomplete_request_that_moves_the_arm_is_found(tmp_path):
+    done, judged = of_arm(Arm(fault="incomplete-moves"), tmp_path, MOVES)
+    assert judged["motion/incomplete-still"] == "fail", done.stdout
 
 
-def test_the_certificate_draws_how_it_moved(tmp_path):
-    """A stop that is ignored: its picture stands first."""
+def test_clients_that_are_mixed_up_are_found_and_the_certificate_draws_the_stop_that_is_ignored_first(tmp_path):
     body = Body(LIMITS)
     mutants.of_arm()["stop-ignored"](body)
-    done, judged = of_arm(Arm(body), tmp_path)
-    assert judged["motion/stop"] == "fail", done.stdout
+    done, judged = of_arm(Arm(body, fault="mixes"), tmp_path)
+    assert (judged["motion/stop"], judged["motion/one-client"]) == ("fail", "fail"), done.stdout
     page = (tmp_path / "out" / "certificate.html").read_text(encoding="utf-8")
     first = page.index('<figure class="move')
     assert "A stop of pan under way" in page[first : page.index("</figcaption>", first)]
