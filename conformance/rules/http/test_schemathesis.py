@@ -3,14 +3,15 @@
 The suite judges each request by its bytes: valid ones must get a declared status, invalid ones 4xx.
 """
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis.errors import Unsatisfiable
 
 from conformance.api.expectation import expect
 from conformance.api.rest.applicable import allowed
-from conformance.api.rest.generated import Target
 from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.motion_guard import MotionGuard
@@ -20,6 +21,10 @@ from conformance.documents.openapi import operations_of
 from conformance.transport.client import HttpClient
 from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
+
+if TYPE_CHECKING:
+    # Importing it takes 0.1 s, in which the robot could drive already.
+    from conformance.api.rest.generated import Target
 
 pytestmark = pytest.mark.needs("rest")
 _IDS = ("http/declared-status", "http/declared-body", "http/no-server-error")
@@ -51,7 +56,7 @@ _POSITIVE_REFUSALS = frozenset({405, 406, 408, 411, 413, 414, 415, 431})
 
 def _targets(api: RestInterface, *, moving: bool) -> list[Target]:
     if api.run.effort.name == "quick":
-        return []  # importing Schemathesis and reading the contract takes a tenth of the time that a quick run has
+        return []
     from conformance.api.rest.generated import targets  # noqa: PLC0415 - takes half a second
 
     labels = {item.label for item in operations_of(api.run.contract) if item.motion == moving and allowed(api, item)}

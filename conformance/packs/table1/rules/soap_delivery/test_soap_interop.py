@@ -1,19 +1,23 @@
 """Interoperability with zeep, a common SOAP client for Python: it must load the WSDL and call every operation."""
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from conformance.api.soap.callable_services import SoapServices, repetitions
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import example
-from conformance.api.soap.zeep_client import ZeepCaller
 from conformance.observe.clock import WALL_CLOCK
 from conformance.observe.polling import poll_for
 from conformance.packs.table1.delivery import COFFEE, COURIER, EXAMPLE
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
+
+if TYPE_CHECKING:
+    from conformance.api.soap.zeep_client import ZeepCaller
 
 # What a user would look for in what zeep returns.
 _VALUES = {

@@ -4,13 +4,13 @@ from collections.abc import Iterator
 from http import HTTPStatus
 
 from conformance.packs.table1.robot.delivery import Delivery
-from conformance.packs.table1.scenarios.invalid_deliveries import CORRECT, InvalidDeliveries, invalid_deliveries
+from conformance.packs.table1.scenarios.counted_deliveries import CORRECT, CountedDeliveries, counted_deliveries
 from conformance.scenarios.rule import Case, Note, Outcome, rule
 from conformance.transport.exchange import SAFE_METHODS
 
 
-@rule("strict-input/delivery-refused", on=(invalid_deliveries,))
-def delivery_refused(trace: InvalidDeliveries) -> Iterator[Outcome]:
+@rule("strict-input/delivery-refused", on=(counted_deliveries,))
+def delivery_refused(trace: CountedDeliveries) -> Iterator[Outcome]:
     """Judge that the robot rejects invalid deliveries, and that neither they nor other methods make a message."""
     for exchange in trace.invalid:
         holds = exchange.response.status >= HTTPStatus.BAD_REQUEST
@@ -24,8 +24,7 @@ def delivery_refused(trace: InvalidDeliveries) -> Iterator[Outcome]:
         accepted = one.exchange.response.ok and one.method not in SAFE_METHODS
         expected = f"no DeliveryRequestMsg on ROS after {one.method}: only PUT starts a delivery"
         yield Case(one.delivery not in seen or accepted, one.exchange, expected, cause=one.method)
-    known = {trace.last, trace.no_format, *(one.delivery for one in trace.by_method)}
-    unknown = [one for one in seen if one not in known]
+    unknown = [one for one in seen if one not in trace.known]
     # The robot may have other clients: a single delivery that resembles none of the suite's may be theirs.
     found = [one for one in unknown if _resembles(one)] or (unknown if len(unknown) > 1 else [])
     accepted_first = next((one for one in trace.invalid if one.response.ok), trace.invalid[-1])
@@ -33,23 +32,23 @@ def delivery_refused(trace: InvalidDeliveries) -> Iterator[Outcome]:
     yield Case(not found, accepted_first, "no message for an invalid delivery", observed)
 
 
-@rule("http/not-acceptable-undone", on=(invalid_deliveries,))
-def not_acceptable_delivery(trace: InvalidDeliveries) -> Iterator[Outcome]:
+@rule("http/not-acceptable-undone", on=(counted_deliveries,))
+def not_acceptable_delivery(trace: CountedDeliveries) -> Iterator[Outcome]:
     """Judge that a delivery that the robot answered 406 makes no message."""
     if _shown(trace) and trace.answer is not None and trace.answer.response.status == HTTPStatus.NOT_ACCEPTABLE:
         arrived = trace.no_format in (trace.seen or ())
         yield Case(not arrived, trace.answer, "no message for a delivery that is answered 406", "a message")
 
 
-@rule("equivalence/delivery-rest", on=(invalid_deliveries,))
-def accepted_delivery(trace: InvalidDeliveries) -> Iterator[Outcome]:
+@rule("equivalence/delivery-rest", on=(counted_deliveries,))
+def accepted_delivery(trace: CountedDeliveries) -> Iterator[Outcome]:
     """Judge that a delivery whose Accept header excludes all formats arrives if the robot accepts it."""
     if _shown(trace) and trace.answer is not None and trace.answer.response.ok:
         arrived = trace.no_format in (trace.seen or ())
         yield Case(arrived, trace.answer, "a message for a delivery that is accepted", "no message")
 
 
-def _shown(trace: InvalidDeliveries) -> bool:
+def _shown(trace: CountedDeliveries) -> bool:
     """Return whether arrivals were observed, which the last valid delivery proves."""
     return trace.seen is not None and trace.last in trace.seen
 

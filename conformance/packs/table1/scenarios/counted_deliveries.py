@@ -1,12 +1,15 @@
-"""Invalid deliveries, and valid paths with other methods: crawlers and link previews send GET."""
+"""Deliveries whose messages are counted: invalid ones, other methods (crawlers send GET), and Idempotency-Keys."""
 
-from dataclasses import dataclass
+import uuid
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.calls import call
 from conformance.api.soap.service import SoapService
+from conformance.packs.table1.delivery import COURIER
 from conformance.packs.table1.robot.deliveries_seen import DeliveryObserver, NoObserverError, observer_of
 from conformance.packs.table1.robot.delivery import Delivery, path_of, put_delivery
 from conformance.packs.table1.robot.delivery_messages import request
@@ -24,6 +27,8 @@ _BAD_PARTS: Final = (
 )
 _NO_FORMAT: Final = Delivery(3, 21.0, 22.0, 23.0, 24.0, 25.0, 26.0)
 _LAST: Final = Delivery(3, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0)
+_TWICE: Final = Delivery(COURIER, 70.5, 71.5, 72.5, 73.5, 74.5, 75.5)
+_APART: Final = Delivery(COURIER, 80.5, 81.5, 82.5, 83.5, 84.5, 85.5)
 
 
 @dataclass(frozen=True)
@@ -36,7 +41,25 @@ class ByMethod:
 
 
 @dataclass(frozen=True)
-class InvalidDeliveries:
+class Keyed:
+    """Two pairs of identical deliveries with an Idempotency-Key.
+
+    Attributes:
+        twice: the exchanges of two requests with one key.
+        apart: the exchanges of two requests with a key each.
+    """
+
+    twice: tuple[Exchange, ...]
+    apart: tuple[Exchange, ...]
+
+    @property
+    def accepted_apart(self) -> int:
+        """Return how many requests of the second pair the robot accepted."""
+        return sum(exchange.response.ok for exchange in self.apart)
+
+
+@dataclass(frozen=True)
+class CountedDeliveries:
     """All requests, and the deliveries that arrived.
 
     Attributes:
@@ -44,7 +67,8 @@ class InvalidDeliveries:
         by_method: valid paths with other methods.
         no_format: the valid delivery whose Accept header excludes all formats.
         answer: its exchange, or None if no observer shows arrivals.
-        last: the valid delivery at the end, which must arrive.
+        last: a valid delivery after them, which must arrive.
+        keyed: those with a key, or None if no observer shows arrivals.
         seen: the deliveries that arrived; None: no observer shows them.
         unseen: why no observer shows them, or empty.
     """
@@ -54,14 +78,29 @@ class InvalidDeliveries:
     no_format: Delivery = _NO_FORMAT
     answer: Exchange | None = None
     last: Delivery = _LAST
+    keyed: Keyed | None = None
     seen: tuple[Delivery, ...] | None = None
     unseen: str = ""
 
+    @property
+    def known(self) -> set[Delivery]:
+        """Return the valid deliveries among them."""
+        return {self.last, self.no_format, _TWICE, _APART, *(one.delivery for one in self.by_method)}
+
+    @property
+    def twice_arrived(self) -> int:
+        """Return the number of messages for the pair with one key."""
+        return (self.seen or ()).count(_TWICE)
+
+    @property
+    def apart_arrived(self) -> int:
+        """Return the number of messages for the pair with two keys."""
+        return (self.seen or ()).count(_APART)
+
 
 @scenario(needs={Need.REST, Need.MOTION}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
-def invalid_deliveries(api: RestInterface, soap: SoapServices, probe: RosProbe) -> InvalidDeliveries:
-    """Send invalid deliveries, valid paths with other methods, and at last two valid deliveries."""
-    rest = api.client
+def counted_deliveries(api: RestInterface, soap: SoapServices, probe: RosProbe) -> CountedDeliveries:
+    """Send invalid deliveries, valid paths with other methods, and at last valid deliveries, some with a key."""
     observer: DeliveryObserver | None = None
     unseen = ""
     try:
@@ -69,6 +108,27 @@ def invalid_deliveries(api: RestInterface, soap: SoapServices, probe: RosProbe) 
         observer.mark()
     except (NoObserverError, ProbeError) as error:
         observer, unseen = None, str(error)
+    trace = replace(_invalid(api, soap), unseen=unseen)
+    if observer is None:
+        return trace
+    answer = api.client.send("PUT", _NO_FORMAT.rest_path, headers=(("Accept", "image/png"),), fresh=True)
+    put_delivery(api, _LAST.rest_path, fresh=True)
+    # No robot may know the keys from an earlier run.
+    first, second, third = (str(uuid.uuid4()) for _ in range(3))
+    keyed = Keyed(_put(api, _TWICE, (first, first)), _put(api, _APART, (second, third)))
+    wanted = 1 + answer.response.ok + keyed.twice[0].response.ok + keyed.accepted_apart
+    try:
+        seen = [one.delivery for one in observer.collect(wanted)]
+        # A robot that makes a message too many sends it in the place of the last one here.
+        lacking = keyed.accepted_apart - seen.count(_APART)
+        seen += (one.delivery for one in (observer.collect(lacking) if lacking > 0 else ()))
+    except (NoObserverError, ProbeError) as error:
+        return replace(trace, unseen=str(error))
+    return replace(trace, answer=answer, keyed=keyed, seen=tuple(seen))
+
+
+def _invalid(api: RestInterface, soap: SoapServices) -> CountedDeliveries:
+    rest = api.client
     invalid = []
     for place, text in api.run.effort.subsample(_BAD_PARTS, 8):
         values = [*CORRECT[:place], text, *CORRECT[place + 1 :]]
@@ -79,16 +139,13 @@ def invalid_deliveries(api: RestInterface, soap: SoapServices, probe: RosProbe) 
         by_method.append(ByMethod(method, delivery, rest.send(method, delivery.rest_path, fresh=True)))
     if soap.publishers is not None:
         invalid += _invalid_soap(soap.publishers)
-    trace = InvalidDeliveries(tuple(invalid), tuple(by_method), unseen=unseen)
-    if observer is None:
-        return trace
-    answer = rest.send("PUT", _NO_FORMAT.rest_path, headers=(("Accept", "image/png"),), fresh=True)
-    put_delivery(api, _LAST.rest_path, fresh=True)
-    try:
-        seen = tuple(one.delivery for one in observer.collect(1 + answer.response.ok))
-    except (NoObserverError, ProbeError) as error:
-        return InvalidDeliveries(tuple(invalid), tuple(by_method), unseen=str(error))
-    return InvalidDeliveries(tuple(invalid), tuple(by_method), answer=answer, seen=seen)
+    return CountedDeliveries(tuple(invalid), tuple(by_method))
+
+
+def _put(api: RestInterface, delivery: Delivery, keys: Sequence[str]) -> tuple[Exchange, ...]:
+    """PUT a delivery once with each key, each on a new connection so that the client does not retry."""
+    fields = [(("Idempotency-Key", f'"{key}"'),) for key in keys]
+    return tuple(put_delivery(api, delivery.rest_path, headers=field, fresh=True) for field in fields)
 
 
 def _invalid_soap(publishers: SoapService) -> list[Exchange]:
