@@ -193,6 +193,13 @@ class Shape:
             return "the value is nested too deeply"
         return _described(error, where) if error is not None else ""
 
+    def holds(self, value: Any) -> bool:
+        """Return whether ``value`` has no problem: quicker, because the problem is not looked for."""
+        try:
+            return self._passes(value) or bool(self._validator.is_valid(value))
+        except RecursionError:
+            return False
+
     def broken_rule(self, value: Any) -> tuple[str, bool]:
         """Return the violated schema keyword, and True if ``value`` itself violates it, and not only a member.
 

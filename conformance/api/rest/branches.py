@@ -56,6 +56,6 @@ def _parts(schema: Schema, place: str) -> Iterator[tuple[str, Any]]:
 
 def _fits(schema: Any, value: Any) -> bool:
     try:
-        return not isinstance(schema, dict) or not shape_of(schema).problem(value)
+        return not isinstance(schema, dict) or shape_of(schema).holds(value)
     except (ValueError, TypeError):
         return False  # no schema that a validator can use

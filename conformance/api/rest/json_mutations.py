@@ -138,7 +138,7 @@ def near_misses(value: Any, schema: Schema, number: Path) -> list[Mutation[bytes
 def is_invalid(body: bytes, schema: Schema) -> bool:
     """Return whether the bytes of a body violate the contract."""
     text = read_json(body)
-    return bool(text.problem) or bool(shape_of(schema).problem(text.value))
+    return bool(text.problem) or not shape_of(schema).holds(text.value)
 
 
 def _of_text(value: Any) -> Iterator[Mutation[bytes]]:
@@ -224,7 +224,7 @@ def _of_type(whole: Any, place: Place) -> Iterator[Mutation[bytes]]:
         ("a number", 7),
     ]
     for what, new in wrong:
-        if shape_of(place.schema).problem(new):
+        if not shape_of(place.schema).holds(new):
             shown = STRANGE_TEXT if new == STRANGE_TEXT else ""
             is_lacking = kind_of(place.schema) == "object" and new == {}
             kind, name = ("missing", "") if is_lacking else ("type", place.field)

@@ -47,10 +47,10 @@ def wrong_texts(parameter: Parameter) -> list[Wrong]:
         found += [
             Wrong(parameter.name, str(value), f"{value}, which is not allowed, at {parameter.name}", str(value))
             for value in dict.fromkeys(outside)
-            if shape_of(schema).problem(value)
+            if not shape_of(schema).holds(value)
         ]
     elif kinds <= {"string"} and ("enum" in schema or "pattern" in schema):
         text = "roaas-not-one-of-these"
-        if shape_of(schema).problem(text):
+        if not shape_of(schema).holds(text):
             found.append(Wrong(parameter.name, text, f"a text that is not allowed at {parameter.name}", text))
     return found

@@ -172,7 +172,7 @@ def _is_shown(contract: Contract, path: str, schema: Schema, body: bytes) -> boo
     if not isinstance(value, dict):
         return False
     kept = {name: part for name, part in value.items() if name in schema.get("properties", {}) or name not in shown}
-    return not shape_of(schema).problem(kept)
+    return shape_of(schema).holds(kept)
 
 
 def _xml_fault(body: bytes, schema: Schema) -> _Said:

@@ -140,7 +140,7 @@ def _distinct(values: Sequence[Any]) -> list[Any]:
 def fits(schema: Schema, value: Any) -> bool:
     """Return whether a schema allows a value; a schema that no validator reads allows all."""
     try:
-        return not shape_of(schema).problem(value)
+        return shape_of(schema).holds(value)
     except ValueError:
         return True
 
