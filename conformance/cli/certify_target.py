@@ -15,7 +15,7 @@ from conformance.documents.openapi import operations_of
 from conformance.engine.connecting import connection_of, keyed
 from conformance.engine.describing import described_contract, is_wsdl, soap_contract
 from conformance.statement.endpoints import Endpoints
-from conformance.statement.motion_map import shape_of
+from conformance.statement.motion_map import MotionMap, shape_of
 from conformance.statement.statement import (
     Api,
     Calls,
@@ -78,7 +78,7 @@ def _described(
         connection = connection_of(where if where.api_key else msgspec.structs.replace(where, api_key_file=None))
         moves = statement is not None and has_motion_map(statement)
         if is_wsdl(source) or source in {options["wsdl"], api.wsdl if api else None}:
-            contract, where, remarks = soap_contract(source, base_url, where, connection, options["out"])
+            contract, where, remarks = soap_contract(source, base_url, where, connection, options["out"], moves=moves)
         else:
             contract, where, remarks = described_contract(
                 source, overlays, base_url, where, connection, options["out"], moves=moves
@@ -106,6 +106,27 @@ def _check_map(declared: Statement, contract: Contract) -> None:
                 f"[motion] names {call!r}, which the description does not have"
                 + (f"; did you mean {near[0]!r}?" if near else "")
             )
+    if declared.motion_map is not None and declared.motion_map.calls:
+        _check_messages(declared.motion_map, contract)
+
+
+def _check_messages(motion: MotionMap, contract: Contract) -> None:
+    """Check that the messages of a WSDL have the elements that the motion map gives them.
+
+    Raises:
+        StatementError: they do not.
+    """
+    # xmlschema and lxml take a third of a second, which other devices need not pay.
+    from conformance.documents.wsdl_pack import messages_of  # noqa: PLC0415
+    from conformance.documents.xml_values import NoElementError, node_of  # noqa: PLC0415
+
+    declared = messages_of(contract)
+    for call, body in motion.bodies:
+        if body is not None and call in declared:
+            try:
+                node_of(declared[call], body)
+            except NoElementError as error:
+                raise StatementError(f"[motion] {call}: {error}") from error
 
 
 def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> Statement:

@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from conformance.contract.described import TITLE
+from conformance.contract.described import MOTION, TITLE
 from conformance.contract.locating import MANIFEST
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import basic_string
 from conformance.documents.soap_services import SoapDescription, SoapOperation, SoapPort, read_services
 from conformance.documents.xml_names import local
+from conformance.documents.xsd_shapes import Element
 
 #: The documents of the WSDL, by location, and which of them comes first.
 DOCUMENTS_NAME: Final = "wsdl.json"
@@ -32,7 +33,13 @@ def label_of(port: SoapPort, operation: SoapOperation) -> str:
 
 
 def write_soap_pack(
-    folder: Path, found: SoapDescription, location: str, documents: Mapping[str, bytes], address: str = ""
+    folder: Path,
+    found: SoapDescription,
+    location: str,
+    documents: Mapping[str, bytes],
+    address: str = "",
+    *,
+    moves: bool = False,
 ) -> Path:
     """Write a contract pack for a WSDL; return its folder.
 
@@ -42,6 +49,7 @@ def write_soap_pack(
         location: that of the WSDL.
         documents: all documents by location.
         address: where the service is, whatever the WSDL says; empty: as it says.
+        moves: whether the statement has a motion map, so that motion is judged as well.
 
     Raises:
         OSError: it cannot be written.
@@ -53,7 +61,7 @@ def write_soap_pack(
         f"title = {basic_string(TITLE)}",
         "closed_answers = true",
         "described = true",
-        f'\n[[class]]\nname = "{CLASS}"',
+        *(f'\n[[class]]\nname = "{class_}"' for class_ in (CLASS, *((MOTION,) if moves else ()))),
     ]
     (folder / MANIFEST).write_text("\n".join(lines) + "\n", encoding="utf-8")
     (folder / "openapi.json").write_text(json.dumps(_operations(found)), encoding="utf-8")
@@ -125,3 +133,12 @@ def services_of(contract: Contract) -> SoapDescription | None:
         return found
 
     return read_services(documents[kept["location"]], kept["location"], fetch, kept["address"])
+
+
+def messages_of(contract: Contract) -> dict[str, Element]:
+    """Return the declarations of the requests of a pack's WSDL, by operation; empty if the pack has none."""
+    found = services_of(contract)
+    if found is None:
+        return {}
+    shapes = ((label_of(port, one), found.types.shape(one.request)) for port, one in each(found.ports) if one.request)
+    return {label: shape for label, shape in shapes if shape is not None}

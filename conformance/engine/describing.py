@@ -137,7 +137,7 @@ def described_contract(
 
 
 def soap_contract(
-    source: str, base_url: str | None, endpoints: Endpoints, connection: Connection, out: Path
+    source: str, base_url: str | None, endpoints: Endpoints, connection: Connection, out: Path, *, moves: bool = False
 ) -> tuple[Contract, Endpoints, tuple[str, ...]]:
     """Return the contract of a device's WSDL, the endpoints with its address, and remarks.
 
@@ -148,6 +148,7 @@ def soap_contract(
         endpoints: what the statement or the options say.
         connection: deadline, credentials and TLS.
         out: folder of the results, in which the pack is written.
+        moves: whether the statement has a motion map.
 
     Raises:
         DescriptionError: there is no usable WSDL.
@@ -178,6 +179,6 @@ def soap_contract(
         for port in found.ports
         if not moved(port.url, base_of(found), base).startswith(base)
     )
-    folder = write_soap_pack(out / FOLDER, found, source, documents, address)
+    folder = write_soap_pack(out / FOLDER, found, source, documents, address, moves=moves)
     Contract.load.cache_clear()
     return Contract.load(folder), msgspec.structs.replace(endpoints, rest=base), remarks

@@ -13,6 +13,7 @@ from conformance.api.rest.observers import Observer
 from conformance.api.rest.values import Values
 from conformance.api.soap.observer import PASSIVE, SoapObserver, answers_of
 from conformance.api.soap.service import SoapService
+from conformance.scenarios.motion.binding import binding_of
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.other_exchanges import OtherExchanges
 from conformance.scenarios.scenario import NotPossibleError
@@ -68,7 +69,7 @@ def mapped(interfaces: Interfaces, motion: MotionMap) -> MappedDevice:
     """Return the device that is moved by its map."""
     if interfaces.rest is None:
         raise NotPossibleError("the device has no REST interface")
-    return MappedDevice(interfaces.rest, motion)
+    return MappedDevice(interfaces.rest, motion, binding=binding_of(interfaces.rest))
 
 
 @pytest.fixture

@@ -7,12 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Final
-from urllib.parse import urlsplit
 
 from conformance.api.rest.interface import RestInterface
-from conformance.api.soap.envelope import envelope
-from conformance.api.soap.messages import declarations, ordinary, simple_leaves, with_text
-from conformance.api.soap.username_token import UsernameToken
+from conformance.api.soap.messages import declarations, simple_leaves, with_text
 from conformance.documents.openapi import operations_of
 from conformance.documents.soap_services import SoapDescription, SoapOperation, SoapPort, base_of
 from conformance.documents.wsdl_pack import each, label_of, services_of
@@ -21,9 +18,9 @@ from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_lexical import outside, unreadable
 from conformance.documents.xsd_shapes import Element
+from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
-from conformance.transport.client import Headers
 from conformance.transport.exchange import Exchange, NoAnswerError, Unanswered
 from conformance.verdict.run import Run
 
@@ -76,15 +73,8 @@ class _Caller:
     """Sends messages and records them."""
 
     api: RestInterface
-    found: SoapDescription
-    token: UsernameToken | None = None
+    messages: DescribedMessages
     probes: list[SoapProbe] = field(default_factory=list)
-
-    def message(self, port: SoapPort, node: Node | None, *more: Node, space: str = "") -> bytes:
-        """Return a message, with further header blocks, or in another namespace than that of the port's Envelope."""
-        blocks = (*([self.token.block(space or port.envelope)] if self.token else ()), *more)
-        whole = envelope((node,) if node else (), blocks or None, space or port.envelope)
-        return b'<?xml version="1.0" encoding="utf-8"?>\n' + whole.written()
 
     def send(self, port: SoapPort, operation: SoapOperation, kind: Kind, says: str, octets: bytes) -> SoapProbe:
         """Send octets to a port.
@@ -92,11 +82,7 @@ class _Caller:
         Raises:
             PartialTraceError: the device does not respond any more.
         """
-        parts = urlsplit(port.url)  # the path alone: a device behind a front does not know its own address
-        path = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
-        fields: Headers = (("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", f'"{operation.action}"'))
-        if port.is_12:
-            fields = (("Content-Type", f'application/soap+xml; charset=utf-8; action="{operation.action}"'),)
+        path, fields = target_of(port), fields_of(port, operation)
         probe = SoapProbe(label_of(port, operation), kind, says, port.envelope, operation.response)
         try:
             probe = replace(probe, exchange=self.api.client.send("POST", path, headers=fields, body=octets))
@@ -107,30 +93,6 @@ class _Caller:
             return self.probes[-1]
         self.probes.append(probe)
         return probe
-
-    def usual(self, operation: SoapOperation) -> tuple[Element | None, Node | None]:
-        """Return the declaration of an operation's request, and a valid message of it; None if its Body is empty.
-
-        Raises:
-            NotPossibleError: none can be made.
-        """
-        if not operation.request:
-            return None, None
-        declared = self.found.types.shape(operation.request)
-        if declared is None:
-            raise NotPossibleError(f"no schema declares {operation.request}")
-        values = self.api.run.statement.values
-        fault = ""
-        for optional in (False, True):
-            node = ordinary(declared, optional=optional)
-            for path, _ in simple_leaves(declared, node):
-                given = values.get(node.at(path).name)
-                if given:
-                    node = with_text(node, path, str(given[0]))
-            fault = self.found.types.invalid(parse(node.written()))
-            if not fault:
-                return declared, node
-        raise NotPossibleError(f"no valid message can be made for {operation.name}: {fault}")
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.READING)
@@ -145,16 +107,10 @@ def wsdl_faults(run: Run) -> tuple[str, ...]:
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.READING)
 def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
     """Call each operation that may be called, with valid messages and with wrong ones."""
-    found = services_of(api.run.contract)
-    if found is None:
+    messages = DescribedMessages.of(api)
+    if messages is None:
         raise NotPossibleError("the device has no WSDL")
-    try:
-        token = UsernameToken.of(api.run.statement.endpoints.username_token_file)
-    except (OSError, ValueError) as error:
-        raise NotPossibleError(str(error)) from error
-    caller = _Caller(api, found, token)
-    if token is not None:
-        token.set_clock(api.client.send("GET", "/").response.header("date"))
+    found, caller = messages.found, _Caller(api, messages)
     may = {item.label for item in operations_of(api.run.contract) if api.call_rules.decide(item).may}
     reasons: list[str] = []
     for port, operation in each(found.ports):
@@ -170,19 +126,21 @@ def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
 
 def _explore(caller: _Caller, port: SoapPort, operation: SoapOperation) -> None:
     """Send the messages of one operation."""
-    declared, node = caller.usual(operation)
+    declared, node = caller.messages.usual(operation)
     effort = caller.api.run.effort
     for _ in range(1 if effort.name == "quick" else _USUAL):
-        caller.send(port, operation, Kind.USUAL, "a valid message", caller.message(port, node))
+        caller.send(port, operation, Kind.USUAL, "a valid message", caller.messages.message(port, node))
     until = time.monotonic() + _BUDGET_S
-    invalid = list(_invalid(caller.found, declared, node)) if declared and node else []
+    invalid = list(_invalid(caller.messages.found, declared, node)) if declared and node else []
     for says, wrong in effort.draw(invalid, _MOST, f"{caller.api.run.seed}/{label_of(port, operation)}"):
         if time.monotonic() < until:
-            caller.send(port, operation, Kind.INVALID, says, caller.message(port, wrong))
+            caller.send(port, operation, Kind.INVALID, says, caller.messages.message(port, wrong))
     for kind, says, octets in _odd(caller, port, node):
         if time.monotonic() < until:
             caller.send(port, operation, kind, says, octets)
-            caller.send(port, operation, Kind.AGAIN, f"a valid message after {says}", caller.message(port, node))
+            caller.send(
+                port, operation, Kind.AGAIN, f"a valid message after {says}", caller.messages.message(port, node)
+            )
 
 
 def _invalid(found: SoapDescription, declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
@@ -204,12 +162,12 @@ def _invalid(found: SoapDescription, declared: Element, node: Node) -> Iterator[
 
 def _odd(caller: _Caller, port: SoapPort, node: Node | None) -> Iterator[tuple[Kind, str, bytes]]:
     """Yield messages that are wrong whatever the operation is."""
-    whole = caller.message(port, node)
+    whole = caller.messages.message(port, node)
     yield Kind.UNREADABLE, "XML that is not well-formed", whole[: len(whole) * 2 // 3]
     yield Kind.UNREADABLE, "octets that are no XML", b"roaas"
     yield Kind.EMPTY, "an empty body", b""
-    yield Kind.VERSION, "an Envelope of an unknown namespace", caller.message(port, node, space=_STRANGE)
+    yield Kind.VERSION, "an Envelope of an unknown namespace", caller.messages.message(port, node, space=_STRANGE)
     block = Node(clark(_STRANGE, "Strange"), "1", (), ((clark(port.envelope, "mustUnderstand"), "1"),))
-    yield Kind.UNDERSTAND, "a header block that must be understood", caller.message(port, node, block)
-    head, rest = caller.message(port, node).split(b"\n", 1)
+    yield Kind.UNDERSTAND, "a header block that must be understood", caller.messages.message(port, node, block)
+    head, rest = caller.messages.message(port, node).split(b"\n", 1)
     yield Kind.DOCTYPE, "a DOCTYPE", head + b'\n<!DOCTYPE e [<!ENTITY a "b">]>' + rest

@@ -1,9 +1,11 @@
 """The motion map: how any device is read, commanded and stopped (tables ``[motion.*]`` of a statement).
 
-Operations are written as in ``--call``: "METHOD PATH", the path as the description has it. Positions in responses are
-JSON pointers (RFC 6901). Bodies and paths are templates: "{yaw}" is the target of the axis yaw, "{seconds}" the
-duration of a move, "{value}" the value of a switch, and "{goto:/uuid}" a value in the response to the last accepted
-move.
+Operations are written as in ``--call``: "METHOD PATH", the path as the description has it, or "POST /PORT/OPERATION" of
+a WSDL. Positions in responses are JSON pointers (RFC 6901); in XML they go by local names, with "@name" for an
+attribute. Bodies and paths are templates: "{yaw}" is the target of the axis yaw, "{seconds}" the duration of a move,
+"{value}" the value of a switch, and "{goto:/uuid}" a value in the response to the last accepted move.
+
+Over 300 lines because the format of the map is in one place.
 """
 
 from __future__ import annotations
@@ -47,6 +49,11 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """
         if self.limits[0] >= self.limits[1]:
             raise ValueError(f"limits = {list(self.limits)} must be two numbers, the lesser one first")
+
+    def well_inside(self, position: float) -> float:
+        """Return the position, or the nearest one that is a quarter of the range away from both limits."""
+        margin = (self.limits[1] - self.limits[0]) / 4
+        return min(max(position, self.limits[0] + margin), self.limits[1] - margin)
 
 
 class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -120,12 +127,14 @@ class Speed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         limits: least and greatest, in units per second.
         at: where the state's response has the measured velocity; empty: it is the change of the axis ``of``.
         of: the axis that it changes.
+        scale: how fast the axis ``of`` changes at velocity 1, in its unit per second.
         tolerance: how far the measured velocity may be off; None: that of the command.
     """
 
     limits: tuple[Finite, Finite]
     at: Pointer = ""
     of: str = ""
+    scale: Positive = 1.0
     tolerance: Positive | None = None
 
     def __post_init__(self) -> None:
@@ -246,10 +255,15 @@ class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"agrees names {min(strange)!r}, which is no axis of [motion.state.axes]")
 
     @property
+    def bodies(self) -> tuple[tuple[str, Any], ...]:
+        """The operations that command the device, with the templates of their bodies."""
+        given = (self.goto, self.velocity, self.stop, *self.switches.values())
+        return tuple((one.send, one.body) for one in given if one)
+
+    @property
     def calls(self) -> tuple[str, ...]:
         """The operations that the map names."""
-        given = (self.goto, self.velocity, self.stop, *self.switches.values())
-        sent = [one.send for one in given if one]
+        sent = [call for call, _ in self.bodies]
         read = [self.state.read, *self.state.agrees, *(one.read for one in self.switches.values() if one.read)]
         return (*read, *sent, *([self.action.read] if self.action else ()))
 

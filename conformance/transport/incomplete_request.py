@@ -5,7 +5,7 @@ import socket
 import struct
 from typing import Final, Self
 
-from conformance.transport.client import HttpClient
+from conformance.transport.client import Headers, HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError, Request, Unanswered
 
 # l_onoff 1, l_linger 0: close() sends RST instead of FIN.
@@ -21,6 +21,7 @@ class PartialRequest:
         sent: the part of the body to send.
         promised: Content-Length, or None for a chunked body without its last chunk.
         head_only: number of bytes of the head to send, without a body; None: the whole head and ``sent``.
+        headers: further fields; Content-Type is application/json where they have none.
 
     Raises:
         NoAnswerError: the connection cannot be opened.
@@ -36,11 +37,13 @@ class PartialRequest:
         sent: bytes = b"",
         promised: int | None = None,
         head_only: int | None = None,
+        headers: Headers = (),
     ) -> None:
         credentials = client.connection.credentials
         head = [f"{method} {client.prefix}{credentials.target(path)} HTTP/1.1", f"Host: {client.authority}"]
-        if sent or promised:
+        if (sent or promised) and not any(name.lower() == "content-type" for name, _ in headers):
             head.append("Content-Type: application/json")
+        head += [f"{name}: {value}" for name, value in headers]
         head.append("Transfer-Encoding: chunked" if promised is None and sent else f"Content-Length: {promised or 0}")
         shown = credentials.hidden("\r\n".join(head))
         head += [f"{name}: {value}" for name, value in credentials.fields()]

@@ -85,8 +85,8 @@ def driven(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
 
 def measured(readings: list[Reading], name: str, motion: MotionMap) -> float | None:
     """Return a velocity by some readings, in units per second; None if they do not show it."""
-    of = motion.velocity.axes[name].of if motion.velocity else ""
-    if not of:
+    speed = motion.velocity.axes[name] if motion.velocity else None
+    if speed is None or not speed.of:
         speeds = [one.speeds[name] for one in readings if one.speeds]
         return median(speeds) if len(speeds) >= SEVERAL else None
     seen = [one for one in readings if one.values]
@@ -94,7 +94,8 @@ def measured(readings: list[Reading], name: str, motion: MotionMap) -> float | N
         return None
     first, last = seen[:SEVERAL], seen[-SEVERAL:]
     lapse_s = (last[1].sent + last[1].received - first[1].sent - first[1].received) / 2
-    return (middle_of(last, of) - middle_of(first, of)) / lapse_s if lapse_s > 0 else None
+    way = middle_of(last, speed.of) - middle_of(first, speed.of)
+    return way / lapse_s / speed.scale if lapse_s > 0 else None
 
 
 def usual_s(readings: Sequence[Reading]) -> float:
@@ -123,7 +124,10 @@ def stopped(leg: Leg, motion: MotionMap) -> tuple[tuple[Reading, ...], NotTested
         return (), NotTested("the state could not be read before the stop")
     axis, here = moved_axis(leg), before[-1].values
     left, done = abs(goal.targets[axis] - here[axis]), abs(here[axis] - leg.start[axis])
-    if left < 4 * motion.tolerance(axis) or done < motion.tolerance(axis):
+    # A stop over a slow link reaches a fast device after it has arrived.
+    way_s = before[-1].sent - goal.answered
+    comes = done / way_s * (order.answered - before[-1].sent) if way_s > 0 else left
+    if left < comes + 4 * motion.tolerance(axis) or done < motion.tolerance(axis):
         return (), NotTested("the device was not under way when it was stopped")
     due = order.sent + stop.rests_within_s + usual_s(leg.readings)
     readings = leg.after(due)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 
 from conformance.rules.motion.judging import ALL, at, driven, legs_of, off, reached, usable
 from conformance.scenarios.motion.attempts import attempts_at_rest
 from conformance.scenarios.motion.moves import clamped_targets
-from conformance.scenarios.motion.trace import SEVERAL, Drive, Leg, Quiet, Tried
+from conformance.scenarios.motion.trace import SEVERAL, Drive, Leg, Quiet, Tried, is_refusal, is_soap
 from conformance.scenarios.motion.velocities import clamped_velocities
 from conformance.scenarios.rule import Case, NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
@@ -48,10 +48,14 @@ def _alone(trace: Quiet, motion: MotionMap, kinds: tuple[str, ...]) -> Iterator[
         yield NotTested("the device moved after several attempts, and did not come back for each of them alone")
 
 
-def _refused(tried: Iterable[Tried], statuses: Container[int], expected: str) -> Iterator[Outcome]:
+def _refused(tried: Iterable[Tried], *statuses: int) -> Iterator[Outcome]:
+    """Judge whether attempts are refused, with one of some statuses if there are any; SOAP has a fault for all."""
     for one in tried:
-        holds = one.exchange is not None and one.exchange.response.status in statuses
-        yield Case(holds, one.exchange, f"{expected} for {one.what}", cause=one.kind)
+        soap = one.exchange is not None and is_soap(one.exchange)
+        expected = "a fault" if soap else " or ".join(map(str, statuses)) or "4xx"
+        found = one.exchange
+        holds = found is not None and is_refusal(found) and (soap or not statuses or found.response.status in statuses)
+        yield Case(holds, found, f"{expected} for {one.what}", cause=one.kind)
 
 
 @rule("motion/beyond-limits", on=(clamped_targets, clamped_velocities, attempts_at_rest))
@@ -63,7 +67,7 @@ def beyond_limits(trace: Quiet | tuple[Leg, ...] | tuple[Drive, ...], motion: Mo
         return
     if all(one is None or one.beyond_limits == "undefined" for one in (motion.goto, motion.velocity)):
         yield NotClaimed("the map does not say what becomes of a target beyond the limits")
-    yield from _refused((one for one in trace.tried if one.kind == "beyond"), range(400, 500), "4xx")
+    yield from _refused(one for one in trace.tried if one.kind == "beyond")
 
 
 @rule("motion/refused-still", on=(attempts_at_rest,))
@@ -87,7 +91,7 @@ def incomplete_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
 def unauthorised_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a move without credentials is refused, and moves nothing."""
     tried = [one for one in trace.tried if one.kind == "unauthorised"]
-    yield from _refused(tried, {401, 403}, "401 or 403")
+    yield from _refused(tried, 401, 403)
     yield from _nothing_moved(trace, motion, "unauthorised")
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
 
-from conformance.api.rest.validity import INVALID, validity
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.motion.moves import beyond
 from conformance.scenarios.motion.trace import Quiet, Tried
@@ -86,7 +85,7 @@ def _tries_of(sender: _Sender) -> Iterator[Callable[[], Tried]]:
                 yield partial(sender.send, "invalid", what, {name: value})
     first, axis = next(iter(sender.axes.items()))
     away = {first: axis.limits[1]}
-    if sender.mapped.api.client.connection.credentials.items:
+    if sender.mapped.binding.has_credentials:
         yield partial(sender.send, "unauthorised", f"{sender.what} without credentials", away, authorized=False)
     if sender.given.body is not None:
         yield partial(sender.send_broken, away)
@@ -112,27 +111,25 @@ class _Sender:
 
     def is_invalid(self, values: dict[str, Any]) -> bool:
         """Return whether the description forbids a command."""
-        method, path, fields, octets = self.mapped.request_of(self.given, values)
-        media_type = "application/json" if fields else ""
-        return validity(self.mapped.api.run.contract, method, path, media_type, octets).verdict == INVALID
+        return self.mapped.binding.forbids(*self.mapped.call_of(self.given, values))
 
     def send(self, kind: str, what: str, values: dict[str, Any], *, authorized: bool = True) -> Tried:
         """Send a command."""
-        method, path, fields, octets = self.mapped.request_of(self.given, values)
-        exchange = self.mapped.api.client.send(method, path, headers=fields, body=octets, authorized=authorized)
-        return Tried(kind, what, exchange)
+        made = self.mapped.request_of(self.given, values, authorized=authorized)
+        return Tried(kind, what, self.mapped.send(made, authorized=authorized))
 
     def send_broken(self, values: dict[str, Any]) -> Tried:
-        """Send a command whose body is not JSON."""
-        method, path, fields, octets = self.mapped.request_of(self.given, values)
-        exchange = self.mapped.api.client.send(method, path, headers=fields, body=octets + b"}")
-        return Tried("invalid", f"{self.what} whose body is not JSON", exchange)
+        """Send a command whose body is not in its syntax."""
+        made = self.mapped.request_of(self.given, values)
+        exchange = self.mapped.send(replace(made, body=made.body + b"}"))
+        return Tried("invalid", f"{self.what} whose body is not {self.mapped.binding.syntax}", exchange)
 
     def vanish(self, values: dict[str, Any], promised: int | None) -> Tried:
         """Send a command of which some bytes are missing, and close the connection."""
-        method, path, _, octets = self.mapped.request_of(self.given, values)
-        whole = None if promised is None else len(octets) + promised
-        request = PartialRequest(self.mapped.api.client, method, path, sent=octets, promised=whole)
+        made = self.mapped.request_of(self.given, values)
+        whole = None if promised is None else len(made.body) + promised
+        client = self.mapped.api.client
+        request = PartialRequest(client, made.method, made.path, sent=made.body, promised=whole, headers=made.headers)
         self.mapped.clock.sleep(_READ_S)
         request.vanish(reset=promised is None)
         return Tried("incomplete", f"{self.what} of which some bytes were not sent", None)

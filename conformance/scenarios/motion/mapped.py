@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
-from conformance.documents.json_text import read_json
 from conformance.observe.clock import WALL_CLOCK, Clock
+from conformance.scenarios.motion.binding import Binding, JsonBinding, Made
 from conformance.scenarios.motion.templates import NoValueError, at, filled, numbers_at, seconds_of
 from conformance.scenarios.motion.trace import SEVERAL, Command, Leg, Reading, middle_of
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.motion_map import Goto, MotionMap, Switch, Velocity, names_in
-from conformance.transport.client import Headers
 from conformance.transport.exchange import Exchange
 
 #: For so long a device that has arrived is watched, s.
@@ -31,11 +29,6 @@ _RESTS_S: Final = 5.0
 Position = dict[str, float]
 
 
-def _content(body: Any) -> tuple[Headers, bytes]:
-    """Return header fields and octets of a body; None: there is none."""
-    return ((), b"") if body is None else ((("Content-Type", "application/json"),), json.dumps(body).encode())
-
-
 class MappedDevice:
     """One device.
 
@@ -43,6 +36,7 @@ class MappedDevice:
         api: its REST interface.
         motion: its map.
         clock: by which it is watched.
+        binding: how its calls become requests; None: JSON over HTTP.
 
     Attributes:
         home: where it is brought between scenarios: near where it was at first, well within its limits.
@@ -52,17 +46,15 @@ class MappedDevice:
         NoAnswerError: there is no response.
     """
 
-    def __init__(self, api: RestInterface, motion: MotionMap, clock: Clock = WALL_CLOCK) -> None:
+    def __init__(
+        self, api: RestInterface, motion: MotionMap, clock: Clock = WALL_CLOCK, binding: Binding | None = None
+    ) -> None:
         self.api, self.motion, self.clock = api, motion, clock
+        self.binding: Binding = binding or JsonBinding(api)
         self._answer: Any = None
         self._read_at = 0.0
-        self.home = {name: self._inside(name, value) for name, value in self.where().items()}
+        self.home = {name: motion.state.axes[name].well_inside(value) for name, value in self.where().items()}
         api.stop_device = self.stop
-
-    def _inside(self, axis: str, value: float) -> float:
-        least, greatest = self.motion.state.axes[axis].limits
-        margin = (greatest - least) / 4
-        return min(max(value, least + margin), greatest - margin)
 
     @property
     def moves(self) -> Goto:
@@ -119,14 +111,23 @@ class MappedDevice:
         )
 
     def get(self, call: str) -> tuple[Exchange, Any]:
-        """Send a reading operation of the map; return the exchange and its JSON, None if it is none.
+        """Send a reading operation of the map; return the exchange and what it says, None if nothing.
 
         Raises:
             NoAnswerError: there is no response.
         """
-        method, _, path = call.partition(" ")
-        exchange = self.api.client.send(method, path, headers=(("Accept", "application/json"),))
-        return exchange, read_json(exchange.response.body).value
+        exchange = self.send(self.binding.made(call, None))
+        return exchange, self.binding.content(exchange.response.body)
+
+    def send(self, made: Made, *, authorized: bool = True, timeout_s: float | None = None) -> Exchange:
+        """Send a request.
+
+        Raises:
+            NoAnswerError: there is no response.
+        """
+        return self.api.client.send(
+            made.method, made.path, headers=made.headers, body=made.body, authorized=authorized, timeout_s=timeout_s
+        )
 
     def _action_state(self) -> str:
         action = self.motion.action
@@ -137,8 +138,8 @@ class MappedDevice:
         except NoValueError:
             return ""
 
-    def request_of(self, given: Goto | Velocity | Switch, values: Mapping[str, Any]) -> tuple[str, str, Headers, bytes]:
-        """Return method, path, header fields and body of a command.
+    def call_of(self, given: Goto | Velocity | Switch, values: Mapping[str, Any]) -> tuple[str, Any]:
+        """Return call and body of a command.
 
         An axis without a value goes home, or stands still.
         """
@@ -146,17 +147,25 @@ class MappedDevice:
             values = {**self.home, **values}
             if given.relative:
                 here = self.where()
-                values = {name: value - here[name] if _is_number(value) else value for name, value in values.items()}
+                values = {
+                    name: value - here[name] if isinstance(value, int | float) else value
+                    for name, value in values.items()
+                }
             values = {**values, "seconds": given.seconds}
         elif isinstance(given, Velocity):
             values = {**dict.fromkeys(given.axes, 0.0), **values}
-        method, _, path = given.send.partition(" ")
-        return method, filled(path, values, self._answer), *_content(filled(given.body, values, self._answer))
+        return filled(given.send, values, self._answer), filled(given.body, values, self._answer)
+
+    def request_of(
+        self, given: Goto | Velocity | Switch, values: Mapping[str, Any], *, authorized: bool = True
+    ) -> Made:
+        """Return the request of a command; see call_of()."""
+        return self.binding.made(*self.call_of(given, values), authorized=authorized)
 
     def _command(self, given: Goto | Velocity, values: Mapping[str, float], targets: Position) -> Command:
-        method, path, fields, octets = self.request_of(given, values)
+        made = self.request_of(given, values)
         sent = self.clock.now()
-        exchange = self.api.client.send(method, path, headers=fields, body=octets)
+        exchange = self.send(made)
         return Command(sent, self.clock.now(), targets, exchange)
 
     def goto(self, targets: Mapping[str, float], ends: Mapping[str, float] | None = None) -> Command:
@@ -180,7 +189,7 @@ class MappedDevice:
 
     def note(self, exchange: Exchange) -> None:
         """Keep the response to an accepted move, if it can be read: a stop may name its id."""
-        self._answer = read_json(exchange.response.body).value or self._answer
+        self._answer = self.binding.content(exchange.response.body) or self._answer
 
     def stop(self) -> Command | None:
         """Send the stop, or velocity 0; return None if the map has neither, or it names what is not known yet.
@@ -191,16 +200,12 @@ class MappedDevice:
         stop = self.motion.stop
         if stop is None:
             return self.drive({}) if self.motion.velocity else None
-        method, _, path = stop.send.partition(" ")
         try:
-            path, body = filled(path, {}, self._answer), filled(stop.body, {}, self._answer)
+            made = self.binding.made(filled(stop.send, {}, self._answer), filled(stop.body, {}, self._answer))
         except NoValueError:
             return None
-        fields, octets = _content(body)
         sent = self.clock.now()
-        exchange = self.api.client.send(
-            method, path, headers=fields, body=octets, timeout_s=max(_STOP_S, stop.rests_within_s)
-        )
+        exchange = self.send(made, timeout_s=max(_STOP_S, stop.rests_within_s))
         return Command(sent, self.clock.now(), {}, exchange)
 
     def watch(self, until: float, is_over: Callable[[list[Reading]], bool] = lambda _: False) -> list[Reading]:
@@ -293,7 +298,3 @@ class MappedDevice:
                 return
             if self.clock.now() > until:
                 raise NotPossibleError("the device does not come to rest")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float)

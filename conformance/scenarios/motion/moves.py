@@ -224,7 +224,8 @@ def _of_clients(mapped: MappedDevice) -> Leg:
 
 
 def _outgoing(mapped: MappedDevice, targets: Position) -> Outgoing:
-    return Outgoing(mapped.api.client, *mapped.request_of(mapped.moves, targets))
+    made = mapped.request_of(mapped.moves, targets)
+    return Outgoing(mapped.api.client, made.method, made.path, made.headers, made.body)
 
 
 def _is_at_one(mapped: MappedDevice, wanted: list[Position], readings: list[Reading]) -> bool:

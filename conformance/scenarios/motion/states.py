@@ -59,8 +59,7 @@ def switched(mapped: MappedDevice) -> tuple[Switched, ...]:
 
 def _switch(mapped: MappedDevice, name: str, value: object) -> Switched:
     switch = mapped.motion.switches[name]
-    method, path, fields, octets = mapped.request_of(switch, {"value": value})
-    command = mapped.api.client.send(method, path, headers=fields, body=octets)
+    command = mapped.send(mapped.request_of(switch, {"value": value}))
     shown, wanted = None, switch.shown(value)
     for _ in poll_for(mapped.clock, _STEP_S, switch.within_s):
         shown = _shown(mapped, name)

@@ -60,8 +60,8 @@ class Command:
 
     @property
     def refused(self) -> bool:
-        """Whether it was answered 4xx."""
-        return 400 <= self.exchange.response.status < 500  # noqa: PLR2004
+        """Whether the device refused it."""
+        return is_refusal(self.exchange)
 
 
 @dataclass(frozen=True)
@@ -171,6 +171,18 @@ class Quiet:
     tried: tuple[Tried, ...]
     readings: tuple[Reading, ...]
     alone: tuple[Quiet, ...] = ()
+
+
+def is_refusal(exchange: Exchange) -> bool:
+    """Return whether a response refuses a request: 4xx, or for a SOAP message a fault, which may have status 500."""
+    status = exchange.response.status
+    return 400 <= status < 500 or (is_soap(exchange) and not exchange.response.ok)  # noqa: PLR2004
+
+
+def is_soap(exchange: Exchange) -> bool:
+    """Return whether a request was a SOAP message."""
+    fields = {name.lower(): value for name, value in exchange.request.headers}
+    return "soapaction" in fields or fields.get("content-type", "").startswith("application/soap+xml")
 
 
 def middle_of(readings: Sequence[Reading], axis: str) -> float:

@@ -61,13 +61,18 @@ def let_go(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
     hold_s = mapped.drives.hold_s
     if hold_s is None:
         raise NotDeclaredError("the map declares no hold_s: the device goes on until it is told otherwise")
+    return recorded(_let_go(mapped, effort, hold_s))
+
+
+def _let_go(mapped: MappedDevice, effort: Effort, hold_s: float) -> Iterator[Drive]:
     axes = list(mapped.drives.axes.items())
-    return recorded(
-        _drive(mapped, f"{name} {limit:g}, let go", {name: limit}, let_go_s=hold_s)
-        for _ in range(1 if effort.name == "quick" else 2)
-        for name, axis in (axes[:1] if effort.name == "quick" else axes)
-        for limit in _there_and_back(mapped, axis.limits, axis.of)
-    )
+    more = 0
+    for _ in range(1 if effort.name == "quick" else 2):
+        for name, axis in axes[:1] if effort.name == "quick" else axes:
+            for limit in _there_and_back(mapped, axis.limits, axis.of):
+                # An odd number of commands and an even one: a watchdog may work after every other command.
+                yield _drive(mapped, f"{name} {limit:g}, let go", {name: limit}, let_go_s=hold_s, more=more % 2)
+                more += 1
 
 
 def _there_and_back(mapped: MappedDevice, limits: tuple[float, float], of: str) -> Iterator[float]:
@@ -81,7 +86,13 @@ def _there_and_back(mapped: MappedDevice, limits: tuple[float, float], of: str) 
 
 
 def _drive(
-    mapped: MappedDevice, what: str, speeds: Position, ends: Position | None = None, *, let_go_s: float | None = None
+    mapped: MappedDevice,
+    what: str,
+    speeds: Position,
+    ends: Position | None = None,
+    *,
+    let_go_s: float | None = None,
+    more: int = 0,
 ) -> Drive:
     """Drive at a velocity.
 
@@ -91,6 +102,7 @@ def _drive(
         speeds: what is commanded.
         ends: what the device must take instead.
         let_go_s: its hold time, if nothing is sent after the drive; None: velocity 0 is.
+        more: how often the velocity is sent once more at the end.
     """
     given = mapped.drives
     mapped.come_to_rest()
@@ -101,6 +113,7 @@ def _drive(
         if mapped.clock.now() >= commands[-1].sent + every_s:
             commands.append(mapped.drive(speeds))
         readings.append(mapped.read())
+    commands += [mapped.drive(speeds) for _ in range(more)]
     end = None if let_go_s is not None else mapped.drive({})
     last = end or commands[-1]
     after = mapped.watch(last.answered + (let_go_s or 0.0) + given.settle_s + _REST_S)

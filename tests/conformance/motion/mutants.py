@@ -361,3 +361,10 @@ def of_rover() -> dict[str, Change]:
     axes = ["x", "y"]
     groups = (target_mutants(axes), second_mutants(), stop_mutants(axes), reading_mutants(axes))
     return {name: change for group in (*groups, velocity_mutants(axes), switch_mutants()) for name, change in group}
+
+
+def of_dome() -> dict[str, Change]:
+    """Return the mutants of the camera, which says nothing of a move."""
+    axes = ["pan", "tilt"]
+    groups = (target_mutants(axes), second_mutants(), stop_mutants(axes), reading_mutants(axes), velocity_mutants(axes))
+    return {name: change for group in groups for name, change in group}

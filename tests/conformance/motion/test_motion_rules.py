@@ -3,17 +3,20 @@
 import tomllib
 from functools import partial
 
+import dome
 import msgspec
 import mutants
 import pytest
 import rover
 from arm import LIMITS, MAP, Arm
 from body import Body
+from dome import Dome
 from rover import Rover
 
 from conformance.observe.clock import SimulatedClock
 from conformance.rules.motion import test_motion, test_motion_attempts, test_states, test_velocities
 from conformance.scenarios.motion import moves, states, velocities
+from conformance.scenarios.motion.binding import SoapBinding
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.motion.trace import Quiet, Reading, Tried
 from conformance.scenarios.rule import Case, Rule
@@ -38,11 +41,13 @@ _DEVICES = {
     "arm": (Arm, LIMITS, MAP),
     "rover": (Rover, rover.LIMITS, rover.MAP),
     "relative": (partial(Arm, relative=True), LIMITS, _RELATIVE),
+    "dome": (Dome, dome.LIMITS, dome.MAP),
 }
 # A move that is relative begins where the last one ended, and none is sent under way.
 _MUTANTS = {
     "arm": mutants.of_arm(),
     "rover": mutants.of_rover(),
+    "dome": mutants.of_dome(),
     "relative": {name: change for name, change in mutants.of_arm().items() if not name.startswith("second")},
 }
 
@@ -56,13 +61,14 @@ class _Api:
 
     def send(self, method, path, *, headers=(), body=b"", **_):
         self.clock.sleep(self.takes_s / 2)
-        status, document = self.device.answer(method, path, body)
+        if isinstance(self.device, Dome):
+            status, octets = self.device.respond(body)
+        else:
+            status, document = self.device.answer(method, path, body)
+            octets = msgspec.json.encode(document)
         self.clock.sleep(self.takes_s / 2)
-        fields = (("Content-Type", "application/json"),)
-        return Exchange(
-            Request(method, f"http://device{path}", headers, body),
-            Response(status, fields, msgspec.json.encode(document), 2.0),
-        )
+        fields = (("Content-Type", "text/xml" if isinstance(self.device, Dome) else "application/json"),)
+        return Exchange(Request(method, f"http://device{path}", headers, body), Response(status, fields, octets, 2.0))
 
 
 def _failed(name, mutant=None, *, noise=0.0, seed=0, takes_s=0.002):
@@ -73,8 +79,15 @@ def _failed(name, mutant=None, *, noise=0.0, seed=0, takes_s=0.002):
     if mutant is not None:
         mutant(body)
     motion = msgspec.convert(tomllib.loads(text)["motion"], MotionMap)
-    mapped = MappedDevice(_Api(device(body), clock, takes_s), motion, clock)
-    given = {"mapped": mapped, "effort": Effort("standard"), "run": Run(seed=seed), "motion": motion}
+    api = _Api(device(body), clock, takes_s)
+    binding = SoapBinding(api, dome.messages_of()) if name == "dome" else None
+    mapped = MappedDevice(api, motion, clock, binding)
+    given = {
+        "mapped": mapped,
+        "effort": Effort("quick" if name == "dome" else "standard"),
+        "run": Run(seed=seed),
+        "motion": motion,
+    }
     failed, judged = set(), set()
     for scenario in _PLAYED:
         try:

@@ -3,18 +3,13 @@
 import contextlib
 import json
 import re
-import socketserver
 import sys
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import count
 from types import SimpleNamespace
-from wsgiref.simple_server import WSGIRequestHandler, WSGIServer, make_server
 
 import pytest
 from processes import ended
-from soap_devices import PASSWORD, SOAP_11, USER, Device, camera, scale, table
+from soap_devices import PASSWORD, SOAP_11, USER, camera, scale, serving, table
 
 from conformance.api.call_rules import CallRules
 from conformance.contract.pack import Contract
@@ -32,24 +27,6 @@ from conformance.verdict.run import Run
 
 _DEVICES = {"camera": camera, "scale": scale, "table": table}
 _RULES = [one for one in vars(test_soap).values() if isinstance(one, Rule)]
-
-
-class _Server(socketserver.ThreadingMixIn, WSGIServer):
-    daemon_threads = True
-
-
-class _Quiet(WSGIRequestHandler):
-    def log_message(self, *_):
-        pass
-
-
-@contextmanager
-def _serving(device: Device) -> Iterator[str]:
-    server = make_server("127.0.0.1", 0, device.app, _Server, _Quiet)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield f"http://127.0.0.1:{server.server_port}"
-    server.shutdown()
-    server.server_close()
 
 
 @pytest.fixture
@@ -239,7 +216,7 @@ def test_a_wsdl_that_does_not_hold_together_is_told(right, wrong, tmp_path, secr
 @pytest.mark.parametrize("name", _DEVICES)
 def test_certify_by_a_wsdl(name, tmp_path, secret):
     """Over HTTP: right services pass, and only what reads is called."""
-    with _serving(_DEVICES[name]()) as url:
+    with serving(_DEVICES[name]()) as url:
         more = ["--username-token-file", str(secret), "--effort", "quick", "--out", str(tmp_path / "out")]
         done = ended(sys.executable, "-m", "roaas", "certify", "--wsdl", f"{url}/{name}.wsdl", *more)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -257,7 +234,7 @@ def test_an_address_takes_the_place_of_what_the_wsdl_says(tmp_path):
         device.wsdl = re.sub(without, "", device.wsdl.replace("ADDRESS", "http://www.example.org"))
         (tmp_path / "camera.wsdl").write_text(device.wsdl, encoding="utf-8")
         (tmp_path / "camera.xsd").write_text(device.xsd, encoding="utf-8")
-        with _serving(device) as url:
+        with serving(device) as url:
             more = ["--base-url", f"{url}/services/camera", "--effort", "quick", "--out", str(tmp_path / "out")]
             done = ended(sys.executable, "-m", "roaas", "certify", str(tmp_path / "camera.wsdl"), *more)
         assert (done.returncode, "1 of 2 operations called" in done.stdout) == (0, True), done.stdout + done.stderr

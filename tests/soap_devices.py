@@ -6,9 +6,14 @@ A camera that pans (SOAP 1.1, document/literal, an imported schema), a scale (SO
 
 import base64
 import hashlib
-from collections.abc import Callable
+import socketserver
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
+from wsgiref.simple_server import WSGIRequestHandler, WSGIServer, make_server
 
 from lxml import etree
 
@@ -38,7 +43,8 @@ CAMERA_XSD = f"""<xs:schema {_XS} targetNamespace="urn:camera" xmlns:c="urn:came
 </xs:schema>"""
 
 
-def _operation(name: str, soap: str, action: str, more: str = "") -> str:
+def operation(name: str, soap: str, action: str, more: str = "") -> str:
+    """Return an operation of a binding."""
     body = f'<{soap}:body use="literal"{more}/>'
     return (
         f'<operation name="{name}"><{soap}:operation soapAction="{action}"/>'
@@ -46,7 +52,8 @@ def _operation(name: str, soap: str, action: str, more: str = "") -> str:
     )
 
 
-def _wsdl(name: str, types: str, messages: str, operations: str, soap: str, style: str, bound: str) -> str:
+def wsdl(name: str, types: str, messages: str, operations: str, soap: str, style: str, bound: str) -> str:
+    """Return a WSDL with one port."""
     spaces = {"soap": "http://schemas.xmlsoap.org/wsdl/soap/", "soap12": "http://schemas.xmlsoap.org/wsdl/soap12/"}
     return (
         f'<definitions name="{name}" targetNamespace="urn:{name}" {_WSDL} {_XS} xmlns:c="urn:{name}" '
@@ -58,14 +65,16 @@ def _wsdl(name: str, types: str, messages: str, operations: str, soap: str, styl
     )
 
 
-def _abstract(*names: str) -> str:
+def abstract(*names: str) -> str:
+    """Return operations of a port type."""
     return "".join(
         f'<operation name="{name}"><input message="c:{name}In"/><output message="c:{name}Out"/></operation>'
         for name in names
     )
 
 
-def _messages(*names: str) -> str:
+def messages(*names: str) -> str:
+    """Return the messages of operations."""
     return "".join(
         f'<message name="{name}In"><part name="body" element="c:{name}"/></message>'
         f'<message name="{name}Out"><part name="body" element="c:{name}Response"/></message>'
@@ -73,40 +82,45 @@ def _messages(*names: str) -> str:
     )
 
 
-CAMERA = _wsdl(
+CAMERA = wsdl(
     "camera",
     f'<xs:schema {_XS}><xs:import namespace="urn:camera" schemaLocation="camera.xsd"/></xs:schema>',
-    _messages("GetStatus", "AbsoluteMove"),
-    _abstract("GetStatus", "AbsoluteMove"),
+    messages("GetStatus", "AbsoluteMove"),
+    abstract("GetStatus", "AbsoluteMove"),
     "soap",
     "document",
-    "".join(_operation(name, "soap", f"urn:camera/{name}") for name in ("GetStatus", "AbsoluteMove")),
+    "".join(operation(name, "soap", f"urn:camera/{name}") for name in ("GetStatus", "AbsoluteMove")),
 )
 _SCALE_XSD = f"""<xs:schema {_XS} targetNamespace="urn:scale"><xs:complexType name="Load"><xs:sequence>
 <xs:element name="grams" type="xs:int"/><xs:element name="stable" type="xs:boolean"/></xs:sequence></xs:complexType>
 </xs:schema>"""
-SCALE = _wsdl(
+SCALE = wsdl(
     "scale",
     _SCALE_XSD,
     '<message name="GetLoadIn"><part name="channel" type="xs:short"/><part name="unit" type="xs:string"/></message>'
     '<message name="GetLoadOut"><part name="load" type="c:Load"/></message>',
-    _abstract("GetLoad"),
+    abstract("GetLoad"),
     "soap",
     "rpc",
-    _operation("GetLoad", "soap", "urn:scale/load", ' namespace="urn:scale"'),
+    operation("GetLoad", "soap", "urn:scale/load", ' namespace="urn:scale"'),
 )
 _TABLE_XSD = f"""<xs:schema {_XS} targetNamespace="urn:table" elementFormDefault="qualified">
 <xs:element name="GetAngle"><xs:complexType><xs:sequence/></xs:complexType></xs:element>
 <xs:element name="GetAngleResponse"><xs:complexType><xs:sequence><xs:element name="Angle" type="xs:float"/>
 <xs:any namespace="##other" processContents="lax" minOccurs="0" maxOccurs="unbounded"/>
 </xs:sequence></xs:complexType></xs:element></xs:schema>"""
-TABLE = _wsdl(
-    "table", _TABLE_XSD, _messages("GetAngle"), _abstract("GetAngle"), "soap12", "document",
-    _operation("GetAngle", "soap12", "urn:table/GetAngle"),
+TABLE = wsdl(
+    "table", _TABLE_XSD, messages("GetAngle"), abstract("GetAngle"), "soap12", "document",
+    operation("GetAngle", "soap12", "urn:table/GetAngle"),
 )  # fmt: skip
 _RPC = f"""<xs:schema {_XS} targetNamespace="urn:scale"><xs:element name="GetLoad"><xs:complexType><xs:sequence>
 <xs:element name="channel" type="xs:short"/><xs:element name="unit" type="xs:string"/></xs:sequence></xs:complexType>
 </xs:element></xs:schema>"""
+
+
+@cache
+def _schema(xsd: str) -> etree.XMLSchema:
+    return etree.XMLSchema(etree.fromstring(xsd.encode()))
 
 
 @dataclass
@@ -141,7 +155,10 @@ class Device:
             text = found.get(path)
             start("200 OK" if text else "404 Not Found", [("Content-Type", "text/xml")])
             return [(text or "").encode()]
-        octets = environ["wsgi.input"].read(int(environ.get("CONTENT_LENGTH") or 0))
+        length = int(environ.get("CONTENT_LENGTH") or 0)
+        octets = environ["wsgi.input"].read(length)
+        if len(octets) < length:
+            raise ConnectionError("the client has gone")
         status, body = self.respond(octets)
         media_type = "text/xml; charset=utf-8" if self.soap == SOAP_11 else "application/soap+xml; charset=utf-8"
         altered = self.alter(octets, status, media_type, body)
@@ -162,10 +179,14 @@ class Device:
         body = root.find(f"{{{self.soap}}}Body")
         payload = body[0] if body is not None and len(body) else None
         name = etree.QName(payload).localname if payload is not None else ""
-        schema = etree.XMLSchema(etree.fromstring(self.xsd.encode()))
-        if name not in self.answers or not schema.validate(payload):
+        if payload is None or not _schema(self.xsd).validate(payload):
             return self.fault("Client", "not valid")
-        return 200, self.envelope(self.answers[name])
+        inside = self.answer(name, payload)
+        return self.fault("Client", "not known") if inside is None else (200, self.envelope(inside))
+
+    def answer(self, name: str, _payload: Any) -> str | None:
+        """Return XML of the Body of the response to a valid request; None: it is refused."""
+        return self.answers.get(name)
 
     def _problem(self, root: Any) -> tuple[str, str] | None:
         """Return code and reason of the fault for a message that must not be processed."""
@@ -233,3 +254,22 @@ def table() -> Device:
         '<c:GetAngleResponse xmlns:c="urn:table"><c:Angle>1.5</c:Angle><x:More xmlns:x="urn:x"/></c:GetAngleResponse>'
     )
     return Device("table", TABLE, _TABLE_XSD, {"GetAngle": angle}, SOAP_12, secured=True)
+
+
+class _Server(socketserver.ThreadingMixIn, WSGIServer):
+    daemon_threads = True
+
+
+class _Quiet(WSGIRequestHandler):
+    def log_message(self, *_: Any) -> None:
+        pass
+
+
+@contextmanager
+def serving(device: Device) -> Iterator[str]:
+    """Serve a device; yield scheme, host and port."""
+    server = make_server("127.0.0.1", 0, device.app, _Server, _Quiet)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}"
+    server.shutdown()
+    server.server_close()

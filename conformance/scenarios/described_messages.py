@@ -1,0 +1,97 @@
+"""Messages to the operations of a WSDL, as HTTP requests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from urllib.parse import urlsplit
+
+from conformance.api.rest.interface import RestInterface
+from conformance.api.soap.envelope import envelope
+from conformance.api.soap.messages import ordinary, simple_leaves, with_text
+from conformance.api.soap.username_token import UsernameToken
+from conformance.documents.soap_services import SoapDescription, SoapOperation, SoapPort
+from conformance.documents.wsdl_pack import services_of
+from conformance.documents.xml import parse
+from conformance.documents.xml_node import Node
+from conformance.documents.xsd_shapes import Element
+from conformance.scenarios.scenario import NotPossibleError
+from conformance.transport.client import Headers
+
+
+@dataclass(frozen=True)
+class DescribedMessages:
+    """Makes messages.
+
+    Attributes:
+        found: what the WSDL describes.
+        values: texts for elements, by local name.
+        token: the user whose token each message carries, or None.
+    """
+
+    found: SoapDescription
+    values: dict[str, tuple[object, ...]] = field(default_factory=dict)
+    token: UsernameToken | None = None
+
+    @classmethod
+    def of(cls, api: RestInterface) -> DescribedMessages | None:
+        """Return it for a device; None if the device has no WSDL.
+
+        Raises:
+            NotPossibleError: the token's file cannot be used.
+            NoAnswerError: the device does not tell its time.
+        """
+        found = services_of(api.run.contract)
+        if found is None:
+            return None
+        try:
+            token = UsernameToken.of(api.run.statement.endpoints.username_token_file)
+        except (OSError, ValueError) as error:
+            raise NotPossibleError(str(error)) from error
+        if token is not None:
+            token.set_clock(api.client.send("GET", "/").response.header("date"))
+        return cls(found, api.run.statement.values, token)
+
+    def message(
+        self, port: SoapPort, node: Node | None, *more: Node, space: str = "", authorized: bool = True
+    ) -> bytes:
+        """Return a message, with further header blocks, or in another namespace than that of the port's Envelope."""
+        token = self.token if authorized else None
+        blocks = (*([token.block(space or port.envelope)] if token else ()), *more)
+        whole = envelope((node,) if node else (), blocks or None, space or port.envelope)
+        return b'<?xml version="1.0" encoding="utf-8"?>\n' + whole.written()
+
+    def usual(self, operation: SoapOperation) -> tuple[Element | None, Node | None]:
+        """Return the declaration of an operation's request, and a valid message of it; None if its Body is empty.
+
+        Raises:
+            NotPossibleError: none can be made.
+        """
+        if not operation.request:
+            return None, None
+        declared = self.found.types.shape(operation.request)
+        if declared is None:
+            raise NotPossibleError(f"no schema declares {operation.request}")
+        fault = ""
+        for optional in (False, True):
+            node = ordinary(declared, optional=optional)
+            for path, _ in simple_leaves(declared, node):
+                given = self.values.get(node.at(path).name)
+                if given:
+                    node = with_text(node, path, str(given[0]))
+            fault = self.found.types.invalid(parse(node.written()))
+            if not fault:
+                return declared, node
+        raise NotPossibleError(f"no valid message can be made for {operation.name}: {fault}")
+
+
+def target_of(port: SoapPort) -> str:
+    """Return the request target of a port: a device behind a front does not know its own scheme and host."""
+    parts = urlsplit(port.url)
+    return (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
+
+
+def fields_of(port: SoapPort, operation: SoapOperation) -> Headers:
+    """Return the header fields of a message (SOAP 1.1, 6.1.1; SOAP 1.2 Part 2, 7.5.1 and Appendix B)."""
+    if port.is_12:
+        return (("Content-Type", f'application/soap+xml; charset=utf-8; action="{operation.action}"'),)
+    return (("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", f'"{operation.action}"'))

@@ -1,0 +1,29 @@
+"""A camera that is moved over SOAP, over HTTP: a right one is not blamed, and a wrong map is refused."""
+
+import dome
+from body import Body
+from dome import Dome
+from judged_devices import judged_by_map
+from soap_devices import PASSWORD, USER, serving
+
+_NOT_DECLARED = {"agrees", "action-runs", "action-succeeds", "action-canceled", "switches"}
+
+
+def _judged(body, tmp_path, motion=dome.MAP):
+    secret = tmp_path / "user"
+    secret.write_text(f"{USER}:{PASSWORD}", encoding="utf-8")
+    api = f'wsdl = "{{url}}/dome.wsdl"\n[endpoints]\nusername_token_file = "{secret}"\n'
+    return judged_by_map(serving(Dome(body)), motion, tmp_path, api)
+
+
+def test_a_right_camera_is_not_blamed(tmp_path):
+    done, judged = _judged(Body(dome.LIMITS, noise=0.003), tmp_path)
+    assert {id_ for id_, verdict in judged.items() if verdict != "pass"} == {
+        f"motion/{one}" for one in _NOT_DECLARED
+    }, done.stdout
+
+
+def test_an_element_that_the_message_has_not_is_named(tmp_path):
+    done, _ = _judged(None, tmp_path, dome.MAP.replace('Camera = "main", Position', 'Kamera = "main", Position'))
+    assert done.returncode == 2
+    assert "POST /domePort/AbsoluteMove: AbsoluteMove has no Kamera, but Camera, Position" in done.stderr
