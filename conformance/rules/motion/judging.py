@@ -116,19 +116,12 @@ def moved_axis(leg: Leg) -> str:
 
 def stopped(leg: Leg, motion: MotionMap) -> tuple[tuple[Reading, ...], NotTested | Case | None]:
     """Return the readings from when the device must rest, or why they cannot be judged."""
-    stop, (goal, order) = motion.stop, leg.commands[:2]
+    stop, order = motion.stop, leg.commands[1]
     if stop is None or not order.accepted:
         return (), Case(holds=False, exchange=order.exchange, expected="a 2xx for a stop under way")
-    before = [one for one in usable(leg) if one.received <= order.sent]
-    if not before:
-        return (), NotTested("the state could not be read before the stop")
-    axis, here = moved_axis(leg), before[-1].values
-    left, done = abs(goal.targets[axis] - here[axis]), abs(here[axis] - leg.start[axis])
-    # A stop over a slow link reaches a fast device after it has arrived.
-    way_s = before[-1].sent - goal.answered
-    comes = done / way_s * (order.answered - before[-1].sent) if way_s > 0 else left
-    if left < comes + 4 * motion.tolerance(axis) or done < motion.tolerance(axis):
-        return (), NotTested("the device was not under way when it was stopped")
+    axis = moved_axis(leg)
+    if not leg.was_under_way(axis, motion.tolerance(axis)):
+        return (), NotTested("the device was not seen under way when it was stopped")
     due = order.sent + stop.rests_within_s + usual_s(leg.readings)
     readings = leg.after(due)
     return readings, None if len(readings) > 2 * SEVERAL else NotTested("the state could not be read after the stop")

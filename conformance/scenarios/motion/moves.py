@@ -23,6 +23,8 @@ _Part = TypeVar("_Part")
 # Of the way: so far a device has come when it is stopped, or gets another target.
 _UNDER_WAY: Final = 0.3
 _CLIENTS: Final = 4
+# A stop that met no motion, on a loaded machine, is tried again: so often in all.
+_TRIES: Final = 3
 # After a stop the device is watched for as long as the rest of its way would take: at least until so long after it
 # must rest, and at most so long in all, s.
 _AT_LEAST_S: Final = 1.5
@@ -96,25 +98,24 @@ class _Way:
     readings: list[Reading]
 
 
-def _ways(mapped: MappedDevice, effort: Effort) -> Iterator[tuple[str, float, _Way]]:
-    """Set out from one end of each axis to the other; yield axis, first end, and a move that is partly done.
+def _axes(mapped: MappedDevice, effort: Effort) -> list[str]:
+    """Return the axes that are moved one by one: at quick only the first."""
+    axes = list(mapped.motion.state.axes)
+    return axes[:1] if effort.name == "quick" else axes
 
-    At quick only the first axis is moved.
-    """
-    axes = list(mapped.motion.state.axes.items())
-    for name, axis in axes[:1] if effort.name == "quick" else axes:
-        begin, end = axis.limits
-        mapped.go("one end", {name: begin})
-        start = mapped.where()
-        command = mapped.goto({name: end})
-        part = abs(end - begin) * _UNDER_WAY
-        seen = mapped.watch(
-            command.answered + mapped.takes_s,
-            lambda so_far, name=name, begin=begin, part=part: (  # type: ignore[misc] # bound in its round
-                bool(so_far[-1].values) and abs(so_far[-1].values[name] - begin) > part
-            ),
-        )
-        yield name, begin, _Way(start, command, seen)
+
+def _way(mapped: MappedDevice, name: str) -> _Way:
+    """Set out from one end of an axis to the other; return when the move is partly done."""
+    begin, end = mapped.motion.state.axes[name].limits
+    mapped.go("one end", {name: begin})
+    start = mapped.where()
+    command = mapped.goto({name: end})
+    part = abs(end - begin) * _UNDER_WAY
+    seen = mapped.watch(
+        command.answered + mapped.takes_s,
+        lambda so_far: bool(so_far[-1].values) and abs(so_far[-1].values[name] - begin) > part,
+    )
+    return _Way(start, command, seen)
 
 
 @scenario(needs=_NEEDS, stage=Stage.MOTION)
@@ -125,13 +126,22 @@ def stops(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
 
 
 def _to_stops(mapped: MappedDevice, effort: Effort, rests_s: float) -> Iterator[Leg]:
-    for name, _, way in _ways(mapped, effort):
-        stop = mapped.stop()
-        if stop is None:
-            raise NotPossibleError("the stop names a value that the response to the move does not have")
-        until = min(mapped.due(stop), stop.answered + _AT_MOST_S)
-        seen = way.readings + mapped.watch(max(until, stop.answered + rests_s + _AT_LEAST_S))
-        yield Leg(f"a stop of {name} under way", way.start, (way.command, stop), tuple(seen), mapped.due(stop))
+    for name in _axes(mapped, effort):
+        for _ in range(_TRIES):
+            leg = _stopped(mapped, name, rests_s)
+            if leg.was_under_way(name, mapped.motion.tolerance(name)):
+                break
+        yield leg
+
+
+def _stopped(mapped: MappedDevice, name: str, rests_s: float) -> Leg:
+    way = _way(mapped, name)
+    stop = mapped.stop()
+    if stop is None:
+        raise NotPossibleError("the stop names a value that the response to the move does not have")
+    until = min(mapped.due(stop), stop.answered + _AT_MOST_S)
+    seen = way.readings + mapped.watch(max(until, stop.answered + rests_s + _AT_LEAST_S))
+    return Leg(f"a stop of {name} under way", way.start, (way.command, stop), tuple(seen), mapped.due(stop))
 
 
 @scenario(needs=_NEEDS, stage=Stage.MOTION)
@@ -152,8 +162,9 @@ def _need_positions(mapped: MappedDevice) -> None:
 
 
 def _to_new_targets(mapped: MappedDevice, effort: Effort) -> Iterator[Leg]:
-    for name, begin, way in _ways(mapped, effort):
-        second = mapped.goto({name: begin})
+    for name in _axes(mapped, effort):
+        way = _way(mapped, name)
+        second = mapped.goto({name: mapped.motion.state.axes[name].limits[0]})
         last = second if second.accepted else way.command
         seen = way.readings + mapped.follow(last)
         seen += mapped.watch(max(mapped.clock.now(), way.command.answered + mapped.takes_s) + _LONGER_S)

@@ -86,6 +86,21 @@ class Leg:
         """Return the usable readings that were requested after a moment."""
         return tuple(one for one in self.readings if one.sent >= moment and one.values)
 
+    def was_under_way(self, axis: str, tolerance: float) -> bool:
+        """Return whether the second command met the device between start and target of the first, along an axis.
+
+        Over a slow link it reaches a fast device after that has arrived.
+        """
+        goal, order = self.commands[:2]
+        before = [one for one in self.readings if one.values and one.received <= order.sent]
+        if not before:
+            return False
+        last = before[-1]
+        left, done = abs(goal.targets[axis] - last.values[axis]), abs(last.values[axis] - self.start[axis])
+        since_s = last.sent - goal.answered
+        comes = done / since_s * (order.answered - last.sent) if since_s > 0 else left
+        return left >= comes + 4 * tolerance and done >= tolerance
+
 
 @dataclass(frozen=True)
 class Drive:
