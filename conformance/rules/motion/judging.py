@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from statistics import median
 
@@ -10,6 +11,10 @@ from conformance.scenarios.motion.trace import SEVERAL, Command, Drive, Leg, Rea
 from conformance.scenarios.rule import Case, NotTested, Outcome
 from conformance.statement.motion_map import MotionMap
 
+# A reading that takes that many times as long as usual is late.
+_LATE = 3
+# A velocity is measured over so long at least, s.
+_LAPSE_S = 0.15
 #: The scenarios in which a device moves.
 ALL = (
     moves.targets, moves.clamped_targets, moves.stops, moves.new_targets, moves.many_commands, moves.repeated,
@@ -67,6 +72,9 @@ def driven(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
     if refused is not None:
         yield Case(holds=False, exchange=refused.exchange, expected=f"a 2xx for {drive.what}")
         return
+    if not drive.was_kept(motion.velocity.hold_s):
+        yield NotTested("over this link the device was not driven on within its hold time")
+        return
     first = drive.commands[0]
     seen = [one for one in drive.under_way if one.sent >= first.answered + motion.velocity.settle_s]
     for name, wanted in drive.wanted.items():
@@ -89,13 +97,23 @@ def measured(readings: list[Reading], name: str, motion: MotionMap) -> float | N
     if speed is None or not speed.of:
         speeds = [one.speeds[name] for one in readings if one.speeds]
         return median(speeds) if len(speeds) >= SEVERAL else None
-    seen = [one for one in readings if one.values]
-    if len(seen) < 2 * SEVERAL:
+    # When a position was read of which the response came late, nobody knows.
+    late_s = _LATE * usual_s(readings)
+    seen = [
+        ((one.sent + one.received) / 2, one.values[speed.of])
+        for one in readings
+        if one.values and one.received - one.sent <= late_s
+    ]
+    if len(seen) < 2 * SEVERAL or seen[-1][0] - seen[0][0] < _LAPSE_S:
         return None
-    first, last = seen[:SEVERAL], seen[-SEVERAL:]
-    lapse_s = (last[1].sent + last[1].received - first[1].sent - first[1].received) / 2
-    way = middle_of(last, speed.of) - middle_of(first, speed.of)
-    return way / lapse_s / speed.scale if lapse_s > 0 else None
+    # The median of the slopes between readings (Theil and Sen), of which no single reading decides anything.
+    half_s = (seen[-1][0] - seen[0][0]) / 2
+    slopes = [
+        (there - here) / (later - first)
+        for (first, here), (later, there) in itertools.combinations(seen, 2)
+        if later - first >= half_s
+    ]
+    return median(slopes) / speed.scale
 
 
 def usual_s(readings: Sequence[Reading]) -> float:

@@ -23,8 +23,8 @@ _Part = TypeVar("_Part")
 # Of the way: so far a device has come when it is stopped, or gets another target.
 _UNDER_WAY: Final = 0.3
 _CLIENTS: Final = 4
-# A stop that met no motion, on a loaded machine, is tried again: so often in all.
-_TRIES: Final = 3
+#: What a slow link or a loaded machine has spoilt is tried again: so often in all.
+TRIES: Final = 3
 # After a stop the device is watched for as long as the rest of its way would take: at least until so long after it
 # must rest, and at most so long in all, s.
 _AT_LEAST_S: Final = 1.5
@@ -127,7 +127,7 @@ def stops(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
 
 def _to_stops(mapped: MappedDevice, effort: Effort, rests_s: float) -> Iterator[Leg]:
     for name in _axes(mapped, effort):
-        for _ in range(_TRIES):
+        for _ in range(TRIES):
             leg = _stopped(mapped, name, rests_s)
             if leg.was_under_way(name, mapped.motion.tolerance(name)):
                 break

@@ -122,6 +122,14 @@ class Drive:
     end: Command | None
     after: tuple[Reading, ...]
 
+    def was_kept(self, hold_s: float | None) -> bool:
+        """Return whether each command met the device within its hold time after the one before; no hold time: always.
+
+        Over a slow link it may rest in between, rightly.
+        """
+        met = [*(one.answered for one in self.commands[1:]), *(one.received for one in self.under_way[-1:])]
+        return hold_s is None or all(later - one.sent <= hold_s for one, later in zip(self.commands, met, strict=False))
+
 
 @dataclass(frozen=True)
 class Told:

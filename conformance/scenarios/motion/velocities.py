@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from conformance.scenarios.motion.mapped import MappedDevice, Position
-from conformance.scenarios.motion.moves import beyond, recorded
+from conformance.scenarios.motion.moves import TRIES, beyond, recorded
 from conformance.scenarios.motion.trace import Drive, Reading
 from conformance.scenarios.scenario import NotDeclaredError, scenario
 from conformance.scenarios.stage import Need, Stage
@@ -94,7 +94,7 @@ def _drive(
     let_go_s: float | None = None,
     more: int = 0,
 ) -> Drive:
-    """Drive at a velocity.
+    """Drive at a velocity; again, if over a slow link the device could not be driven on within its hold time.
 
     Args:
         mapped: the device.
@@ -104,6 +104,16 @@ def _drive(
         let_go_s: its hold time, if nothing is sent after the drive; None: velocity 0 is.
         more: how often the velocity is sent once more at the end.
     """
+    for _ in range(TRIES):
+        drive = _driven(mapped, what, speeds, ends, let_go_s, more)
+        if drive.was_kept(mapped.drives.hold_s):
+            break
+    return drive
+
+
+def _driven(
+    mapped: MappedDevice, what: str, speeds: Position, ends: Position | None, let_go_s: float | None, more: int
+) -> Drive:
     given = mapped.drives
     mapped.come_to_rest()
     every_s = min(_KEPT_S, given.hold_s / _KEPT) if given.hold_s else _KEPT_S
