@@ -11,10 +11,10 @@ from conformance.scenarios.motion.trace import SEVERAL, Command, Drive, Leg, Rea
 from conformance.scenarios.rule import Case, NotTested, Outcome
 from conformance.statement.motion_map import MotionMap
 
-# A reading that takes that many times as long as usual is late.
-_LATE = 3
+# A reading is late if it takes that many times as long as usual, and more than this share of the drive.
+_LATE, _SHARE = 3, 0.1
 # A velocity is measured over so long at least, s.
-_LAPSE_S = 0.15
+_LAPSE_S = 0.1
 #: The scenarios in which a device moves.
 ALL = (
     moves.targets, moves.clamped_targets, moves.stops, moves.new_targets, moves.many_commands, moves.repeated,
@@ -98,7 +98,7 @@ def measured(readings: list[Reading], name: str, motion: MotionMap) -> float | N
         speeds = [one.speeds[name] for one in readings if one.speeds]
         return median(speeds) if len(speeds) >= SEVERAL else None
     # When a position was read of which the response came late, nobody knows.
-    late_s = _LATE * usual_s(readings)
+    late_s = max(_LATE * usual_s(readings), _SHARE * (readings[-1].sent - readings[0].sent)) if readings else 0.0
     seen = [
         ((one.sent + one.received) / 2, one.values[speed.of])
         for one in readings
