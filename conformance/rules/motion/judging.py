@@ -15,6 +15,8 @@ from conformance.statement.motion_map import MotionMap
 _LATE, _SHARE = 3, 0.1
 # A velocity is measured over so long at least, s.
 _LAPSE_S = 0.1
+# And where it is seen to be renewed, s.
+_RENEWED_S = 0.35
 #: The scenarios in which a device moves.
 ALL = (
     moves.targets, moves.clamped_targets, moves.stops, moves.new_targets, moves.many_commands, moves.repeated,
@@ -88,6 +90,24 @@ def driven(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
             f"{name} at {wanted:.4g} per second {motion.velocity.settle_s:g} s after the response ({drive.what})",
             observed=f"{found:.4g}",
             cause=name,
+        )
+        yield from _renewed(drive, name, wanted, motion)
+
+
+def _renewed(drive: Drive, name: str, wanted: float, motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether a velocity that was sent again and again outlasts the hold time of the first command."""
+    hold_s = motion.velocity.hold_s if motion.velocity else None
+    first = drive.commands[0]
+    late = [one for one in drive.under_way if hold_s and one.sent >= first.answered + hold_s]
+    long_enough = bool(late) and late[-1].sent - late[0].sent >= _RENEWED_S
+    found = measured(late, name, motion) if wanted and long_enough else None
+    if found is not None:
+        yield Case(
+            abs(found - wanted) <= motion.speed_tolerance(name),
+            drive.commands[-1].exchange,
+            f"{name} still at {wanted:.4g} per second {hold_s:g} s after the first of several commands ({drive.what})",
+            observed=f"{found:.4g}",
+            cause=f"{name} renewed",
         )
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Final
 
 from conformance.scenarios.motion.mapped import MappedDevice, Position
 from conformance.scenarios.motion.moves import TRIES, beyond, recorded
-from conformance.scenarios.motion.trace import Drive, Reading
+from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.scenario import NotDeclaredError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.verdict.effort import Effort
@@ -17,6 +18,10 @@ _NEEDS: Final = (Need.REST, Need.MOTION)
 MEASURED_S: Final = 0.5
 # Of the limit: velocities.
 _SHARES: Final = (1.0, 0.4)
+# A slow drive lasts longer than the hold time, up to this, so that a renewed command is seen to last, s.
+_LONGEST_HOLD_S: Final = 2.0
+# After this part of the hold time a command that must be refused follows the last one.
+_REFUSED_AT: Final = 0.6
 # A device is told its velocity that often within its hold time, at least every so many s.
 _KEPT: Final = 3
 _KEPT_S: Final = 0.1
@@ -31,7 +36,7 @@ def velocities(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
     At quick there at one limit, and back slowly.
     """
     return recorded(
-        _drive(mapped, f"{name} {speed:g}", {name: speed})
+        _drive(mapped, f"{name} {speed:g}", {name: speed}, longer=abs(speed) < max(map(abs, axis.limits)) / 2)
         for name, axis in mapped.drives.axes.items()
         for speed in _speeds(list(_there_and_back(mapped, axis.limits, axis.of)), effort)
     )
@@ -73,6 +78,12 @@ def _let_go(mapped: MappedDevice, effort: Effort, hold_s: float) -> Iterator[Dri
                 # An odd number of commands and an even one: a watchdog may work after every other command.
                 yield _drive(mapped, f"{name} {limit:g}, let go", {name: limit}, let_go_s=hold_s, more=more % 2)
                 more += 1
+    name, axis = axes[0]
+    limit = next(_there_and_back(mapped, axis.limits, axis.of))
+    if mapped.drives.beyond_limits == "refused":
+        refused = {name: next(value for _, end, value in beyond({name: axis}) if end == limit)}
+        what = f"{name} {limit:g}, let go, with {name} {refused[name]:g} after it, which must be refused"
+        yield _drive(mapped, what, {name: limit}, let_go_s=hold_s, refused=refused)
 
 
 def _there_and_back(mapped: MappedDevice, limits: tuple[float, float], of: str) -> Iterator[float]:
@@ -93,6 +104,8 @@ def _drive(
     *,
     let_go_s: float | None = None,
     more: int = 0,
+    longer: bool = False,
+    refused: Position | None = None,
 ) -> Drive:
     """Drive at a velocity; again, if over a slow link the device could not be driven on within its hold time.
 
@@ -103,31 +116,44 @@ def _drive(
         ends: what the device must take instead.
         let_go_s: its hold time, if nothing is sent after the drive; None: velocity 0 is.
         more: how often the velocity is sent once more at the end.
+        longer: whether the drive outlasts the hold time.
+        refused: velocities that the device must refuse, sent after the last command; None: none are.
     """
+    wanted = {**dict.fromkeys(mapped.drives.axes, 0.0), **speeds, **(ends or {})}
     for _ in range(TRIES):
-        drive = _driven(mapped, what, speeds, ends, let_go_s, more)
+        commands, readings = _kept_up(mapped, speeds, longer=longer)
+        commands += [mapped.drive(speeds) for _ in range(more)]
+        drive = _ended(mapped, Drive(what, wanted, tuple(commands), tuple(readings), None, ()), let_go_s, refused)
         if drive.was_kept(mapped.drives.hold_s):
             break
     return drive
 
 
-def _driven(
-    mapped: MappedDevice, what: str, speeds: Position, ends: Position | None, let_go_s: float | None, more: int
-) -> Drive:
+def _kept_up(mapped: MappedDevice, speeds: Position, *, longer: bool) -> tuple[list[Command], list[Reading]]:
+    """Command velocities again and again for as long as they are measured."""
     given = mapped.drives
     mapped.come_to_rest()
     every_s = min(_KEPT_S, given.hold_s / _KEPT) if given.hold_s else _KEPT_S
     commands, readings = [mapped.drive(speeds)], list[Reading]()
-    until = commands[0].answered + given.settle_s + MEASURED_S
-    while mapped.clock.now() < until and commands[-1].accepted:
+    hold_s = given.hold_s or 0.0
+    lasts_s = max(given.settle_s, hold_s if longer and hold_s <= _LONGEST_HOLD_S else 0.0) + MEASURED_S
+    while mapped.clock.now() < commands[0].answered + lasts_s and commands[-1].accepted:
         if mapped.clock.now() >= commands[-1].sent + every_s:
             commands.append(mapped.drive(speeds))
         readings.append(mapped.read())
-    commands += [mapped.drive(speeds) for _ in range(more)]
-    end = None if let_go_s is not None else mapped.drive({})
-    last = end or commands[-1]
-    after = mapped.watch(last.answered + (let_go_s or 0.0) + given.settle_s + _REST_S)
+    return commands, readings
+
+
+def _ended(mapped: MappedDevice, drive: Drive, let_go_s: float | None, refused: Position | None) -> Drive:
+    """End a drive by velocity 0, or let the device go; return it with what came after."""
+    end = mapped.drive({}) if let_go_s is None else None
+    last = end or drive.commands[-1]
+    until = last.answered + (let_go_s or 0.0) + mapped.drives.settle_s + _REST_S
+    after: list[Reading] = []
+    if refused is not None and let_go_s is not None:
+        after = mapped.watch(last.answered + _REFUSED_AT * let_go_s)
+        mapped.drive(refused)
+    after += mapped.watch(until)
     if end is None:
         mapped.stop()
-    wanted = {**dict.fromkeys(given.axes, 0.0), **speeds, **(ends or {})}
-    return Drive(what, wanted, tuple(commands), tuple(readings), end, tuple(after))
+    return replace(drive, end=end, after=tuple(after))

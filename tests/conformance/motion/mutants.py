@@ -301,6 +301,10 @@ def velocity_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
         body.drives = getattr(body, "drives", 0) + 1  # type: ignore[attr-defined]
         return speeds, hold_s if body.drives % 2 else 60.0  # type: ignore[attr-defined]
 
+    def deaf(body: Body, speeds: Position, hold_s: float) -> tuple[Position, float] | None:
+        again = speeds == body.speeds and body.now() < body.held_until
+        return None if again else (speeds, hold_s)
+
     for axis in axes:
         yield f"velocity-slow:{axis}", times(0.7, axis)
         yield f"velocity-fast:{axis}", times(1.3, axis)
@@ -315,6 +319,7 @@ def velocity_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
     yield "watchdog-none", changed(lambda _, speeds, hold_s: (speeds, 60.0))
     yield "watchdog-late", changed(lambda _, speeds, hold_s: (speeds, 2.5 * hold_s))
     yield "watchdog-half", changed(half)
+    yield "not-renewed", changed(deaf)
     yield "hold-short", changed(lambda _, speeds, hold_s: (speeds, 0.3 * hold_s))
 
 
