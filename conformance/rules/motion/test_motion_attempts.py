@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from conformance.rules.motion.judging import ALL, at, driven, legs_of, off, reached, usable
 from conformance.scenarios.motion.attempts import attempts_at_rest
 from conformance.scenarios.motion.moves import clamped_targets
-from conformance.scenarios.motion.trace import SEVERAL, Drive, Leg, Quiet, Tried, is_refusal, is_soap
+from conformance.scenarios.motion.trace import SEVERAL, Drive, Leg, Quiet, Tried, fastest, is_refusal, is_soap
 from conformance.scenarios.motion.velocities import clamped_velocities
 from conformance.scenarios.rule import Case, NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
@@ -20,7 +20,8 @@ def _moved(quiet: Quiet, motion: MotionMap) -> str | None:
     if len(seen) < SEVERAL:
         return None
     windows = (seen[index : index + SEVERAL] for index in range(len(seen) - SEVERAL + 1))
-    return next(filter(None, (off(at(window, motion), quiet.where, motion) for window in windows)), "")
+    elsewhere = next(filter(None, (off(at(window, motion), quiet.where, motion) for window in windows)), "")
+    return elsewhere or fastest(seen, motion)
 
 
 def _nothing_moved(trace: Quiet, motion: MotionMap, *kinds: str) -> Iterator[Outcome]:

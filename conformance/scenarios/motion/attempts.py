@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.motion.moves import beyond
-from conformance.scenarios.motion.trace import Quiet, Tried
+from conformance.scenarios.motion.trace import Quiet, Tried, fastest
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.statement.motion_map import Axis, Goto, Speed, Velocity
@@ -57,7 +57,8 @@ def _effect_s(mapped: MappedDevice) -> float:
 
 
 def _moved(mapped: MappedDevice, quiet: Quiet) -> bool:
-    return any(one.values and not mapped.is_near(one.values, quiet.where) for one in quiet.readings)
+    elsewhere = any(one.values and not mapped.is_near(one.values, quiet.where) for one in quiet.readings)
+    return elsewhere or bool(fastest(quiet.readings, mapped.motion))
 
 
 def _tries(mapped: MappedDevice) -> Iterator[Callable[[], Tried]]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
 
+from conformance.statement.motion_map import MotionMap
 from conformance.transport.exchange import Exchange
 
 #: So many readings in a row show where a device is, whatever one of them says.
@@ -194,6 +195,17 @@ class Quiet:
     tried: tuple[Tried, ...]
     readings: tuple[Reading, ...]
     alone: tuple[Quiet, ...] = ()
+
+
+def fastest(readings: Sequence[Reading], motion: MotionMap) -> str:
+    """Return a measured velocity that is not zero in some readings in a row; empty if there is none."""
+    seen = [one.speeds for one in readings if one.speeds]
+    for window in (seen[index : index + SEVERAL] for index in range(len(seen) - SEVERAL + 1)):
+        for name in window[0]:
+            speed = median(one[name] for one in window)
+            if abs(speed) > motion.speed_tolerance(name):
+                return f"{name} at {speed:.4g} per second"
+    return ""
 
 
 def is_refusal(exchange: Exchange) -> bool:
