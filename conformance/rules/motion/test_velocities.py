@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from conformance.rules.motion.judging import at, driven, measured, off, usual_s
-from conformance.scenarios.motion.trace import SEVERAL, Drive, Reading
+from conformance.scenarios.motion.trace import SEVERAL, Drive, Reading, fastest
 from conformance.scenarios.motion.velocities import let_go, velocities
 from conformance.scenarios.rule import Case, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
@@ -28,17 +28,7 @@ def _at_rest(readings: list[Reading], motion: MotionMap) -> str | None:
     if len(seen) < 2 * SEVERAL:
         return None
     moved = off(at(seen[-SEVERAL:], motion), at(seen[:SEVERAL], motion), motion)
-    fast = {name: measured(readings, name, motion) for name, one in _measured_axes(motion) if one}
-    shown = [f"{name} at {value:.4g} per second" for name, value in fast.items() if _is_fast(value, name, motion)]
-    return moved or ", ".join(shown)
-
-
-def _measured_axes(motion: MotionMap) -> list[tuple[str, str]]:
-    return [(name, one.at) for name, one in motion.velocity.axes.items()] if motion.velocity else []
-
-
-def _is_fast(value: float | None, name: str, motion: MotionMap) -> bool:
-    return value is not None and abs(value) > motion.speed_tolerance(name)
+    return moved or fastest(readings, motion)
 
 
 @rule("motion/velocity-stop", on=(velocities,))
