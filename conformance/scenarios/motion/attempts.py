@@ -25,7 +25,7 @@ _READ_S: Final = 0.03
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.STANDSTILL)
 def attempts_at_rest(mapped: MappedDevice) -> Quiet:
     """At rest, send what must move nothing, watch once, and if the device moves, try each again alone."""
-    mapped.bring_home()
+    _settle(mapped)
     tries = list(_tries(mapped))
     quiet = _quiet(mapped, tries)
     if not _moved(mapped, quiet):
@@ -33,12 +33,19 @@ def attempts_at_rest(mapped: MappedDevice) -> Quiet:
     alone: list[Quiet] = []
     try:
         for one in tries:
-            mapped.bring_home()
+            _settle(mapped)
             alone.append(_quiet(mapped, [one]))
         mapped.bring_home()
     except (NoAnswerError, NotPossibleError) as error:
         raise PartialTraceError(replace(quiet, alone=tuple(alone))) from error
     return replace(quiet, alone=tuple(alone))
+
+
+def _settle(mapped: MappedDevice) -> None:
+    """Bring the device home, and to rest there: one that has arrived may still turn."""
+    mapped.bring_home()
+    if mapped.motion.velocity is not None:
+        mapped.come_to_rest()
 
 
 def _quiet(mapped: MappedDevice, tries: list[Callable[[], Tried]]) -> Quiet:

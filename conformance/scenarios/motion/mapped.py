@@ -9,7 +9,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.scenarios.motion.binding import Binding, JsonBinding, Made
 from conformance.scenarios.motion.templates import NoValueError, at, filled, numbers_at, seconds_of
-from conformance.scenarios.motion.trace import SEVERAL, Command, Leg, Reading, middle_of
+from conformance.scenarios.motion.trace import SEVERAL, Command, Leg, Reading, fastest, middle_of
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.motion_map import Goto, MotionMap, Switch, Velocity, names_in
 from conformance.transport.exchange import Exchange
@@ -293,8 +293,8 @@ class MappedDevice:
         until = self.clock.now() + _RESTS_S
         while True:
             before = self.where()
-            self.watch(self.clock.now() + STAYS_S)
-            if self.is_near(self.where(), before):
+            seen = self.watch(self.clock.now() + STAYS_S)
+            if self.is_near(self.where(), before) and not fastest(seen, self.motion):
                 return
             if self.clock.now() > until:
                 raise NotPossibleError("the device does not come to rest")
