@@ -20,7 +20,6 @@ WRONG = {
     "last-of-many": ("arm", "dropped@third"),
     "repeated": ("arm", "short:pan"),
     "beyond-limits": ("rover", "beyond:x"),
-    "fresh": ("arm", "starts-late"),
     "velocity": ("rover", "velocity-slow:x"),
     "velocity-stop": ("rover", "velocity-stop-creeps"),
     "hold": ("rover", "hold-short"),
