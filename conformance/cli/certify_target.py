@@ -73,11 +73,12 @@ def _described(
     where = msgspec.structs.replace(endpoints_of(statement) if statement else Endpoints(), **given)
     overlays = tuple(options["overlays"]) or (api.overlays if api else ())
     base_url = options["base_url"] or (api.base_url if api else None)
+    soap = is_wsdl(source) or source in {options["wsdl"], api.wsdl if api else None}
     try:
         # Where an API key goes, the description may say, so that it is read without one.
         connection = connection_of(where if where.api_key else msgspec.structs.replace(where, api_key_file=None))
         moves = statement is not None and has_motion_map(statement)
-        if is_wsdl(source) or source in {options["wsdl"], api.wsdl if api else None}:
+        if soap:
             contract, where, remarks = soap_contract(source, base_url, where, connection, options["out"], moves=moves)
         else:
             contract, where, remarks = described_contract(
@@ -88,6 +89,8 @@ def _described(
     options["remarks"] = remarks
     declared = load_statement(statement, contract) if statement else empty_statement(contract)
     _check_map(declared, contract)
+    if soap and declared.motion_map is not None:
+        _check_messages(declared.motion_map, contract)
     where = keyed(where, contract.openapi)
     return _apply(msgspec.structs.replace(declared, endpoints=where), options, contract), contract
 
@@ -106,8 +109,6 @@ def _check_map(declared: Statement, contract: Contract) -> None:
                 f"[motion] names {call!r}, which the description does not have"
                 + (f"; did you mean {near[0]!r}?" if near else "")
             )
-    if declared.motion_map is not None and declared.motion_map.calls:
-        _check_messages(declared.motion_map, contract)
 
 
 def _check_messages(motion: MotionMap, contract: Contract) -> None:
