@@ -120,7 +120,9 @@ def _picture(move: Mapping[str, Any], named: Iterable[str], ranges: Mapping[str,
     for name in _axes(readings, "speeds" if is_drive else "values") or _axes(readings, "values"):
         key = "speeds" if name in readings[0].get("speeds", {}) else "values"
         seen = [((one["sent"] + one["received"]) / 2, one[key][name]) for one in readings if name in one.get(key, {})]
-        lines.append(_line(name, [(x_of(moment), value) for moment, value in seen], wanted, _LEAST * ranges[name]))
+        # A velocity is no position, even where both go by one name.
+        aims = [] if is_drive and key == "values" else wanted
+        lines.append(_line(name, [(x_of(moment), value) for moment, value in seen], aims, _LEAST * ranges[name]))
     return Picture(
         what=move["what"],
         lines=tuple(filter(None, lines)),
