@@ -100,8 +100,7 @@ def stop_rests(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a stop under way stops the device in time, before its target."""
     if motion.stop is None:
         yield _NO_STOP
-    for leg in trace:
-        readings, unusable = stopped(leg, motion)
+    for leg, readings, unusable in stopped(trace, motion):
         if unusable is not None:
             yield unusable
             continue
@@ -127,8 +126,7 @@ def stop_lasts(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a device that was stopped stays where it is, and does not resume its way."""
     if motion.stop is None:
         yield _NO_STOP
-    for leg in trace:
-        readings, unusable = stopped(leg, motion)
+    for leg, readings, unusable in stopped(trace, motion):
         if unusable is None:
             where, last = at(readings[:SEVERAL], motion), at(readings[-SEVERAL:], motion)
             moved = off(last, where, motion)

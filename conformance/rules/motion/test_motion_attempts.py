@@ -63,8 +63,10 @@ def _refused(tried: Iterable[Tried], *statuses: int) -> Iterator[Outcome]:
 def beyond_limits(trace: Quiet | tuple[Leg, ...] | tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a target or a velocity beyond the limits is refused or clamped, as the map says."""
     if not isinstance(trace, Quiet):
+        yield from driven(tuple(one for one in trace if isinstance(one, Drive)), motion)
         for one in trace:
-            yield from driven(one, motion) if isinstance(one, Drive) else reached(one, one.commands[-1], motion)
+            if isinstance(one, Leg):
+                yield from reached(one, one.commands[-1], motion)
         return
     if all(one is None or one.beyond_limits == "undefined" for one in (motion.goto, motion.velocity)):
         yield NotClaimed("the map does not say what becomes of a target beyond the limits")

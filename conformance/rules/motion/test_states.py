@@ -88,8 +88,7 @@ def action_canceled(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outco
     if action is None or not action.canceled:
         yield _NO_ACTION
         return
-    for leg in trace:
-        readings, unusable = stopped(leg, motion)
+    for leg, readings, unusable in stopped(trace, motion):
         if isinstance(unusable, NotTested):
             yield unusable
         elif readings:

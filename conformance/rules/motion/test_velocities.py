@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
-from conformance.rules.motion.judging import at, driven, measured, off, usual_s
-from conformance.scenarios.motion.trace import SEVERAL, Drive, Reading, fastest
+from conformance.rules.motion.judging import at, driven, is_each_late, measured, must_rest_from, off, went_on
+from conformance.scenarios.motion.trace import SEVERAL, Command, Drive, Reading, fastest, usual_s
 from conformance.scenarios.motion.velocities import let_go, velocities
 from conformance.scenarios.rule import Case, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
@@ -18,8 +19,7 @@ _STILL_DRIVES = 0.5
 @rule("motion/velocity", on=(velocities,))
 def velocity(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the device drives at a velocity within its limits."""
-    for drive in trace:
-        yield from driven(drive, motion)
+    yield from driven(trace, motion)
 
 
 def _at_rest(readings: list[Reading], motion: MotionMap) -> str | None:
@@ -34,15 +34,26 @@ def _at_rest(readings: list[Reading], motion: MotionMap) -> str | None:
 @rule("motion/velocity-stop", on=(velocities,))
 def stopped(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether velocity 0 brings the device to rest in time."""
-    for drive in trace:
-        if motion.velocity is None or drive.end is None:
-            continue
-        if not drive.end.accepted:
-            yield Case(holds=False, exchange=drive.end.exchange, expected=f"a 2xx for velocity 0 after {drive.what}")
-            continue
-        within_s = motion.velocity.settle_s + usual_s(drive.after)
-        moved = _at_rest([one for one in drive.after if one.sent >= drive.end.sent + within_s], motion)
-        yield from _rests(moved, drive, f"rest {motion.velocity.settle_s:g} s after velocity 0 ({drive.what})")
+    if motion.velocity is None:
+        return
+    for _, group in itertools.groupby(trace, key=lambda drive: drive.what):
+        ended = [(drive, drive.end) for drive in group if drive.end is not None]
+        excused = not is_each_late([(end, drive.readings) for drive, end in ended])
+        for drive, end in ended:
+            yield from _ended(drive, end, motion.velocity.settle_s, motion, excused=excused)
+
+
+def _ended(drive: Drive, end: Command, settle_s: float, motion: MotionMap, *, excused: bool) -> Iterator[Outcome]:
+    if not end.accepted:
+        yield Case(holds=False, exchange=end.exchange, expected=f"a 2xx for velocity 0 after {drive.what}")
+        return
+    due = must_rest_from(end, drive.readings, excused=excused) + settle_s
+    moved = _at_rest([one for one in drive.after if one.sent >= due], motion)
+    if not excused and not moved:
+        axes = motion.velocity.axes if motion.velocity else {}
+        speeds = {axes[name].of: speed * axes[name].scale for name, speed in drive.wanted.items() if axes[name].of}
+        moved = went_on(end, drive.readings, speeds, settle_s, motion) or moved
+    yield from _rests(moved, drive, f"rest {settle_s:g} s after velocity 0 ({drive.what})")
 
 
 def _rests(moved: str | None, drive: Drive, expected: str) -> Iterator[Outcome]:

@@ -15,6 +15,10 @@ from conformance.transport.exchange import Exchange
 
 #: So many readings in a row show where a device is, whatever one of them says.
 SEVERAL = 3
+#: A response is late that takes so many times as long as a reading usually does,
+LATE = 3
+# and at least so long, s.
+_LATE_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,10 @@ class Command:
         """Whether the device refused it."""
         return is_refusal(self.exchange)
 
+    def was_late(self, readings: Sequence[Reading]) -> bool:
+        """Return whether its response came late, compared with readings: link or device held it back."""
+        return self.answered - self.sent > max(_LATE_S, LATE * usual_s(readings))
+
 
 @dataclass(frozen=True)
 class Leg:
@@ -87,10 +95,11 @@ class Leg:
         """Return the usable readings that were requested after a moment."""
         return tuple(one for one in self.readings if one.sent >= moment and one.values)
 
-    def was_under_way(self, axis: str, tolerance: float) -> bool:
+    def was_under_way(self, axis: str, tolerance: float, until: float | None = None) -> bool:
         """Return whether the second command met the device between start and target of the first, along an axis.
 
-        Over a slow link it reaches a fast device after that has arrived.
+        Over a slow link it reaches a fast device after that has arrived. ``until``: when it met the device at the
+        latest, if not when it was answered.
         """
         goal, order = self.commands[:2]
         before = [one for one in self.readings if one.values and one.received <= order.sent]
@@ -99,7 +108,7 @@ class Leg:
         last = before[-1]
         left, done = abs(goal.targets[axis] - last.values[axis]), abs(last.values[axis] - self.start[axis])
         since_s = last.sent - goal.answered
-        comes = done / since_s * (order.answered - last.sent) if since_s > 0 else left
+        comes = done / since_s * ((until or order.answered) - last.sent) if since_s > 0 else left
         return left >= comes + 4 * tolerance and done >= tolerance
 
 
@@ -122,6 +131,11 @@ class Drive:
     under_way: tuple[Reading, ...]
     end: Command | None
     after: tuple[Reading, ...]
+
+    @property
+    def readings(self) -> tuple[Reading, ...]:
+        """All readings."""
+        return self.under_way + self.after
 
     def was_kept(self, hold_s: float | None) -> bool:
         """Return whether each command met the device within its hold time after the one before; no hold time: always.
@@ -195,6 +209,11 @@ class Quiet:
     tried: tuple[Tried, ...]
     readings: tuple[Reading, ...]
     alone: tuple[Quiet, ...] = ()
+
+
+def usual_s(readings: Sequence[Reading]) -> float:
+    """Return how long a reading takes, by the median, s."""
+    return median(one.received - one.sent for one in readings) if readings else 0.0
 
 
 def fastest(readings: Sequence[Reading], motion: MotionMap) -> str:

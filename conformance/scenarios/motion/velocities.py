@@ -36,9 +36,12 @@ def velocities(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
     At quick there at one limit, and back slowly.
     """
     return recorded(
-        _drive(mapped, f"{name} {speed:g}", {name: speed}, longer=abs(speed) < max(map(abs, axis.limits)) / 2)
+        drive
         for name, axis in mapped.drives.axes.items()
         for speed in _speeds(list(_there_and_back(mapped, axis.limits, axis.of)), effort)
+        for drive in _drives(
+            mapped, f"{name} {speed:g}", {name: speed}, longer=abs(speed) < max(map(abs, axis.limits)) / 2
+        )
     )
 
 
@@ -54,9 +57,10 @@ def clamped_velocities(mapped: MappedDevice) -> tuple[Drive, ...]:
     if mapped.drives.beyond_limits != "clamped":
         raise NotDeclaredError("the map does not say that velocities beyond the limits are clamped")
     return recorded(
-        _drive(mapped, f"{name} {value:g}, beyond its limit", {name: value}, {name: limit})
+        drive
         for name, limit, value in beyond(mapped.drives.axes)
         if limit
+        for drive in _drives(mapped, f"{name} {value:g}, beyond its limit", {name: value}, {name: limit})
     )
 
 
@@ -76,14 +80,15 @@ def _let_go(mapped: MappedDevice, effort: Effort, hold_s: float) -> Iterator[Dri
         for name, axis in axes[:1] if effort.name == "quick" else axes:
             for limit in _there_and_back(mapped, axis.limits, axis.of):
                 # An odd number of commands and an even one: a watchdog may work after every other command.
-                yield _drive(mapped, f"{name} {limit:g}, let go", {name: limit}, let_go_s=hold_s, more=more % 2)
+                what = f"{name} {limit:g}, let go"
+                yield from _drives(mapped, what, {name: limit}, let_go_s=hold_s, more=more % 2)
                 more += 1
     name, axis = axes[0]
     limit = next(_there_and_back(mapped, axis.limits, axis.of))
     if mapped.drives.beyond_limits == "refused":
         refused = {name: next(value for _, end, value in beyond({name: axis}) if end == limit)}
         what = f"{name} {limit:g}, let go, with {name} {refused[name]:g} after it, which must be refused"
-        yield _drive(mapped, what, {name: limit}, let_go_s=hold_s, refused=refused)
+        yield from _drives(mapped, what, {name: limit}, let_go_s=hold_s, refused=refused)
 
 
 def _there_and_back(mapped: MappedDevice, limits: tuple[float, float], of: str) -> Iterator[float]:
@@ -96,7 +101,7 @@ def _there_and_back(mapped: MappedDevice, limits: tuple[float, float], of: str) 
     yield from filter(None, (greatest, least) if ahead else (least, greatest))
 
 
-def _drive(
+def _drives(
     mapped: MappedDevice,
     what: str,
     speeds: Position,
@@ -106,8 +111,10 @@ def _drive(
     more: int = 0,
     longer: bool = False,
     refused: Position | None = None,
-) -> Drive:
-    """Drive at a velocity; again, if over a slow link the device could not be driven on within its hold time.
+) -> Iterator[Drive]:
+    """Drive at a velocity; again, if a slow link let the hold time pass, or velocity 0 was answered late.
+
+    Each drive is judged for what it shows.
 
     Args:
         mapped: the device.
@@ -124,9 +131,10 @@ def _drive(
         commands, readings = _kept_up(mapped, speeds, longer=longer)
         commands += [mapped.drive(speeds) for _ in range(more)]
         drive = _ended(mapped, Drive(what, wanted, tuple(commands), tuple(readings), None, ()), let_go_s, refused)
-        if drive.was_kept(mapped.drives.hold_s):
+        yield drive
+        in_time = drive.end is None or not drive.end.was_late(drive.readings)
+        if in_time and drive.was_kept(mapped.drives.hold_s):
             break
-    return drive
 
 
 def _kept_up(mapped: MappedDevice, speeds: Position, *, longer: bool) -> tuple[list[Command], list[Reading]]:

@@ -15,6 +15,7 @@ class Body:
     Args:
         limits: least and greatest position by axis.
         now: returns the time, s.
+        sleep: waits for some time, s.
         noise: standard deviation of what it says of its position.
         seed: of the noise and of what a mutant leaves to chance.
 
@@ -29,6 +30,7 @@ class Body:
 
     limits: dict[str, tuple[float, float]]
     now: Callable[[], float] = time.monotonic
+    sleep: Callable[[float], None] = time.sleep
     noise: float = 0.0
     seed: int = 0
     moves: int = 0

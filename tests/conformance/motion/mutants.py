@@ -215,6 +215,7 @@ def stop_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
         if body.stops % 2 == 0:  # type: ignore[attr-defined]
             right(now)
 
+    yield "stop-held-back", changed(only_moving(_held_back))
     yield "stop-ignored", changed(only_moving(lambda *_: None))
     yield "stop-late", changed(only_moving(lambda body, now, right: body.later.append((now + 0.6, right))))
     yield "stop-half", changed(only_moving(half))
@@ -223,6 +224,23 @@ def stop_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
     yield "stop-resumes", then(lambda body: dict(body.target), 0.8)
     yield "stop-goes-home", then(lambda body: dict.fromkeys(axes, 0.0), 0.4)
     yield "stop-goes-back", then(lambda body: dict(body.start), 0.3)
+
+
+def _held_back(body: Body, _: float, right: Callable[[float], None]) -> None:
+    body.sleep(1.5)
+    right(body.now())
+
+
+def _zero_held_back(body: Body) -> None:
+    right = body.drive
+
+    def drive(speeds: Position, hold_s: float, now: float) -> None:
+        if not any(speeds.values()):
+            body.sleep(1.5)
+            now = body.now()
+        right(speeds, hold_s, now)
+
+    body.drive = drive  # type: ignore[method-assign]
 
 
 def reading_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
@@ -305,6 +323,7 @@ def velocity_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
         again = speeds == body.speeds and body.now() < body.held_until
         return None if again else (speeds, hold_s)
 
+    yield "velocity-stop-held-back", _zero_held_back
     for axis in axes:
         yield f"velocity-slow:{axis}", times(0.7, axis)
         yield f"velocity-fast:{axis}", times(1.3, axis)

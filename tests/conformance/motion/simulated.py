@@ -73,7 +73,7 @@ def played(name, mutant=None, *, noise=0.0, seed=0, takes_s=lambda: 0.002):
     """Yield what a device is recorded to do: scenario, trace, and what rules may ask for."""
     device, limits, text = DEVICES[name]
     clock = SimulatedClock()
-    body = Body(limits, clock.now, noise, seed)
+    body = Body(limits, clock.now, clock.sleep, noise, seed)
     if mutant is not None:
         mutant(body)
     motion = msgspec.convert(tomllib.loads(text)["motion"], MotionMap)
