@@ -65,7 +65,7 @@ class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         stamp: where the time of the reading is in the response: a number, a date (RFC 3339) or a ROS time; empty: there
             is none.
         fresh_s: at least so often the position changes while the device moves, s.
-        agrees: other operations that say it as well, each with JSON pointers by axis.
+        agrees: other operations that say it as well, each with JSON pointers by axis, or by a velocity's name.
     """
 
     read: Call
@@ -251,8 +251,13 @@ class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             _check_names(f"switches.{name}", switch, {"value"})
         for given in filter(None, (self.stop, self.action)):
             _refuse_strange(names_in(list(msgspec.structs.asdict(given).values())))
-        if strange := {name for pointers in self.state.agrees.values() for name in pointers} - axes:
-            raise ValueError(f"agrees names {min(strange)!r}, which is no axis of [motion.state.axes]")
+        if strange := {name for pointers in self.state.agrees.values() for name in pointers} - axes - set(self.speeds):
+            raise ValueError(f"agrees names {min(strange)!r}, which neither an axis nor a velocity with at is called")
+
+    @property
+    def speeds(self) -> dict[str, Pointer]:
+        """Where the state's response has measured velocities, by name."""
+        return {name: one.at for name, one in self.velocity.axes.items() if one.at} if self.velocity else {}
 
     @property
     def bodies(self) -> tuple[tuple[str, Any], ...]:

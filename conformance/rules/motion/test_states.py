@@ -16,25 +16,25 @@ _NO_ACTION = NotClaimed("the map has no [motion.action]")
 
 @rule("motion/agrees", on=(agreement,))
 def agrees(trace: tuple[Told, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether all operations tell the same position at rest: one of several readings in a row is enough."""
+    """Judge whether all operations tell the same position and velocity: one of several readings in a row is enough."""
     own = motion.state.read
     for index in range(0, len(trace) - SEVERAL + 1, SEVERAL):
         rounds = [told for told in trace[index : index + SEVERAL] if told.values[own]]
         for call in motion.state.agrees if rounds else ():
-            apart = [_apart(told.values[call], told.values[own], motion) for told in rounds]
-            yield Case(
-                not all(apart),
-                rounds[-1].exchanges[call],
-                f"the same position from {call} as from {own}, at rest",
-                observed=apart[-1],
-                cause=call,
-            )
+            if call in rounds[-1].exchanges:
+                apart = [_apart(told.values[call], told.values[own], motion) for told in rounds]
+                expected = f"what {own} tells also from {call}, {rounds[-1].when}"
+                yield Case(not all(apart), rounds[-1].exchanges[call], expected, observed=apart[-1], cause=call)
 
 
 def _apart(values: dict[str, float], own: dict[str, float], motion: MotionMap) -> str:
     if not values:
         return "no numbers at the map's pointers"
-    return off(values, {name: own[name] for name in values}, motion)
+    for name, value in values.items():
+        room = motion.tolerance(name) if name in motion.state.axes else motion.speed_tolerance(name)
+        if not abs(value - own[name]) <= room:
+            return f"{name} {value:.4g} in place of {own[name]:.4g}"
+    return ""
 
 
 @rule("motion/action-succeeds", on=(targets,))

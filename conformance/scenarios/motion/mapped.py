@@ -100,8 +100,7 @@ class MappedDevice:
         exchange, document = self.get(state.read)
         received = self.clock.now()
         values = numbers_at(document, {name: axis.at for name, axis in state.axes.items()})
-        measured = self.motion.velocity.axes.items() if self.motion.velocity else ()
-        speeds = numbers_at(document, {name: speed.at for name, speed in measured if speed.at})
+        speeds = numbers_at(document, self.motion.speeds)
         try:
             stamp = seconds_of(at(document, state.stamp)) if state.stamp else None
         except NoValueError:

@@ -15,34 +15,63 @@ from conformance.transport.exchange import Exchange
 
 _NEEDS = (Need.REST, Need.MOTION)
 _STEP_S = 0.05
+_AT_REST = "at rest"
+# Of the limits: the velocities at which several operations are read.
+_SHARE = 0.4
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
 def agreement(mapped: MappedDevice) -> tuple[Told, ...]:
-    """Read the position by each operation that tells it, at rest: at home, and at the limits of each axis."""
+    """Read by each operation that tells it the position at rest, and the velocity under way and afterwards."""
     if not mapped.motion.state.agrees:
         raise NotDeclaredError("the map names no other operation that tells the position")
     return recorded(_told(mapped))
 
 
 def _told(mapped: MappedDevice) -> Iterator[Told]:
+    axes, speeds = mapped.motion.state.axes, mapped.motion.speeds
+    named = {name for pointers in mapped.motion.state.agrees.values() for name in pointers}
     mapped.bring_home()
-    yield from (_read_all(mapped) for _ in range(SEVERAL))
-    if mapped.motion.goto:
-        for side in (0, 1):
-            mapped.go(
-                "a limit of each axis", {name: axis.limits[side] for name, axis in mapped.motion.state.axes.items()}
-            )
-            yield from (_read_all(mapped) for _ in range(SEVERAL))
+    if wanted := named & set(axes):
+        yield from _all_told(mapped, wanted, _AT_REST)
+        for side in (0, 1) if mapped.motion.goto else ():
+            mapped.go("a limit of each axis", {name: axis.limits[side] for name, axis in axes.items()})
+            yield from _all_told(mapped, wanted, _AT_REST)
+    if wanted := (named & set(speeds)) - set(axes):
+        for side in (1, 0):
+            yield from _told_of_a_drive(mapped, wanted, side)
 
 
-def _read_all(mapped: MappedDevice) -> Told:
+def _told_of_a_drive(mapped: MappedDevice, wanted: set[str], side: int) -> Iterator[Told]:
+    """Drive at all velocities at once, read them, and read them again at rest."""
+    speeds = {name: _SHARE * mapped.drives.axes[name].limits[side] for name in wanted}
+    mapped.come_to_rest()
+    last = mapped.drive(speeds)
+    until = last.answered + mapped.drives.settle_s
+    while mapped.clock.now() < until:
+        last = mapped.drive(speeds)
+        mapped.read()
+    for told in range(SEVERAL):
+        last = mapped.drive(speeds) if told else last
+        yield _read_all(mapped, wanted, "under way")
+    if mapped.drives.hold_s is None:
+        mapped.drive({})
+    mapped.watch(last.answered + (mapped.drives.hold_s or 0.0) + mapped.drives.settle_s)
+    yield from _all_told(mapped, wanted, _AT_REST)
+
+
+def _all_told(mapped: MappedDevice, wanted: set[str], when: str) -> Iterator[Told]:
+    return (_read_all(mapped, wanted, when) for _ in range(SEVERAL))
+
+
+def _read_all(mapped: MappedDevice, wanted: set[str], when: str) -> Told:
     state, values, exchanges = mapped.motion.state, dict[str, dict[str, float]](), dict[str, Exchange]()
-    own = {name: axis.at for name, axis in state.axes.items()}
+    own = {**mapped.motion.speeds, **{name: axis.at for name, axis in state.axes.items()}}
     for call, pointers in {state.read: own, **state.agrees}.items():
-        exchange, document = mapped.get(call)
-        values[call], exchanges[call] = numbers_at(document, pointers), exchange
-    return Told(values, exchanges)
+        if asked := {name: pointer for name, pointer in pointers.items() if name in wanted}:
+            exchange, document = mapped.get(call)
+            values[call], exchanges[call] = numbers_at(document, asked), exchange
+    return Told(when, values, exchanges)
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)

@@ -148,13 +148,15 @@ class Drive:
 
 @dataclass(frozen=True)
 class Told:
-    """What several operations tell of one position, at rest.
+    """What several operations tell of one position, or of one velocity.
 
     Attributes:
+        when: at rest, or what it drives at.
         values: by operation; empty: it has not all of them.
         exchanges: by operation.
     """
 
+    when: str
     values: dict[str, dict[str, float]]
     exchanges: dict[str, Exchange]
 

@@ -69,6 +69,10 @@ class Body:
         """Return how fast it drives by velocity."""
         return self.speeds if now < self.held_until else dict.fromkeys(self.limits, 0.0)
 
+    def velocity_elsewhere(self, now: float) -> Position:
+        """Return how fast another resource says that it drives."""
+        return self.velocity(now)
+
     def moving(self, now: float) -> bool:
         """Return whether it is on its way to a target."""
         self.at(now)

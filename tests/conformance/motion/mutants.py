@@ -342,6 +342,20 @@ def velocity_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
     yield "hold-short", changed(lambda _, speeds, hold_s: (speeds, 0.3 * hold_s))
 
 
+def agreement_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
+    """Yield mutants of which another resource tells another velocity."""
+
+    def told(effect: Callable[[Body, float], Position]) -> Change:
+        def change(body: Body) -> None:
+            body.velocity_elsewhere = lambda now: effect(body, now)  # type: ignore[method-assign]
+
+        return change
+
+    yield "elsewhere-still", told(lambda _, now: dict.fromkeys(axes, 0.0))
+    yield "elsewhere-as-commanded", told(lambda body, now: body.speeds)
+    yield "elsewhere-in-other-units", told(lambda body, now: {a: 3.6 * v for a, v in body.velocity(now).items()})
+
+
 def _swapped(speeds: Position) -> Position:
     return dict(zip(speeds, reversed(speeds.values()), strict=True))
 
@@ -384,7 +398,8 @@ def of_rover() -> dict[str, Change]:
     """Return the mutants of the rover, which refuses a second move."""
     axes = ["x", "y"]
     groups = (target_mutants(axes), second_mutants(), stop_mutants(axes), reading_mutants(axes))
-    return {name: change for group in (*groups, velocity_mutants(axes), switch_mutants()) for name, change in group}
+    more = (velocity_mutants(axes), agreement_mutants(axes), switch_mutants())
+    return {name: change for group in (*groups, *more) for name, change in group}
 
 
 def of_dome() -> dict[str, Change]:

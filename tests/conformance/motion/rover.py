@@ -21,6 +21,7 @@ MAP = f"""
 read = "GET /pose"
 stamp = "/time"
 fresh_s = 0.4
+agrees = {{ "GET /velocity" = {{ left = "/left" }} }}
 
 [motion.state.axes]
 x = {{ at = "/pose/0", unit = "m", limits = [-{LIMIT}, {LIMIT}], speed = {SPEED} }}
@@ -88,7 +89,8 @@ DESCRIPTION = described(
         },
         "/goal": {"delete": {"responses": _DONE}},
         "/velocity": {
-            "put": {"requestBody": content(_VELOCITY), "responses": {**_DONE, "400": problem(), "422": problem()}}
+            "get": {"responses": {"200": answered(_VELOCITY)}},
+            "put": {"requestBody": content(_VELOCITY), "responses": {**_DONE, "400": problem(), "422": problem()}},
         },
         "/gripper/{state}": {
             "put": {
@@ -114,7 +116,8 @@ class Rover:
         if what == "gripper":
             return self._grip(values[0])
         if what == "velocity":
-            return self._drive(octets)
+            told = self.body.velocity_elsewhere(self.body.now())
+            return (200, {"ahead": told["x"], "left": told["y"]}) if method == "GET" else self._drive(octets)
         if method == "DELETE":
             self.body.halt(self.body.now())
             return 200, {}
@@ -180,6 +183,7 @@ class Rover:
                 web.get("/pose", self._over_http),
                 web.put("/goal/{x}/{y}", self._over_http),
                 web.delete("/goal", self._over_http),
+                web.get("/velocity", self._over_http),
                 web.put("/velocity", self._over_http),
                 web.put("/gripper/{state}", self._over_http),
             ]

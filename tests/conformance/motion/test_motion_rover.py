@@ -8,6 +8,6 @@ from rover import Rover, serving_rover
 
 def test_a_right_rover_that_clamps_and_takes_one_move_at_a_time_is_not_blamed(tmp_path):
     done, judged = judged_by_map(serving_rover(Rover(Body(rover.LIMITS, noise=0.004))), rover.MAP, tmp_path)
-    undeclared = {"unauthorised-still", "agrees", "action-runs", "action-succeeds", "action-canceled"}
+    undeclared = {"unauthorised-still", "action-runs", "action-succeeds", "action-canceled"}
     missing = {f"motion/{name}" for name in undeclared}
     assert {id_ for id_, verdict in judged.items() if verdict != "pass"} == missing, done.stdout
