@@ -102,6 +102,7 @@ _OBJECTS = 20_000
 )
 @click.option("--token-file", type=_FILE, help="File with the bearer token to send.")
 @click.option("--basic-file", type=_FILE, help="File with user:password for basic authentication.")
+@click.option("--digest-file", type=_FILE, help="File with user:password for digest authentication (RFC 7616).")
 @click.option(
     "--username-token-file", type=_FILE, help="File with user:password for WS-Security's UsernameToken (SOAP)."
 )

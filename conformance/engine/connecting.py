@@ -113,11 +113,12 @@ def _credentials(where: Endpoints) -> Credentials:
         OSError: a file cannot be read.
     """
     found: list[Credential] = []
-    if where.basic_file:
-        pair = _secret(where.basic_file)
-        if ":" not in pair:
-            raise StatementError(f"{where.basic_file}: expected one line user:password")
-        found.append(Credential(Kind.BASIC, pair))
+    for kind, file in ((Kind.BASIC, where.basic_file), (Kind.DIGEST, where.digest_file)):
+        if file:
+            pair = _secret(file)
+            if ":" not in pair:
+                raise StatementError(f"{file}: expected one line user:password")
+            found.append(Credential(kind, pair))
     if where.api_key or where.api_key_file:
         place, _, name = (where.api_key or "").partition(" ")
         if place not in _PLACES or not name.strip() or not where.api_key_file:

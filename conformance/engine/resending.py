@@ -104,11 +104,13 @@ def send_again(request: Request, connection: Connection) -> Attempt:
     with closing(HttpClient(f"{where.scheme}://{where.netloc}", connection)) as client:
         try:
             if request.raw is not None:
+                if connection.credentials.awaits_challenge:
+                    client.send("GET", where.path)
                 octets = connection.credentials.revealed(request.raw)
                 return raw.read_one(client, octets, raw.talk(client, octets, answers=1), request.method)[0]
             fields = [pair for pair in request.headers if pair[0].lower() not in _OF_THE_CLIENT]
             own = [(name, value) for name, value in fields if not is_shown(value)]
-            authorized = len(own) < len(fields) or not connection.credentials.fields()
+            authorized = len(own) < len(fields) or not connection.credentials.fields(shown=True)
             if not any(name.lower() == "accept" for name, _ in own):
                 own.append(("Accept", ""))
             target = where.path + (f"?{where.query}" if where.query else "")

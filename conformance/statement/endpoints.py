@@ -37,7 +37,7 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         publishers_endpoint: URL of the service if it differs from the WSDL's; likewise subscribers_endpoint.
         ca_file: certificate authorities to trust.
         token_file: file with the bearer token.
-        basic_file: file with ``user:password`` for HTTP's basic authentication.
+        basic_file: file with ``user:password`` for HTTP's basic authentication; likewise digest_file.
         username_token_file: file with ``user:password`` for WS-Security's UsernameToken.
         api_key: where the API key goes: ``header NAME``, ``query NAME`` or ``cookie NAME``.
         api_key_file: file with the API key.
@@ -57,6 +57,7 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ca_file: Text | None = None
     token_file: Text | None = None
     basic_file: Text | None = None
+    digest_file: Text | None = None
     username_token_file: Text | None = None
     api_key: Text | None = None
     api_key_file: Text | None = None

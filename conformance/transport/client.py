@@ -34,6 +34,7 @@ Permit = Callable[[str, str], str]
 # its deadline twice in that time at most, and a link that was gone twice in a long run is none.
 _HANGS = 2
 _HANGS_WITHIN_S = 60.0
+_CHALLENGE = 401
 # A request that met the end of a kept connection is sent so often in all.
 _ATTEMPTS = 2
 
@@ -175,9 +176,9 @@ class HttpClient:
         sent, target, query = list(fields), path, ""
         if authorized:
             credentials, names = self.connection.credentials, [name for name, _ in fields]
-            sent += credentials.fields(names)
-            shown += tuple(credentials.fields(names, shown=True))
             target, query = credentials.target(path), credentials.target(path, shown=True)[len(path) :]
+            sent += credentials.fields(method, self.prefix + target, names)
+            shown += tuple(credentials.fields(given=names, shown=True))
         request = Request(method, self.url(path), shown, body, query=query)
         endpoint = request.endpoint
         if sum(time.monotonic() - at < _HANGS_WITHIN_S for at in self._hangs[endpoint]) >= _HANGS:
@@ -188,6 +189,9 @@ class HttpClient:
         started = time.monotonic()
         try:
             response = self._exchange(method, target, sent, body, deadline, fresh=fresh)
+            if authorized and response.status == _CHALLENGE and credentials.learn(response.headers):
+                sent = [*fields, *credentials.fields(method, self.prefix + target, names)]
+                response = self._exchange(method, target, sent, body, deadline, fresh=fresh)
             self.connection.note(method)
         except _SilenceError as none:
             self.connection.note(method)

@@ -9,12 +9,20 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, Final
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import quote
+
+if TYPE_CHECKING:
+    from conformance.transport.digest import DigestUser
 
 # A shorter secret is not looked for in responses: it would be found everywhere.
 _SHORTEST: Final = 4
 _VARIABLE: Final = re.compile(r"\$ROAAS_[A-Z0-9_]+")
+# The head of a request, and in it what answers a challenge (RFC 7616 3.4).
+_REQUEST_LINE: Final = re.compile(rb"(\S+) (\S+) HTTP/")
+_ANSWER: Final = re.compile(r"(Authorization: Digest )[^\r\n]*")
+_SHOWN_ANSWER: Final = re.compile(rb"Authorization: Digest \$ROAAS_DIGEST")
 _WRONG: Final = "roaas-not-this-one"
 
 
@@ -23,6 +31,7 @@ class Kind(StrEnum):
 
     BEARER = "bearer"
     BASIC = "basic"
+    DIGEST = "digest"
     HEADER = "header"
     QUERY = "query"
     COOKIE = "cookie"
@@ -34,8 +43,8 @@ class Credential:
 
     Attributes:
         kind: where it goes.
-        secret: the token, the key, the header's value, or ``user:password`` for ``basic``.
-        name: of the header, the query parameter or the cookie; empty for ``bearer`` and ``basic``.
+        secret: the token, the key, the header's value, or ``user:password`` for ``basic`` and ``digest``.
+        name: of the header, the query parameter or the cookie; empty for the others.
     """
 
     kind: Kind
@@ -47,7 +56,7 @@ class Credential:
         """The shell variable that stands for the sent text, with its dollar sign; the text itself where it is wrong."""
         if self.secret.startswith(_WRONG):
             return self.sent
-        own = {Kind.BEARER: "TOKEN", Kind.BASIC: "BASIC"}.get(self.kind)
+        own = {Kind.BEARER: "TOKEN", Kind.BASIC: "BASIC", Kind.DIGEST: "DIGEST"}.get(self.kind)
         return f"$ROAAS_{own or re.sub('[^A-Z0-9]', '_', f'{self.kind}_{self.name}'.upper())}"
 
     @property
@@ -65,13 +74,27 @@ class Credential:
 
     def value(self, text: str) -> str:
         """Return the header's value, or the query, with ``text`` for the secret."""
-        forms = {Kind.BEARER: f"Bearer {text}", Kind.BASIC: f"Basic {text}", Kind.HEADER: text}
+        forms = {
+            Kind.BEARER: f"Bearer {text}",
+            Kind.BASIC: f"Basic {text}",
+            Kind.DIGEST: f"Digest {text}",
+            Kind.HEADER: text,
+        }
         return forms.get(self.kind, f"{self.name}={text}")
 
     @property
     def wrong(self) -> "Credential":
         """The same credential with a secret that no robot knows."""
-        return Credential(self.kind, f"{_WRONG}:x" if self.kind is Kind.BASIC else _WRONG, self.name)
+        pair = self.kind in {Kind.BASIC, Kind.DIGEST}
+        return Credential(self.kind, f"{_WRONG}:x" if pair else _WRONG, self.name)
+
+    @cached_property
+    def digest(self) -> "DigestUser":
+        """The user of a ``digest`` credential, who keeps the device's challenge."""
+        # Imported late: requests takes a twentieth of a second.
+        from conformance.transport.digest import DigestUser  # noqa: PLC0415
+
+        return DigestUser(self.secret)
 
 
 @dataclass(frozen=True)
@@ -87,10 +110,14 @@ class Credentials:
     def __bool__(self) -> bool:
         return bool(self.items)
 
-    def fields(self, given: Iterable[str] = (), *, shown: bool = False) -> list[tuple[str, str]]:
+    def fields(
+        self, method: str = "GET", target: str = "/", given: Iterable[str] = (), *, shown: bool = False
+    ) -> list[tuple[str, str]]:
         """Return the headers to add to a request.
 
         Args:
+            method: of the request.
+            target: its request target.
             given: names of headers that the request has already: they are left as they are.
             shown: with variables in place of the secrets.
         """
@@ -99,10 +126,23 @@ class Credentials:
         for item in self.items:
             if item.header and item.header.lower() not in there:
                 value = item.value(item.variable if shown else item.sent)
+                if item.kind is Kind.DIGEST and not shown:
+                    value = item.digest.answer(method, target)
+                    if not value:
+                        continue
                 # Cookies share one header (RFC 6265 5.4); of two others the last one is meant.
                 together = item.kind is Kind.COOKIE and item.header in found
                 found[item.header] = f"{found[item.header]}; {value}" if together else value
         return list(found.items())
+
+    def learn(self, headers: Iterable[tuple[str, str]]) -> bool:
+        """Take the challenge of a 401 response; return whether the request can be sent again with an answer to it."""
+        return any(item.kind is Kind.DIGEST and item.digest.learn(headers) for item in self.items)
+
+    @property
+    def awaits_challenge(self) -> bool:
+        """Whether nothing can be sent with digest authentication yet, as the device has sent no challenge."""
+        return any(item.kind is Kind.DIGEST and not item.digest.answer("GET", "/") for item in self.items)
 
     def target(self, target: str, *, shown: bool = False) -> str:
         """Return a request target with the credentials that go into the query."""
@@ -111,6 +151,8 @@ class Credentials:
 
     def hidden(self, text: str) -> str:
         """Return a text with variables in place of secrets, for whatever a robot repeats of them."""
+        if any(item.kind is Kind.DIGEST for item in self.items):
+            text = _ANSWER.sub(r"\1$ROAAS_DIGEST", text)
         for item in self.items:
             for secret in {item.sent, item.secret, *item.secret.split(":", 1)[1:]}:
                 if len(secret) >= _SHORTEST:
@@ -124,6 +166,9 @@ class Credentials:
     def revealed(self, octets: bytes) -> bytes:
         """Return bytes with the secrets in place of variables, to send a recorded request again."""
         for item in self.items:
+            if item.kind is Kind.DIGEST and (line := _REQUEST_LINE.match(octets)):
+                answer = item.digest.answer(line[1].decode("latin-1"), line[2].decode("latin-1"))
+                octets = _SHOWN_ANSWER.sub(b"Authorization: " + answer.encode("latin-1"), octets)
             octets = octets.replace(item.variable.encode(), item.sent.encode("latin-1"))
         return octets
 

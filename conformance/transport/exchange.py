@@ -15,6 +15,8 @@ SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 # Twice has the effect of once (RFC 9110 9.2.2), so a client may send them again on a new connection.
 IDEMPOTENT_METHODS = SAFE_METHODS | {"PUT", "DELETE"}
 _CURL_PLAIN_LIMIT = 4000
+# How a request shows that it answers a challenge: curl does so by itself.
+_DIGEST = "Digest $ROAAS_DIGEST"
 # A segment of a path that holds this, or is longer than this, is a value and no name.
 _VALUE = re.compile(r"\d|%|NaN|Infinity")
 _LONG_SEGMENT = 40
@@ -85,6 +87,9 @@ class Request:
             words += ["-X", self.method]
         for name, value in self.headers:
             if name.lower() in {"host", "content-length", "connection", "user-agent", "accept-encoding"}:
+                continue
+            if value == _DIGEST:
+                words += ["--digest", "-u", _DIGEST.split()[1]]
                 continue
             words += ["-H", f"{name}: {value}" if value else f"{name};"]
         pipe = ""

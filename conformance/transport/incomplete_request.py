@@ -40,13 +40,14 @@ class PartialRequest:
         headers: Headers = (),
     ) -> None:
         credentials = client.connection.credentials
-        head = [f"{method} {client.prefix}{credentials.target(path)} HTTP/1.1", f"Host: {client.authority}"]
+        target = client.prefix + credentials.target(path)
+        head = [f"{method} {target} HTTP/1.1", f"Host: {client.authority}"]
         if (sent or promised) and not any(name.lower() == "content-type" for name, _ in headers):
             head.append("Content-Type: application/json")
         head += [f"{name}: {value}" for name, value in headers]
         head.append("Transfer-Encoding: chunked" if promised is None and sent else f"Content-Length: {promised or 0}")
         shown = credentials.hidden("\r\n".join(head))
-        head += [f"{name}: {value}" for name, value in credentials.fields()]
+        head += [f"{name}: {value}" for name, value in credentials.fields(method, target)]
         body = f"{len(sent):x}\r\n".encode() + sent + b"\r\n" if promised is None and sent else sent
         octets = "\r\n".join(head).encode() + b"\r\n\r\n" + body
         if head_only is not None:

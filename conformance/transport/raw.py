@@ -65,10 +65,11 @@ def head(client: HttpClient, method: str, path: str, *fields: str, host: bool = 
         host: whether to send Host.
     """
     credentials = client.connection.credentials
-    lines = [f"{method} {client.prefix}{credentials.target(path)} HTTP/1.1"]
+    target = client.prefix + credentials.target(path)
+    lines = [f"{method} {target} HTTP/1.1"]
     if host:
         lines.append(f"Host: {client.authority}")
-    lines += [f"{name}: {value}" for name, value in credentials.fields()]
+    lines += [f"{name}: {value}" for name, value in credentials.fields(method, target)]
     return ("\r\n".join([*lines, *fields]) + "\r\n\r\n").encode("latin-1")
 
 
