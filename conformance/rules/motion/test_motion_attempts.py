@@ -107,12 +107,14 @@ def fresh(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     for leg in legs_of(trace):
         seen = usable(leg)
         changed = [i for i in range(1, len(seen)) if seen[i].values != seen[i - 1].values]
-        if len(changed) < SEVERAL or not leg.commands[-1].targets:
+        if len(changed) < 2 or not leg.commands[-1].targets:
             continue
         still = [
             seen[b - 1].sent - seen[a].received
             for a, b in itertools.pairwise(changed)
             if off(seen[b].values, seen[b - 1].values, motion)
+            # Of few positions, one may be a target, at which a fast device rested until it got the next one.
+            and (len(changed) >= SEVERAL or all(off(seen[a].values, one.targets, motion) for one in leg.commands))
         ]
         longest_s = max(still, default=0.0)
         yield Case(

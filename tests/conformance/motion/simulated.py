@@ -50,7 +50,7 @@ MUTANTS = {
 }
 
 
-class _Api:
+class Api:
     """A device without HTTP: a request takes some simulated time each way."""
 
     def __init__(self, device, clock, takes_s):
@@ -69,15 +69,20 @@ class _Api:
         return Exchange(Request(method, f"http://device{path}", headers, body), Response(status, fields, octets, 2.0))
 
 
+def map_of(name):
+    """Return a device's motion map."""
+    return msgspec.convert(tomllib.loads(DEVICES[name][2])["motion"], MotionMap)
+
+
 def played(name, mutant=None, *, noise=0.0, seed=0, takes_s=lambda: 0.002):
     """Yield what a device is recorded to do: scenario, trace, and what rules may ask for."""
-    device, limits, text = DEVICES[name]
+    device, limits, _ = DEVICES[name]
     clock = SimulatedClock()
     body = Body(limits, clock.now, clock.sleep, noise, seed)
     if mutant is not None:
         mutant(body)
-    motion = msgspec.convert(tomllib.loads(text)["motion"], MotionMap)
-    api = _Api(device(body), clock, takes_s)
+    motion = map_of(name)
+    api = Api(device(body), clock, takes_s)
     binding = SoapBinding(api, dome.messages_of()) if name == "dome" else None
     mapped = MappedDevice(api, motion, clock, binding)
     # Making and reading XML takes most of the time of a camera's run.

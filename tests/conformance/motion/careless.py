@@ -1,0 +1,84 @@
+"""The simulated arm, asked what must move nothing and by several clients at once; right, or careless in one way."""
+
+from unittest.mock import patch
+
+import simulated
+from arm import Arm
+from body import Body
+
+from conformance.observe.clock import SimulatedClock
+from conformance.scenarios.motion import attempts, moves
+from conformance.scenarios.motion.binding import JsonBinding
+from conformance.scenarios.motion.mapped import MappedDevice
+from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
+
+_AWAY = {"pan": 0.4, "tilt": 0.3}
+
+
+class _Api(simulated.Api):
+    """Wants credentials; ``careless``: what moves it all the same, "" for a right one."""
+
+    careless = ""
+
+    def send(self, method, path, *, headers=(), body=b"", authorized=True, **_):
+        if not authorized:
+            self._slip("unauthorised")
+            return Exchange(Request(method, path, headers, body), Response(401, (), b"{}", 2.0))
+        found = super().send(method, path, headers=headers, body=body)
+        if not found.response.ok:
+            self._slip("refused")
+        return found
+
+    def cut_off(self):
+        """Hear a request whose client vanishes."""
+        self._slip("incomplete")
+
+    def _slip(self, what):
+        if self.careless == what:
+            self.device.body.aim(_AWAY, 0.5, self.clock.now())
+
+
+class _Cut:
+    """Stands for a request of which some bytes are missing."""
+
+    def __init__(self, client, *_, **__):
+        self._client = client
+
+    def vanish(self, **_):
+        self._client.cut_off()
+
+
+class _Binding(JsonBinding):
+    """The description's rules without a contract: what is no number is forbidden."""
+
+    has_credentials = True
+
+    def forbids(self, _call, body):
+        return any(not isinstance(one, int | float) for one in body.values())
+
+
+def played(careless):
+    """Return what the arm is recorded to do, and its map: by the name of the scenario.
+
+    Args:
+        careless: refused, incomplete or unauthorised requests that move it, or "mixes" for targets of two clients; ""
+            for a right one.
+    """
+    clock = SimulatedClock()
+    arm = Arm(Body(simulated.LIMITS, clock.now, clock.sleep), fault=careless)
+    api = _Api(arm, clock, lambda: 0.002)
+    api.careless = careless
+    motion = simulated.map_of("arm")
+    mapped = MappedDevice(api, motion, clock, _Binding(api))
+
+    def together(rounds):
+        return [[one.client.send(one.method, one.path, headers=one.headers, body=one.body) for one in rounds[0]]]
+
+    with patch.object(attempts, "PartialRequest", _Cut), patch.object(moves, "send_together", together):
+        found = {
+            "attempts_at_rest": attempts.attempts_at_rest.play(mapped=mapped),
+            "several_clients": moves.several_clients.play(mapped=mapped, effort=Effort("quick")),
+        }
+    return found, {"mapped": mapped, "run": Run(), "motion": motion}
