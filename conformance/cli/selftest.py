@@ -66,10 +66,16 @@ _SHORT = 15
     help="Judge N mutants made by rule from the pack's descriptions, in place of those made by hand.",
 )
 @click.option(
+    "--adversary",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Judge N composed faults: the mutants of --generated, each at a time, for a client or for a class of values.",
+)
+@click.option(
     "--api",
     metavar="URL|FILE",
-    help="With --generated: put the mutants before the running device with this description. Only GET, HEAD and "
-    "OPTIONS are sent, unless --call allows more.",
+    help="With --generated or --adversary: put the mutants before the running device with this description. Only GET, "
+    "HEAD and OPTIONS are sent, unless --call allows more.",
 )
 @click.option("--base-url", metavar="URL", help="With --api: where the operations of the description are.")
 @click.option("--call", "allow", multiple=True, metavar="PATTERN", help="With --api: as in roaas certify; repeatable.")
@@ -89,12 +95,14 @@ def selftest(context: click.Context, /, **options: Any) -> None:
     Each mutant is a good device behind a proxy with one named change. Exit code: 0 all killed and no false positive;
     1 otherwise; 2 usage; 3 a device does not start; 130 interrupted.
     """
+    if options["generated"] and options["adversary"]:
+        raise click.UsageError("--generated and --adversary are two kinds of sample: give one of them")
     if options["api"]:
         _by_api(context, options)
         return
     contract = loaded(options["pack"])
     try:
-        if options["generated"]:
+        if options["generated"] or options["adversary"]:
             _by_rule(context, contract, options)
         else:
             _by_hand(contract, options)
@@ -158,14 +166,14 @@ def _by_rule(context: click.Context, contract: Contract, options: dict[str, Any]
     from conformance.mutation.self_test import self_test_of  # noqa: PLC0415 - see _by_hand()
     from conformance.selftest.report import Report  # noqa: PLC0415 - see _by_hand()
 
-    chosen = chosen_mutants(contract, options)
+    chosen, exist = chosen_mutants(contract, options)
     if options["listed"]:
         for mutant in chosen:
             click.echo(f"{mutant.name} {mutant.says}")
         return
     compared = options["compare"] and _is_given(context, "compare")
     target = _target(contract, options["target"] or self_test_of(contract).quick)
-    report = Report(contract, target.name, seed=options["seed"])
+    report = Report(contract, target.name, seed=options["seed"], exist=exist, option=_option(options))
     _finish(report, lambda: run_generated(report, chosen, options, compared=compared), options)
 
 
@@ -174,17 +182,21 @@ def _by_api(context: click.Context, options: dict[str, Any]) -> None:
     from conformance.cli.selftest_api import chosen_of_api, described_device, run_api  # noqa: PLC0415 - see _by_hand()
     from conformance.selftest.report import Report  # noqa: PLC0415 - see _by_hand()
 
-    if not options["generated"]:
+    if not (options["generated"] or options["adversary"]):
         raise click.UsageError("--api takes mutants that are made by rule: say how many with --generated N")
     contract, base_url = described_device(options)
-    chosen = chosen_of_api(contract, base_url, options)
+    chosen, exist = chosen_of_api(contract, base_url, options)
     if options["listed"]:
         for mutant in chosen:
             click.echo(f"{mutant.name} {mutant.says}")
         return
-    report = Report(contract, base_url, seed=options["seed"])
+    report = Report(contract, base_url, seed=options["seed"], exist=exist, option=_option(options))
     compared = options["compare"] and _is_given(context, "compare")
     _finish(report, lambda: run_api(report, base_url, chosen, options, compared=compared), options)
+
+
+def _option(options: dict[str, Any]) -> str:
+    return "adversary" if options["adversary"] else "generated"
 
 
 def _is_given(context: click.Context, name: str) -> bool:

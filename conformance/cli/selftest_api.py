@@ -42,22 +42,25 @@ def described_device(options: dict[str, Any]) -> tuple[Contract, str]:
     return contract, str(where.rest)
 
 
-def chosen_of_api(contract: Contract, base_url: str, options: dict[str, Any]) -> list[GeneratedMutant]:
-    """Return the sample of mutants of the operations that may be called.
+def chosen_of_api(contract: Contract, base_url: str, options: dict[str, Any]) -> tuple[list[GeneratedMutant], int]:
+    """Return the sample of mutants of the operations that may be called, and how many there are.
 
     Raises:
         click.UsageError: no mutant has such a name.
     """
+    from conformance.selftest.generated.adversary import composed, kinds_in_requests  # noqa: PLC0415 - see selftest.py
     from conformance.selftest.generated.described import described_mutants  # noqa: PLC0415 - see selftest.py
     from conformance.selftest.generated.sampling import sample  # noqa: PLC0415 - see selftest.py
 
     called, patterns = set(callable_operations(contract, options)), options["patterns"] or ("*",)
     every = described_mutants(contract, urlsplit(base_url).path.rstrip("/"))
-    fitting = [one for one in every if one.exchange.name in called]
-    fitting = [one for one in fitting if any(fnmatch.fnmatch(one.name, pattern) for pattern in patterns)]
+    every = tuple(one for one in every if one.exchange.name in called)
+    if options["adversary"]:
+        every = composed(every, kinds_in_requests(contract))
+    fitting = [one for one in every if any(fnmatch.fnmatch(one.name, pattern) for pattern in patterns)]
     if not fitting:
         raise click.UsageError(f"no mutant of an operation that may be called has a name like {', '.join(patterns)}")
-    return sample(fitting, options["generated"], options["seed"])
+    return sample(fitting, options["generated"] or options["adversary"], options["seed"]), len(every)
 
 
 def callable_operations(contract: Contract, options: dict[str, Any]) -> tuple[str, ...]:

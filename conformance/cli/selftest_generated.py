@@ -11,21 +11,24 @@ from conformance.selftest.generated.mutant import GeneratedMutant
 from conformance.selftest.report import Report
 
 
-def chosen_mutants(contract: Contract, options: dict[str, Any]) -> list[GeneratedMutant]:
-    """Return the sample of generated mutants that the options select.
+def chosen_mutants(contract: Contract, options: dict[str, Any]) -> tuple[list[GeneratedMutant], int]:
+    """Return the sample of generated mutants that the options select, and how many there are.
 
     Raises:
         click.UsageError: no mutant has such a name.
     """
+    from conformance.selftest.generated.adversary import composed, kinds_in_requests  # noqa: PLC0415 - see selftest.py
     from conformance.selftest.generated.catalogue import generated_mutants  # noqa: PLC0415 - see selftest.py
     from conformance.selftest.generated.sampling import sample  # noqa: PLC0415 - see selftest.py
 
     patterns = options["patterns"] or ("*",)
     every = generated_mutants(contract)
+    if options["adversary"]:
+        every = composed(every, kinds_in_requests(contract))
     fitting = [one for one in every if any(fnmatch.fnmatch(one.name, pattern) for pattern in patterns)]
     if not fitting:
         raise click.UsageError(f"no mutant by rule has a name like {', '.join(patterns)}; --list shows them")
-    return sample(fitting, options["generated"], options["seed"])
+    return sample(fitting, options["generated"] or options["adversary"], options["seed"]), len(every)
 
 
 def run_generated(report: Report, mutants: list[GeneratedMutant], options: dict[str, Any], *, compared: bool) -> None:

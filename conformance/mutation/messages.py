@@ -60,6 +60,8 @@ class Request(_Message):
         side: "rest" or "soap", by the port that received it.
         raw: its bytes if they are not HTTP; the other attributes are then empty. None for HTTP.
         came: its bytes as received, in pieces.
+        nth: its number on its connection, from 1.
+        beside: whether its client came while another one was connected.
     """
 
     side: str
@@ -70,6 +72,8 @@ class Request(_Message):
     body: bytes = b""
     raw: bytes | None = None
     came: tuple[bytes, ...] = ()
+    nth: int = 1
+    beside: bool = False
 
     @property
     def path(self) -> str:

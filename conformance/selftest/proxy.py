@@ -120,6 +120,7 @@ class Proxy:
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             if self._tls is not None:
                 sock = self._tls.wrap_socket(sock, server_side=True)
+            beside, nth = bool(self._open), 0
             self._open.add(sock)
             client = ClientConnection(sock, side)
             while (request := self._next(side, client, forward)) is not None:
@@ -131,6 +132,8 @@ class Proxy:
                 last = False
                 for item in together:
                     self.requests += 1
+                    nth += 1
+                    item.nth, item.beside = nth, beside
                     response = self._changed(item, forward)
                     last = last or item.is_last or response.is_last
                     client.respond(response, last=last and item is together[-1])

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from conformance.contract.pack import Contract
+from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.selftest.comparison import SchemathesisResult
 from conformance.selftest.controls import ControlResult
 from conformance.selftest.generated import api_report
@@ -27,6 +27,8 @@ class Report:
         notes: remarks for the reader.
         generated_results: results of the generated mutants.
         seed: seed of the sample of generated mutants.
+        exist: how many generated mutants there are, of which the sample is.
+        option: the option that asked for the sample: generated or adversary.
         blamed: requirements that the unchanged described device does not pass, with the reason.
     """
 
@@ -40,6 +42,8 @@ class Report:
     seconds: float = 0.0
     generated_results: list[GeneratedResult] = field(default_factory=list)
     seed: int = 0
+    exist: int = 0
+    option: str = "generated"
     blamed: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -111,7 +115,7 @@ class Report:
                 ],
             },
             **(
-                {"generated": by_rule.document(self.contract, self.generated_results, self.seed)}
+                {"generated": by_rule.document(self.exist, self.generated_results, self.seed)}
                 if self.generated_results
                 else {}
             ),
@@ -137,7 +141,10 @@ class Report:
             return api_report.page(self.target, *seen, self.notes)
         if self.generated_results:
             theirs = {seen.mutant: seen.killed for seen in self.compared}
-            return by_rule.rates_page(self.contract, self.generated_results, self.target, self.seed, theirs, self.notes)
+            pack = "" if self.contract.name == DEFAULT_PACK else f" --contract {self.contract.name}"
+            number = len(self.generated_results)
+            command = f"roaas selftest --{self.option} {number} --seed {self.seed} --target {self.target}{pack}"
+            return by_rule.rates_page(command, self.exist, self.generated_results, theirs, self.notes)
         compared = {seen.mutant: "killed" if seen.killed else "survived" for seen in self.compared}
         lines = [
             "# Mutants, and what killed them",
@@ -187,7 +194,7 @@ class Report:
             code = one.outcome.exit_code if one.outcome else "none"
             lines.append(f"FALSE POSITIVE {one.robot}{where}, seed {one.seed}, exit code {code}: {said}")
         if self.generated_results:
-            lines.append(by_rule.summary(self.contract, self.generated_results))
+            lines.append(by_rule.summary(self.exist, self.generated_results))
         if self.contract.described:
             alarms = "; ".join(f"{id_}: {why[:200]}" for id_, why in self.blamed.items()) or "none"
             lines.append(f"False alarms on the unchanged device: {alarms}")

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from conformance.contract.pack import DEFAULT_PACK, Contract
+from conformance.contract.pack import Contract
 from conformance.selftest.generated.catalogue import every_change, generated_mutants
 from conformance.selftest.generated.judging import BROKEN, GIVEN_UP, KILLED, NOT_REACHED, SURVIVED, GeneratedResult
 from conformance.selftest.generated.open_places import open_place, open_places
@@ -12,7 +12,7 @@ from conformance.selftest.generated.sampling import Rate, rate_of, rates_by
 
 # The result file's word for a mutant that was killed, as roaas-selftest/1 has it.
 _WRITTEN = {KILLED: "caught"}
-_KEYS = ("class", "operator", "effort")
+_KEYS = ("class", "operation", "when", "operator", "effort")
 
 
 def _figures(rate: Rate) -> dict[str, Any]:
@@ -25,14 +25,14 @@ def _figures(rate: Rate) -> dict[str, Any]:
     }
 
 
-def document(contract: Contract, results: Iterable[GeneratedResult], seed: int) -> dict[str, Any]:
-    """Return the part of selftest.json on generated mutants.
+def document(exist: int, results: Iterable[GeneratedResult], seed: int) -> dict[str, Any]:
+    """Return the part of selftest.json on generated mutants, of which so many exist.
 
     ``at_least`` is the lower bound of Wilson's 95 % interval of the kill rate.
     """
     results = list(results)
     return {
-        "exist": len(generated_mutants(contract)),
+        "exist": exist,
         "seed": seed,
         "all": _figures(rate_of(results)),
         **{f"by_{key}": {name: _figures(rate) for name, rate in rates_by(results, key).items()} for key in _KEYS},
@@ -54,10 +54,10 @@ def document(contract: Contract, results: Iterable[GeneratedResult], seed: int) 
     }
 
 
-def summary(contract: Contract, results: Iterable[GeneratedResult]) -> str:
+def summary(exist: int, results: Iterable[GeneratedResult]) -> str:
     """Return the rates and the list of survivors for the terminal."""
     results = list(results)
-    lines = [f"Mutants by rule killed: {rate_of(results).words()}; {len(generated_mutants(contract))} exist"]
+    lines = [f"Mutants by rule killed: {rate_of(results).words()}; {exist} exist"]
     if warned := sum(result.outcome == KILLED and not result.fails for result in results):
         lines.append(f"{warned} of them by a SHOULD alone")
     for key in _KEYS:
@@ -72,31 +72,23 @@ def summary(contract: Contract, results: Iterable[GeneratedResult]) -> str:
 
 
 def rates_page(
-    contract: Contract,
-    results: Iterable[GeneratedResult],
-    target: str,
-    seed: int,
-    theirs: Mapping[str, bool],
-    notes: Iterable[str],
+    command: str, exist: int, results: Iterable[GeneratedResult], theirs: Mapping[str, bool], notes: Iterable[str]
 ) -> str:
     """Return a Markdown page with the rates, for selftest.md and docs/caught.md.
 
     Args:
-        contract: the pack.
+        command: the command that gives this page.
+        exist: how many mutants there are.
         results: result of each mutant.
-        target: the good device behind the mutants.
-        seed: seed of the sample.
         theirs: by mutant's name, whether plain Schemathesis killed it, for those it was run on.
         notes: remarks at the end of the page.
     """
     results = list(results)
-    pack = "" if contract.name == DEFAULT_PACK else f" --contract {contract.name}"
     about = (
-        f"`roaas selftest --generated {len(results)} --seed {seed} --target {target}{pack}`: {len(results)} of the "
-        f"{len(generated_mutants(contract))} mutants by rule. The sample takes each operator in each class in turn, so "
-        "that rare ones weigh as much as frequent ones. A mutant is killed when a requirement fails or warns of it and "
-        "passes the good device. A mutant that altered nothing in any run does not count. Bounds are the lower end of "
-        "Wilson's 95 % interval."
+        f"`{command}`: {len(results)} of the {exist} mutants by rule. The sample takes each operator in each class in "
+        "turn, so that rare ones weigh as much as frequent ones. A mutant is killed when a requirement fails or warns "
+        "of it and passes the good device. A mutant that altered nothing in any run does not count. Bounds are the "
+        "lower end of Wilson's 95 % interval."
     )
     lines = ["# Mutants by rule, and how many are killed", "", about, "", f"**{rate_of(results).words()}.**"]
     for key in _KEYS:

@@ -86,7 +86,7 @@ def rate_of(results: Iterable[GeneratedResult]) -> Rate:
 
 
 def rates_by(results: Iterable[GeneratedResult], key: str) -> dict[str, Rate]:
-    """Return kill rates grouped by ``operator`` (with its mode), ``class`` or ``effort`` (of the last run)."""
+    """Return kill rates grouped by a key of group_of()."""
     groups: dict[str, list[GeneratedResult]] = defaultdict(list)
     for result in results:
         groups[group_of(result, key)].append(result)
@@ -94,6 +94,13 @@ def rates_by(results: Iterable[GeneratedResult], key: str) -> dict[str, Rate]:
 
 
 def group_of(result: GeneratedResult, key: str) -> str:
-    """Return a result's ``operator``, ``class`` or ``effort``."""
+    """Return a result's ``operator``, ``when`` it strikes, ``class``, ``operation``, or ``effort`` of the last run."""
     mutant = result.mutant
-    return {"operator": mutant.operator, "class": mutant.exchange.class_, "effort": result.effort}[key]
+    operator, _, when = mutant.operator.partition("@")
+    return {
+        "operator": operator,
+        "when": when or "always",
+        "class": mutant.exchange.class_,
+        "operation": mutant.exchange.name,
+        "effort": result.effort,
+    }[key]

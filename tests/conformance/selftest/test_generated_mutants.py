@@ -150,8 +150,8 @@ def test_five_mutants_are_killed_and_one_that_alters_nothing_is_told_apart():
     results.append(GeneratedResult(named(names[5]), NOT_REACHED, effort="quick"))
     assert rate_of(results) == Rate(5, 0, 1)
     assert rates_by(results, "class")["rest-resources"] == Rate(3, 0, 1)
-    assert document(CONTRACT, results, 0)["all"]["rate"] == 1.0
-    assert "5 of 5 (100.0%, at least 56.6%), 1 not reached" in summary(CONTRACT, results)
+    assert document(7, results, 0)["all"]["rate"] == 1.0
+    assert "5 of 5 (100.0%, at least 56.6%), 1 not reached" in summary(7, results)
     report = Report(CONTRACT, "plain", generated_results=results, seed=7)
     report.compared = [SchemathesisResult(names[0], killed=True, findings=()), SchemathesisResult(names[2], False, ())]
     page = report.matrix()
