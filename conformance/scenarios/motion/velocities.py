@@ -75,14 +75,16 @@ def let_go(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
 
 def _let_go(mapped: MappedDevice, effort: Effort, hold_s: float) -> Iterator[Drive]:
     axes = list(mapped.drives.axes.items())
-    more = 0
-    for _ in range(1 if effort.name == "quick" else 2):
-        for name, axis in axes[:1] if effort.name == "quick" else axes:
+    quick, made = effort.name == "quick", 0
+    for turn in range(1 if quick else 2):
+        for name, axis in axes[:1] if quick else axes:
             for limit in _there_and_back(mapped, axis.limits, axis.of):
-                # An odd number of commands and an even one: a watchdog may work after every other command.
-                what = f"{name} {limit:g}, let go"
-                yield from _drives(mapped, what, {name: limit}, let_go_s=hold_s, more=more % 2)
-                more += 1
+                # An odd number of commands and an even one: a watchdog may work after every other command. And with
+                # readings and without: one may work only while somebody asks.
+                silent = made == 1 if quick else turn == 1
+                what = f"{name} {limit:g}, let go" + (", and nothing is read until it must rest" if silent else "")
+                yield from _drives(mapped, what, {name: limit}, let_go_s=hold_s, more=made % 2, silent=silent)
+                made += 1
     name, axis = axes[0]
     limit = next(_there_and_back(mapped, axis.limits, axis.of))
     if mapped.drives.beyond_limits == "refused":
@@ -111,6 +113,7 @@ def _drives(
     more: int = 0,
     longer: bool = False,
     refused: Position | None = None,
+    silent: bool = False,
 ) -> Iterator[Drive]:
     """Drive at a velocity; again, if a slow link let the hold time pass, or velocity 0 was answered late.
 
@@ -125,12 +128,14 @@ def _drives(
         more: how often the velocity is sent once more at the end.
         longer: whether the drive outlasts the hold time.
         refused: velocities that the device must refuse, sent after the last command; None: none are.
+        silent: whether nothing is read until the device must rest.
     """
     wanted = {**dict.fromkeys(mapped.drives.axes, 0.0), **speeds, **(ends or {})}
     for _ in range(TRIES):
         commands, readings = _kept_up(mapped, speeds, longer=longer)
         commands += [mapped.drive(speeds) for _ in range(more)]
-        drive = _ended(mapped, Drive(what, wanted, tuple(commands), tuple(readings), None, ()), let_go_s, refused)
+        drive = Drive(what, wanted, tuple(commands), tuple(readings), None, ())
+        drive = _ended(mapped, drive, let_go_s, refused, silent=silent)
         yield drive
         in_time = drive.end is None or not drive.end.was_late(drive.readings)
         if in_time and drive.was_kept(mapped.drives.hold_s):
@@ -152,16 +157,20 @@ def _kept_up(mapped: MappedDevice, speeds: Position, *, longer: bool) -> tuple[l
     return commands, readings
 
 
-def _ended(mapped: MappedDevice, drive: Drive, let_go_s: float | None, refused: Position | None) -> Drive:
+def _ended(
+    mapped: MappedDevice, drive: Drive, let_go_s: float | None, refused: Position | None, *, silent: bool
+) -> Drive:
     """End a drive by velocity 0, or let the device go; return it with what came after."""
     end = mapped.drive({}) if let_go_s is None else None
     last = end or drive.commands[-1]
-    until = last.answered + (let_go_s or 0.0) + mapped.drives.settle_s + _REST_S
+    rests_at = last.answered + (let_go_s or 0.0) + mapped.drives.settle_s
     after: list[Reading] = []
     if refused is not None and let_go_s is not None:
         after = mapped.watch(last.answered + _REFUSED_AT * let_go_s)
         mapped.drive(refused)
-    after += mapped.watch(until)
+    if silent:
+        mapped.clock.sleep(rests_at - mapped.clock.now())
+    after += mapped.watch(rests_at + _REST_S)
     if end is None:
         mapped.stop()
     return replace(drive, end=end, after=tuple(after))

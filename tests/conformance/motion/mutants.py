@@ -231,6 +231,19 @@ def _held_back(body: Body, _: float, right: Callable[[float], None]) -> None:
     right(body.now())
 
 
+def _asleep(body: Body) -> None:
+    """Let the hold time end only when somebody asks."""
+    right, woken = body.at, [0.0]
+
+    def at(now: float) -> Position:
+        if any(body.speeds.values()) and now >= body.held_until and woken[0] != body.began:
+            woken[0] = body.began
+            body.held_until = now + 0.15
+        return right(now)
+
+    body.at = at  # type: ignore[method-assign]
+
+
 def _zero_held_back(body: Body) -> None:
     right = body.drive
 
@@ -338,6 +351,7 @@ def velocity_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
     yield "watchdog-none", changed(lambda _, speeds, hold_s: (speeds, 60.0))
     yield "watchdog-late", changed(lambda _, speeds, hold_s: (speeds, 2.5 * hold_s))
     yield "watchdog-half", changed(half)
+    yield "watchdog-asleep", _asleep
     yield "not-renewed", changed(deaf)
     yield "hold-short", changed(lambda _, speeds, hold_s: (speeds, 0.3 * hold_s))
 
