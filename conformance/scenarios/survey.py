@@ -182,10 +182,11 @@ class _Surveyor:
         tried = usual_inputs(operation, self.values)
         for inputs in tried[:4]:
             self.usual.setdefault(operation.label, inputs)
-            if self.send(operation, Variation(Kind.USUAL, "", "", inputs)).ok:
+            probe = self.send(operation, Variation(Kind.USUAL, "", "", inputs))
+            if probe.ok and probe.exchange is not None:
                 self.usual[operation.label] = inputs
                 if operation.label not in self.given_up:
-                    self._note_working(operation, inputs)
+                    self._note_working(operation, inputs, probe.exchange)
                 return
             if operation.label in self.given_up:
                 return
@@ -195,12 +196,13 @@ class _Surveyor:
         told = self.api.run.tally.cut_short
         told[what] = told.get(what, 0) + 1
 
-    def _note_working(self, operation: Operation, inputs: Inputs) -> None:
+    def _note_working(self, operation: Operation, inputs: Inputs, exchange: Exchange) -> None:
         """Keep a request that was answered 2xx for other checks, if its values are plain texts and numbers."""
         values = {**inputs.path, **inputs.query}
         if all(isinstance(value, str | int | float) for value in values.values()) and not inputs.headers:
             texts = {name: text_of(value) for name, value in values.items()}
             self.api.working[operation.label] = Call(operation, texts)
+            self.api.first.setdefault(operation.label, exchange)
 
     def vary(self, operation: Operation, effort: Effort, seed: int) -> None:
         """Send requests that differ from the usual one in one thing, and then the usual one again."""

@@ -10,6 +10,7 @@ from conformance.api.device import Device, device_of
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
 
 
@@ -25,6 +26,7 @@ class RestInterface:
         small_numbers: by operation, the number that the robot accepts for its numeric parameters; empty: the example's.
         waits: how many more deferred reads may be repeated.
         working: requests that the survey of a described API found to be answered 2xx, by operation.
+        first: the usual exchange of each of these operations at the beginning of the run.
         streams: operations whose responses do not end.
         slow: operations that once took more than a second to respond.
         stop_device: stops a device with a motion map; None: it has none, or was not moved.
@@ -38,6 +40,7 @@ class RestInterface:
     small_numbers: dict[str, str] = field(default_factory=dict)
     waits: int = 5
     working: dict[str, Any] = field(default_factory=dict)
+    first: dict[str, Exchange] = field(default_factory=dict)
     streams: set[str] = field(default_factory=set)
     slow: set[str] = field(default_factory=set)
     stop_device: Callable[[], Any] | None = None

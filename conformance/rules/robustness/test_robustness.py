@@ -14,11 +14,14 @@ from conformance.rules.told_once import Fault, told_once
 from conformance.scenarios.other_exchanges import others
 from conformance.scenarios.rule import Case, NotTested, Outcome, rule
 from conformance.scenarios.survey import TIMED, Probe, Survey, generated_requests, survey
+from conformance.scenarios.timed_again import TimedAgain, timed_again
 from conformance.transport.exchange import Exchange, NoAnswer
 
 _ON = (survey, generated_requests)
 # A response time has grown when its median is so many times, and so many ms, above that of the first requests.
 _TIMES, _MS, _FEWEST = 3.0, 50.0, 15
+# A body that has become so many times as long takes longer, rightly.
+_MORE = 1.5
 
 
 @rule("robustness/no-server-error", on=_ON)
@@ -110,9 +113,12 @@ def recovers(trace: Survey) -> Iterable[Outcome]:
         yield from told_once(after, "a response as before the invalid requests", fault, apart=True)
 
 
-@rule("robustness/steady-latency", on=(survey,))
-def steady_latency(trace: Survey) -> Iterable[Outcome]:
+@rule("robustness/steady-latency", on=(survey, timed_again))
+def steady_latency(trace: Survey | tuple[TimedAgain, ...]) -> Iterable[Outcome]:
     """Judge whether one request is answered as fast after many others as at the beginning."""
+    if isinstance(trace, tuple):
+        yield from map(_at_the_end, trace)
+        return
     if len(trace.repeats) >= 3 * _FEWEST and trace.repeated is not None:
         yield _steady(trace.repeated, trace.repeats, len(trace.repeats) // 3)
     else:
@@ -122,6 +128,21 @@ def steady_latency(trace: Survey) -> Iterable[Outcome]:
         if len(timed) >= 3 * TIMED:
             times = [one.response.elapsed_ms for one in timed]
             yield replace(_steady(timed[-1], times, TIMED), cause=label, subject=label, operations=(label,))
+
+
+def _at_the_end(timed: TimedAgain) -> Case:
+    """Judge the quickest response at the end of the run; what answers with more by then may take longer."""
+    before, after = timed.first.response.elapsed_ms, min(timed.times)
+    more = len(timed.last.response.body) > _MORE * len(timed.first.response.body)
+    return Case(
+        more or after <= _TIMES * before or after - before <= _MS,
+        timed.last,
+        "a response time that does not grow during the run",
+        f"{before:.1f} ms at the beginning, at least {after:.1f} ms at the end",
+        cause=timed.operation,
+        subject=timed.operation,
+        operations=(timed.operation,),
+    )
 
 
 def _steady(last: Exchange, times: Sequence[float], number: int) -> Case:
