@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator, Sequence
 from statistics import median
 
-from conformance.scenarios.motion import moves
+from conformance.scenarios.motion import moves, several
 from conformance.scenarios.motion.trace import LATE, SEVERAL, Command, Drive, Leg, Reading, middle_of, usual_s
 from conformance.scenarios.rule import Case, NotTested, Outcome
 from conformance.statement.motion_map import MotionMap
@@ -17,10 +17,12 @@ _SHARE = 0.1
 _LAPSE_S = 0.1
 # And where it is seen to be renewed, s.
 _RENEWED_S = 0.35
+# A stop is answered no later than so long after the device must rest, s.
+_TOO_LATE_S = 1.0
 #: The scenarios in which a device moves.
 ALL = (
     moves.targets, moves.clamped_targets, moves.stops, moves.new_targets, moves.many_commands, moves.repeated,
-    moves.several_clients,
+    several.several_clients,
 )  # fmt: skip
 
 
@@ -195,9 +197,10 @@ def must_rest_from(command: Command, readings: Sequence[Reading], *, excused: bo
 def went_on(
     command: Command, readings: Sequence[Reading], speeds: dict[str, float], within_s: float, motion: MotionMap
 ) -> str:
-    """Return how far a device went while nobody saw it, if it cannot have rested in time; empty if it can.
+    """Return what shows that a device did not rest in time before a late response; empty if nothing does.
 
-    Nobody reads the state before the response to a stop; the next reading shows where the device is then.
+    Nobody reads the state before the response to a stop; the next reading shows where the device is then. And a client
+    that waits for a response much longer than for the rest cannot know that the device rests.
 
     Args:
         command: the stop, or velocity 0.
@@ -210,11 +213,14 @@ def went_on(
     after = [one for one in readings if one.values and one.sent >= command.answered]
     if not before or len(after) < SEVERAL:
         return ""
+    took_s = command.answered - command.sent
+    if took_s > within_s + usual_s(readings) + _TOO_LATE_S:
+        return f"no response for {took_s:.2f} s, {moves.TRIES} times"
     blind_s = command.sent - before[-1].sent + 2 * usual_s(readings) + within_s
     for axis, speed in speeds.items():
         way = abs(middle_of(after[:SEVERAL], axis) - before[-1].values[axis])
         if way > abs(speed) * blind_s + 2 * motion.tolerance(axis):
-            return f"{axis} {way:.3g} farther when the response came, {command.answered - command.sent:.2f} s later"
+            return f"{axis} {way:.3g} farther when the response came, {took_s:.2f} s later"
     return ""
 
 

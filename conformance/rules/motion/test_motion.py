@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 
-from conformance.rules.motion.judging import ALL, at, legs_of, moved_axis, named, off, reached, stopped, usable
-from conformance.scenarios.motion.moves import many_commands, new_targets, repeated, several_clients, stops, targets
-from conformance.scenarios.motion.trace import SEVERAL, Leg, Reading, middle_of
+from conformance.rules.motion.judging import (
+    ALL,
+    at,
+    legs_of,
+    measured,
+    moved_axis,
+    named,
+    off,
+    reached,
+    stopped,
+    usable,
+)
+from conformance.scenarios.motion.moves import many_commands, new_targets, repeated, stops, targets
+from conformance.scenarios.motion.several import several_clients, several_drivers
+from conformance.scenarios.motion.trace import SEVERAL, Drive, Leg, Reading, middle_of
 from conformance.scenarios.rule import Case, NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
 
@@ -204,10 +217,13 @@ def repetition(trace: Leg, motion: MotionMap) -> Iterator[Outcome]:
     yield from reached(trace, (accepted or list(trace.commands))[-1], motion)
 
 
-@rule("motion/one-client", on=(several_clients,))
-def one_client(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether of several clients' targets one is reached, and no mix of two."""
+@rule("motion/one-client", on=(several_clients, several_drivers))
+def one_client(trace: tuple[Leg, ...] | tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether of several clients' targets or velocities one is taken, and no mix of two."""
     for leg in trace:
+        if isinstance(leg, Drive):
+            yield from _of_one_driver(leg, motion)
+            continue
         accepted = [one for one in leg.commands if one.accepted]
         seen = usable(leg)[-SEVERAL:]
         if not accepted or len(seen) < SEVERAL:
@@ -216,3 +232,27 @@ def one_client(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
         here = at(seen, motion)
         fits = any(not off(here, one.targets, motion) for one in accepted)
         yield Case(fits, accepted[-1].exchange, "the target of one client", observed=named(here))
+
+
+def _of_one_driver(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
+    """Judge whether the device drives as one of several clients commanded."""
+    accepted = [one for one in drive.commands if one.accepted]
+    if motion.velocity is None or not accepted:
+        return
+    begin, end = (
+        accepted[-1].answered + motion.velocity.settle_s,
+        accepted[-1].sent + (motion.velocity.hold_s or math.inf),
+    )
+    seen = [one for one in drive.under_way if begin <= one.sent and one.received <= end]
+    axes = motion.velocity.axes
+    found = {name: measured(seen, name, motion) for name in axes}
+    speeds = {name: speed for name, speed in found.items() if speed is not None}
+    if len(speeds) < len(found):
+        # The hold time is too short for it, or the link too slow: positions tell enough of most devices.
+        return
+    fits = any(
+        # Each client drives one axis at its limit: nearer to that, or to rest, than to the other.
+        all(abs(speeds[name] - one.targets[name]) < max(axes[name].limits) / 2 for name in speeds)
+        for one in accepted
+    )
+    yield Case(fits, accepted[-1].exchange, "the velocity of one client", observed=named(speeds), cause="velocity")

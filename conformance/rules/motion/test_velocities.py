@@ -14,6 +14,8 @@ from conformance.statement.motion_map import MotionMap
 # Of the hold time: within that part the device must still drive, and at least at this part of its velocity.
 _HELD = (0.2, 0.7)
 _STILL_DRIVES = 0.5
+# So long after a refusal a device that it stops is seen to be slower, s.
+_SLOWS_S = 0.1
 
 
 @rule("motion/velocity", on=(velocities,))
@@ -76,6 +78,14 @@ def watchdog(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
         yield from _rests(moved, drive, f"rest {within_s:g} s after the last command ({drive.what})")
 
 
+def _held(drive: Drive, hold_s: float) -> tuple[float, float]:
+    """Return from when to when a device that was let go must still drive, also if it refused something meanwhile."""
+    last, refused = drive.commands[-1], drive.refused
+    if refused is None:
+        return last.answered + _HELD[0] * hold_s, last.sent + _HELD[1] * hold_s
+    return refused.answered + _SLOWS_S, last.sent + hold_s
+
+
 @rule("motion/hold", on=(let_go,))
 def hold(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a device that gets no command any more still drives within its hold time.
@@ -86,8 +96,8 @@ def hold(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
         return
     unseen, seen = set[str](), set[str]()
     for drive in trace:
-        last, (begin, end) = drive.commands[-1], (part * motion.velocity.hold_s for part in _HELD)
-        within = [one for one in drive.after if last.answered + begin <= one.sent and one.received <= last.sent + end]
+        last, (begin, end) = drive.commands[-1], _held(drive, motion.velocity.hold_s)
+        within = [one for one in drive.after if begin <= one.sent and one.received <= end]
         for name, wanted in drive.wanted.items():
             found = measured(within, name, motion) if wanted else None
             if found is not None:
@@ -95,7 +105,7 @@ def hold(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
                 yield Case(
                     found * wanted > 0 and abs(found) >= _STILL_DRIVES * abs(wanted),
                     last.exchange,
-                    f"{name} still driven {_HELD[1]:.0%} of the hold time after the last command ({drive.what})",
+                    f"{name} still driven {end - last.sent:.2g} s after the last command ({drive.what})",
                     observed=f"{found:.4g} in place of {wanted:.4g} per second",
                     cause=name,
                 )

@@ -5,16 +5,14 @@ from __future__ import annotations
 import random
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Final, TypeVar
 
-from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice, Position
+from conformance.scenarios.motion.mapped import MappedDevice, Position
 from conformance.scenarios.motion.trace import Command, Leg, Reading
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.statement.motion_map import Axis, Speed
-from conformance.transport.exchange import Exchange, NoAnswerError
-from conformance.transport.parallel import Outgoing, send_together
+from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
@@ -22,7 +20,6 @@ _NEEDS: Final = (Need.REST, Need.MOTION)
 _Part = TypeVar("_Part")
 # Of the way: so far a device has come when it is stopped, or gets another target.
 _UNDER_WAY: Final = 0.3
-_CLIENTS: Final = 4
 #: What a slow link or a loaded machine has spoilt is tried again: so often in all.
 TRIES: Final = 3
 # After a stop the device is watched for as long as the rest of its way would take: at least until so long after it
@@ -32,6 +29,8 @@ _AT_MOST_S: Final = 5.0
 # Beyond the time of a move that was displaced, s.
 _LONGER_S: Final = 0.5
 _COMMANDS: Final = 100
+# A velocity with a longer hold time is not commanded only to be let go, s.
+_SHORT_HOLD_S: Final = 2.0
 # Of the range of an axis: so far beyond its limits are targets that the device must not take.
 _BEYOND: Final = (0.05, 0.5)
 
@@ -137,6 +136,7 @@ def _to_stops(mapped: MappedDevice, effort: Effort, rests_s: float) -> Iterator[
 
 
 def _stopped(mapped: MappedDevice, name: str, rests_s: float) -> Leg:
+    _drive_before(mapped)
     way = _way(mapped, name)
     stop = mapped.stop()
     if stop is None:
@@ -146,14 +146,24 @@ def _stopped(mapped: MappedDevice, name: str, rests_s: float) -> Leg:
     return Leg(f"a stop of {name} under way", way.start, (way.command, stop), tuple(seen), mapped.due(stop))
 
 
+def _drive_before(mapped: MappedDevice) -> None:
+    """Drive a little and let go: a device that is stopped later must not take this velocity up again."""
+    velocity = mapped.motion.velocity
+    if velocity is not None and velocity.hold_s is not None and velocity.hold_s <= _SHORT_HOLD_S:
+        name, axis = next(iter(velocity.axes.items()))
+        last = mapped.drive({name: axis.limits[1] / 2})
+        mapped.clock.sleep(last.answered + velocity.hold_s - mapped.clock.now())
+        mapped.come_to_rest()
+
+
 @scenario(needs=_NEEDS, stage=Stage.MOTION)
 def new_targets(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
     """Send the device back under way, and watch for as long as the first move would have taken, and longer."""
-    _need_positions(mapped)
+    need_positions(mapped)
     return recorded(_to_new_targets(mapped, effort))
 
 
-def _need_positions(mapped: MappedDevice) -> None:
+def need_positions(mapped: MappedDevice) -> None:
     """Check that a move names its end: where moves are relative, nobody knows where several of them end.
 
     Raises:
@@ -176,7 +186,7 @@ def _to_new_targets(mapped: MappedDevice, effort: Effort) -> Iterator[Leg]:
 @scenario(needs=_NEEDS, stage=Stage.MOTION)
 def many_commands(mapped: MappedDevice, effort: Effort) -> Leg:
     """Send many targets in a row, without waiting for any of them."""
-    _need_positions(mapped)
+    need_positions(mapped)
     name, axis = next(iter(mapped.motion.state.axes.items()))
     ends = [axis.limits[turn % 2] for turn in range(effort.cases(_COMMANDS))]
     return _in_a_row(mapped, f"{len(ends)} targets in a row", [{name: end} for end in ends])
@@ -185,7 +195,7 @@ def many_commands(mapped: MappedDevice, effort: Effort) -> Leg:
 @scenario(needs=_NEEDS, stage=Stage.MOTION)
 def repeated(mapped: MappedDevice) -> Leg:
     """Send one move twice, as a client does that tries again."""
-    _need_positions(mapped)
+    need_positions(mapped)
     name, axis = next(iter(mapped.motion.state.axes.items()))
     here = mapped.where()[name]
     return _in_a_row(
@@ -199,47 +209,3 @@ def _in_a_row(mapped: MappedDevice, what: str, wanted: list[Position]) -> Leg:
     commands = [mapped.goto(one) for one in wanted]
     last = next((one for one in reversed(commands) if one.accepted), commands[-1])
     return Leg(what, start, tuple(commands), tuple(mapped.follow(last)) if last.accepted else (), mapped.due(last))
-
-
-@scenario(needs=_NEEDS, stage=Stage.MOTION)
-def several_clients(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
-    """Send different targets from several clients at the same moment."""
-    _need_positions(mapped)
-    return recorded(_of_clients(mapped) for _ in range(1 if effort.name == "quick" else 3))
-
-
-def _of_clients(mapped: MappedDevice) -> Leg:
-    mapped.bring_home()
-    start, axes = mapped.where(), mapped.motion.state.axes.items()
-    several = (
-        {name: axis.limits[0] + (axis.limits[1] - axis.limits[0]) * client / (_CLIENTS - 1) for name, axis in axes}
-        for client in range(_CLIENTS)
-    )
-    # A target where the device is already would be reached whatever becomes of the others.
-    wanted = [one for one in several if not mapped.is_near(start, one)]
-    sent = mapped.clock.now()
-    attempts = send_together([[_outgoing(mapped, one) for one in wanted]])[0]
-    answered = mapped.clock.now()
-    # A client whose connection was refused has sent no move.
-    commands = [
-        Command(sent, answered, one, attempt)
-        for one, attempt in zip(wanted, attempts, strict=True)
-        if isinstance(attempt, Exchange)
-    ]
-    if not commands:
-        raise NotPossibleError("none of several clients at once was answered")
-    for one in commands:
-        if one.accepted:
-            mapped.note(one.exchange)
-    due = mapped.due(commands[-1])
-    seen = mapped.watch(due, partial(_is_at_one, mapped, wanted)) + mapped.watch(mapped.clock.now() + STAYS_S)
-    return Leg("targets of several clients", start, tuple(commands), tuple(seen), due)
-
-
-def _outgoing(mapped: MappedDevice, targets: Position) -> Outgoing:
-    made = mapped.request_of(mapped.moves, targets)
-    return Outgoing(mapped.api.client, made.method, made.path, made.headers, made.body)
-
-
-def _is_at_one(mapped: MappedDevice, wanted: list[Position], readings: list[Reading]) -> bool:
-    return any(mapped.is_at(one, readings) for one in wanted)

@@ -123,6 +123,7 @@ class Drive:
         under_way: the readings until the last of them.
         end: the command of velocity zero; None: nothing was sent any more.
         after: the readings after that.
+        refused: a command after the last one that the device must refuse; None: none was sent.
     """
 
     what: str
@@ -131,6 +132,7 @@ class Drive:
     under_way: tuple[Reading, ...]
     end: Command | None
     after: tuple[Reading, ...]
+    refused: Command | None = None
 
     @property
     def readings(self) -> tuple[Reading, ...]:

@@ -164,13 +164,13 @@ def _ended(
     end = mapped.drive({}) if let_go_s is None else None
     last = end or drive.commands[-1]
     rests_at = last.answered + (let_go_s or 0.0) + mapped.drives.settle_s
-    after: list[Reading] = []
+    after, answer = list[Reading](), None
     if refused is not None and let_go_s is not None:
         after = mapped.watch(last.answered + _REFUSED_AT * let_go_s)
-        mapped.drive(refused)
+        answer = mapped.drive(refused)
     if silent:
         mapped.clock.sleep(rests_at - mapped.clock.now())
     after += mapped.watch(rests_at + _REST_S)
     if end is None:
         mapped.stop()
-    return replace(drive, end=end, after=tuple(after))
+    return replace(drive, end=end, after=tuple(after), refused=answer)

@@ -7,7 +7,7 @@ from arm import Arm
 from body import Body
 
 from conformance.observe.clock import SimulatedClock
-from conformance.scenarios.motion import attempts, moves
+from conformance.scenarios.motion import attempts, several
 from conformance.scenarios.motion.binding import JsonBinding
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.transport.exchange import Exchange, Request, Response
@@ -71,14 +71,14 @@ def played(careless):
     api = _Api(arm, clock, lambda: 0.002)
     api.careless = careless
     motion = simulated.map_of("arm")
-    mapped = MappedDevice(api, motion, clock, _Binding(api))
+    device = MappedDevice(api, motion, clock, _Binding(api))
 
-    def together(rounds):
-        return [[one.client.send(one.method, one.path, headers=one.headers, body=one.body) for one in rounds[0]]]
-
-    with patch.object(attempts, "PartialRequest", _Cut), patch.object(moves, "send_together", together):
+    with (
+        patch.object(attempts, "PartialRequest", _Cut),
+        patch.object(several, "send_together", simulated.one_after_another),
+    ):
         found = {
-            "attempts_at_rest": attempts.attempts_at_rest.play(mapped=mapped),
-            "several_clients": moves.several_clients.play(mapped=mapped, effort=Effort("quick")),
+            "attempts_at_rest": attempts.attempts_at_rest.play(mapped=device),
+            "several_clients": several.several_clients.play(mapped=device, effort=Effort("quick")),
         }
-    return found, {"mapped": mapped, "run": Run(), "motion": motion}
+    return found, {"mapped": device, "run": Run(), "motion": motion}

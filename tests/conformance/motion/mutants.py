@@ -231,6 +231,35 @@ def _held_back(body: Body, _: float, right: Callable[[float], None]) -> None:
     right(body.now())
 
 
+def _mixed(body: Body) -> None:
+    """Take the first axis of one command and the others of the one before, if both come at once."""
+    right, last = body.drive, [(-1.0, dict[str, float]())]
+
+    def drive(speeds: Position, hold_s: float, now: float) -> None:
+        (then, before), last[0] = last[0], (now, speeds)
+        mixed = {name: (before if number else speeds)[name] for number, name in enumerate(speeds)} if before else speeds
+        right(mixed if now - then < 0.01 else speeds, hold_s, now)
+
+    body.drive = drive  # type: ignore[method-assign]
+
+
+def _resumed(body: Body) -> None:
+    """Drive the last velocity again after a move was stopped."""
+    drive, halt, last = body.drive, body.halt, [dict[str, float]()]
+
+    def driven(speeds: Position, hold_s: float, now: float) -> None:
+        last[0] = speeds
+        drive(speeds, hold_s, now)
+
+    def halted(now: float) -> None:
+        moving = body.moving(now)
+        halt(now)
+        if moving and any(last[0].values()):
+            body.later.append((now + 0.4, lambda due: drive(last[0], 0.8, due)))
+
+    body.drive, body.halt = driven, halted  # type: ignore[method-assign]
+
+
 def _asleep(body: Body) -> None:
     """Let the hold time end only when somebody asks."""
     right, woken = body.at, [0.0]
@@ -352,6 +381,8 @@ def velocity_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
     yield "watchdog-late", changed(lambda _, speeds, hold_s: (speeds, 2.5 * hold_s))
     yield "watchdog-half", changed(half)
     yield "watchdog-asleep", _asleep
+    yield "velocities-mixed", _mixed
+    yield "resumes-after-stop", _resumed
     yield "not-renewed", changed(deaf)
     yield "hold-short", changed(lambda _, speeds, hold_s: (speeds, 0.3 * hold_s))
 

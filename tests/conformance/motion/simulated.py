@@ -2,6 +2,7 @@
 
 import tomllib
 from functools import partial
+from unittest.mock import patch
 
 import dome
 import msgspec
@@ -14,7 +15,7 @@ from rover import Rover
 
 from conformance.observe.clock import SimulatedClock
 from conformance.rules.motion import test_motion, test_motion_attempts, test_states, test_velocities
-from conformance.scenarios.motion import moves, states, velocities
+from conformance.scenarios.motion import moves, several, states, velocities
 from conformance.scenarios.motion.binding import SoapBinding
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.rule import Case, Rule
@@ -26,7 +27,8 @@ from conformance.verdict.run import Run
 
 _PLAYED = (
     moves.targets, moves.clamped_targets, moves.stops, moves.new_targets, moves.many_commands, moves.repeated,
-    velocities.velocities, velocities.let_go, states.agreement, states.switched,
+    velocities.velocities, velocities.let_go, states.agreement, states.switched, several.several_clients,
+    several.several_drivers,
 )  # fmt: skip
 RULES = [
     one
@@ -69,6 +71,11 @@ class Api:
         return Exchange(Request(method, f"http://device{path}", headers, body), Response(status, fields, octets, 2.0))
 
 
+def one_after_another(rounds):
+    """Send what several clients send at once: the simulated clock does not pass between them."""
+    return [[one.client.send(one.method, one.path, headers=one.headers, body=one.body) for one in rounds[0]]]
+
+
 def map_of(name):
     """Return a device's motion map."""
     return msgspec.convert(tomllib.loads(DEVICES[name][2])["motion"], MotionMap)
@@ -90,7 +97,8 @@ def played(name, mutant=None, *, noise=0.0, seed=0, takes_s=lambda: 0.002):
     given = {"mapped": mapped, "effort": effort, "run": Run(seed=seed), "motion": motion}
     for scenario in _PLAYED:
         try:
-            trace = scenario.play(**{name: given[name] for name in scenario.fixtures})
+            with patch.object(several, "send_together", one_after_another):
+                trace = scenario.play(**{name: given[name] for name in scenario.fixtures})
         except PartialTraceError as error:
             trace = error.trace
         except NotPossibleError:

@@ -1,0 +1,95 @@
+"""Scenarios in which several clients command a device at the same moment."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Final
+
+from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice, Position
+from conformance.scenarios.motion.moves import need_positions, recorded
+from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading
+from conformance.scenarios.motion.velocities import MEASURED_S
+from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.stage import Need, Stage
+from conformance.statement.motion_map import Goto, Velocity
+from conformance.transport.exchange import Exchange
+from conformance.transport.parallel import Outgoing, send_together
+from conformance.verdict.effort import Effort
+
+_NEEDS: Final = (Need.REST, Need.MOTION)
+_CLIENTS: Final = 4
+
+
+def _at_once(mapped: MappedDevice, given: Goto | Velocity, several: list[Position]) -> list[Command]:
+    """Send a command from each of several clients; return those that were answered.
+
+    A client whose connection was refused has sent none.
+
+    Raises:
+        NotPossibleError: none was answered.
+    """
+    made = [mapped.request_of(given, one) for one in several]
+    outgoing = [Outgoing(mapped.api.client, one.method, one.path, one.headers, one.body) for one in made]
+    sent = mapped.clock.now()
+    attempts = send_together([outgoing])[0]
+    answered = mapped.clock.now()
+    pairs = zip(several, attempts, strict=True)
+    found = [Command(sent, answered, one, attempt) for one, attempt in pairs if isinstance(attempt, Exchange)]
+    if not found:
+        raise NotPossibleError("none of several clients at once was answered")
+    return found
+
+
+@scenario(needs=_NEEDS, stage=Stage.MOTION)
+def several_clients(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
+    """Send different targets from several clients at the same moment."""
+    need_positions(mapped)
+    return recorded(_of_clients(mapped) for _ in range(1 if effort.name == "quick" else 3))
+
+
+def _of_clients(mapped: MappedDevice) -> Leg:
+    mapped.bring_home()
+    start, axes = mapped.where(), mapped.motion.state.axes.items()
+    several = (
+        {name: axis.limits[0] + (axis.limits[1] - axis.limits[0]) * client / (_CLIENTS - 1) for name, axis in axes}
+        for client in range(_CLIENTS)
+    )
+    # A target where the device is already would be reached whatever becomes of the others.
+    wanted = [one for one in several if not mapped.is_near(start, one)]
+    commands = _at_once(mapped, mapped.moves, wanted)
+    for one in commands:
+        if one.accepted:
+            mapped.note(one.exchange)
+    due = mapped.due(commands[-1])
+    seen = mapped.watch(due, partial(_is_at_one, mapped, wanted)) + mapped.watch(mapped.clock.now() + STAYS_S)
+    return Leg("targets of several clients", start, tuple(commands), tuple(seen), due)
+
+
+def _is_at_one(mapped: MappedDevice, wanted: list[Position], readings: list[Reading]) -> bool:
+    return any(mapped.is_at(one, readings) for one in wanted)
+
+
+@scenario(needs=_NEEDS, stage=Stage.DRIVE)
+def several_drivers(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
+    """Command different velocities from several clients at the same moment, as one drive.
+
+    Of several axes each client drives one, and a velocity that mixes two of them shows.
+    """
+    several = [
+        {**dict.fromkeys(mapped.drives.axes, 0.0), name: axis.limits[side]}
+        for side in (0, 1)
+        for name, axis in mapped.drives.axes.items()
+        if axis.limits[side]
+    ]
+    return recorded(_of_drivers(mapped, several) for _ in range(2 if effort.name == "quick" else 4))
+
+
+def _of_drivers(mapped: MappedDevice, several: list[Position]) -> Drive:
+    mapped.come_to_rest()
+    commands = _at_once(mapped, mapped.drives, several)
+    hold_s, settle_s = mapped.drives.hold_s, mapped.drives.settle_s
+    # Nothing renews it: where the hold time is shorter than the time to settle, nothing can be measured.
+    until = commands[-1].answered + min(hold_s or settle_s + MEASURED_S, settle_s + MEASURED_S)
+    seen = mapped.watch(until)
+    end = mapped.drive({})
+    return Drive("velocities of several clients", {}, tuple(commands), tuple(seen), end, ())
