@@ -87,6 +87,9 @@ def _judge_body(api: RestInterface, exchange: Exchange, answer: Response, contex
         if operation.method == "GET" and answer.status != _NO_CONTENT:
             expected = f"a body as {' or '.join(content)}"
             expect(api.run.judge, "http/declared-body", exchange).that(holds=False, expected=expected, got="no body")
+        elif answer.media_type in content and answer.status != _NO_CONTENT:
+            # It says that there is a document, and a client that asked for one reads it.
+            _judge_shape(api, exchange, answer, operation, content[answer.media_type])
         return
     media_type = answer.media_type
     declared = expect(api.run.judge, "http/declared-body", exchange).that(

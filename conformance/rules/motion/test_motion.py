@@ -20,7 +20,7 @@ from conformance.rules.motion.judging import (
 )
 from conformance.scenarios.motion.moves import many_commands, new_targets, repeated, stops, targets
 from conformance.scenarios.motion.several import several_clients, several_drivers
-from conformance.scenarios.motion.trace import SEVERAL, Drive, Leg, Reading, middle_of
+from conformance.scenarios.motion.trace import SEVERAL, Drive, Leg, Reading, fastest, middle_of
 from conformance.scenarios.rule import Case, NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
 
@@ -93,17 +93,17 @@ def speed(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
         yield NotClaimed("the map declares no greatest speed")
     for leg, (name, most) in itertools.product(legs_of(trace), limited.items()):
         seen = usable(leg)
-        fastest = 0.0
+        highest = 0.0
         for index, one in enumerate(seen):
             later = next((two for two in seen[index:] if two.sent - one.received > _APART_S), None)
             if later is not None:
                 moved = abs(later.values[name] - one.values[name]) - motion.tolerance(name)
-                fastest = max(fastest, moved / (later.received - one.sent))
+                highest = max(highest, moved / (later.received - one.sent))
         yield Case(
-            fastest <= _FASTER * most,
+            highest <= _FASTER * most,
             leg.commands[-1].exchange,
             f"{name} at {most:g} {motion.state.axes[name].unit or 'units'}/s at most ({leg.what})",
-            observed=f"{fastest:.3g} {motion.state.axes[name].unit or 'units'}/s",
+            observed=f"{highest:.3g} {motion.state.axes[name].unit or 'units'}/s",
             cause=name,
         )
 
@@ -120,7 +120,7 @@ def stop_rests(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
         goal, order = leg.commands[:2]
         where = at(readings[:SEVERAL], motion)
         soon = [one for one in readings if one.sent < readings[0].sent + _SOON_S]
-        moved = off(at(tuple(soon[-SEVERAL:]), motion), where, motion)
+        moved = off(at(tuple(soon[-SEVERAL:]), motion), where, motion) or fastest(soon, motion)
         arrived = not off(where, goal.targets, motion)
         rests_s = motion.stop.rests_within_s if motion.stop else 0.0
         yield Case(
@@ -142,7 +142,7 @@ def stop_lasts(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     for leg, readings, unusable in stopped(trace, motion):
         if unusable is None:
             where, last = at(readings[:SEVERAL], motion), at(readings[-SEVERAL:], motion)
-            moved = off(last, where, motion)
+            moved = off(last, where, motion) or fastest(readings, motion)
             after = readings[-1].sent - leg.commands[1].sent
             yield Case(
                 not moved, leg.commands[1].exchange, f"rest after {leg.what}", f"{moved}, {after:.1f} s after the stop"

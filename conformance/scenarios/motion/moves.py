@@ -151,6 +151,7 @@ def _drive_before(mapped: MappedDevice) -> None:
     velocity = mapped.motion.velocity
     if velocity is not None and velocity.hold_s is not None and velocity.hold_s <= _SHORT_HOLD_S:
         name, axis = next(iter(velocity.axes.items()))
+        mapped.come_to_rest()
         last = mapped.drive({name: axis.limits[1] / 2})
         mapped.clock.sleep(last.answered + velocity.hold_s - mapped.clock.now())
         mapped.come_to_rest()
