@@ -175,8 +175,8 @@ def striking(make: Callable[[], Change], exchange: Exchange, when: When) -> Chan
         seen = arrived(request)
         response: Response | None = None
         try:
-            struck = exchange.concerns(request) and when(seen)
-            response = change(request, forward) if struck else forward(request)
+            # The change itself leaves other operations alone.
+            response = change(request, forward) if when(seen) else forward(request)
             return response
         finally:
             with lock:
