@@ -18,6 +18,7 @@ from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.mutation.mutant import Mutant
 from conformance.mutation.self_test import self_test_of
 from conformance.selftest.generated.report import page_part
+from conformance.selftest.ways import tables
 from conformance.statement.statement import empty_statement
 from conformance.verdict.run import Run
 
@@ -163,7 +164,7 @@ def page(contract: Contract) -> str:
                 _listed(binding.mutants),
             )
             lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
-    return "\n".join([*lines, *page_part(contract)]) + "\n"
+    return "\n".join([*lines, *page_part(contract), *tables(contract)]) + "\n"
 
 
 def _listed(names: tuple[str, ...]) -> str:

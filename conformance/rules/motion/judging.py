@@ -7,7 +7,17 @@ from collections.abc import Iterator, Sequence
 from statistics import median
 
 from conformance.scenarios.motion import moves, several
-from conformance.scenarios.motion.trace import LATE, SEVERAL, Command, Drive, Leg, Reading, middle_of, usual_s
+from conformance.scenarios.motion.trace import (
+    LATE,
+    SEVERAL,
+    Command,
+    Drive,
+    Leg,
+    Reading,
+    longest_s,
+    middle_of,
+    usual_s,
+)
 from conformance.scenarios.rule import Case, NotTested, Outcome
 from conformance.statement.motion_map import MotionMap
 
@@ -191,7 +201,7 @@ def must_rest_from(command: Command, readings: Sequence[Reading], *, excused: bo
         readings: around it.
         excused: whether the link may be why its response was late; then the device may have got it late as well.
     """
-    return command.answered if excused and command.was_late(readings) else command.sent + usual_s(readings)
+    return command.answered if excused and command.was_late(readings) else command.sent + longest_s(readings)
 
 
 def went_on(

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator
 
 from conformance.rules.motion.judging import at, driven, is_each_late, measured, must_rest_from, off, went_on
-from conformance.scenarios.motion.trace import SEVERAL, Command, Drive, Reading, fastest, usual_s
+from conformance.scenarios.motion.trace import SEVERAL, Command, Drive, Reading, fastest, longest_s
 from conformance.scenarios.motion.velocities import let_go, velocities
 from conformance.scenarios.rule import Case, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
@@ -73,7 +73,7 @@ def watchdog(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
         if motion.velocity is None or motion.velocity.hold_s is None:
             continue
         last, within_s = drive.commands[-1], motion.velocity.hold_s + motion.velocity.settle_s
-        due = last.answered + within_s + usual_s(drive.after)
+        due = last.answered + within_s + longest_s(drive.readings)
         moved = _at_rest([one for one in drive.after if one.sent >= due], motion)
         yield from _rests(moved, drive, f"rest {within_s:g} s after the last command ({drive.what})")
 

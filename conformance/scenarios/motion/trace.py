@@ -220,6 +220,11 @@ def usual_s(readings: Sequence[Reading]) -> float:
     return median(one.received - one.sent for one in readings) if readings else 0.0
 
 
+def longest_s(readings: Sequence[Reading]) -> float:
+    """Return how long the slowest reading took, s: a loaded machine or link may delay anything else by as much."""
+    return max((one.received - one.sent for one in readings), default=0.0)
+
+
 def fastest(readings: Sequence[Reading], motion: MotionMap) -> str:
     """Return a measured velocity that is not zero in some readings in a row; empty if there is none."""
     seen = [one.speeds for one in readings if one.speeds]

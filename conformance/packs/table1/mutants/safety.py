@@ -42,7 +42,7 @@ class _GoingOn:
     ``act`` is called ``delay_s`` after the command, and then again for ``lasting_s``.
     """
 
-    def __init__(self, act: Callable[[Request, Forward], None], delay_s: float, lasting_s: float = 0.0) -> None:
+    def __init__(self, act: Callable[[Request, Forward], object], delay_s: float, lasting_s: float = 0.0) -> None:
         self._act, self._delay_s, self._lasting_s = act, delay_s, lasting_s
         self._turn = 0
 
@@ -209,6 +209,23 @@ def _torn(side: str, _octets: bytes, forward: Forward) -> None:
 _mutant("safety-relentless", "watchdog", "The robot drives on for 10 s after a velocity command.").made(
     lambda: _GoingOn(_again, 0.15, 10.0)
 )
+
+
+class _GoingOnAfterXml(_GoingOn):
+    """The same for velocities that are sent as XML."""
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        if (_PUT(request) or _PUT_GOAL(request)) and success(response):
+            self._turn += 1
+            if "xml" in request.media_type:
+                self.begin(request, forward)
+        return response
+
+
+_mutant(
+    "safety-relentless-after-xml", "watchdog", "The robot drives on for 10 s after a velocity that was sent as XML."
+).made(lambda: _GoingOnAfterXml(lambda request, forward: forward(request.copy()), 0.15, 10.0))
 _mutant("safety-long-winded", "hold-ends", "A velocity command holds 1.5 times as long as declared.").made(
     lambda: _GoingOn(_again, 0.55)
 )

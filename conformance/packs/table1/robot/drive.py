@@ -17,6 +17,7 @@ from conformance.packs.table1.robot.letting_go import COUNTED_ON_S, certain_s
 from conformance.packs.table1.robot.renewing import Renewing
 from conformance.packs.table1.robot.robot import STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.windows import SEVERAL
+from conformance.packs.table1.robot.xml_commands import put_velocity_as_xml
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
 
@@ -47,12 +48,13 @@ class Drive:
         self._turn_at = 0.0
         self._crowded = False
 
-    def command(self, velocity: Velocity, *, integers: bool = False) -> bool:
+    def command(self, velocity: Velocity, *, integers: bool = False, xml: bool = False) -> bool:
         """PUT a velocity; return whether the response conforms to the contract.
 
         Args:
             velocity: a velocity within the robot's limits.
             integers: write whole numbers without a fraction.
+            xml: send it as XML, if the robot sends its own as XML and takes it.
 
         Raises:
             NotPossibleError: the robot pursues a goal, so that it cannot be driven.
@@ -62,7 +64,8 @@ class Drive:
             whole = {part: {axis: int(value) for axis, value in side.items()} for part, side in velocity.twist.items()}
             exchange = self.robot.put(VELOCITY, whole)
         else:
-            exchange = self.robot.put_velocity(velocity)
+            as_xml = put_velocity_as_xml(self.robot, velocity) if xml else None
+            exchange = as_xml if as_xml and as_xml.response.ok else self.robot.put_velocity(velocity)
         return self._commanded(Command(velocity, sent, self.clock.now(), exchange, integers=integers))
 
     def command_linear(self, velocity: Velocity) -> bool:

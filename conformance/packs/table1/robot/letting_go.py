@@ -5,7 +5,7 @@ Functions here judge a record and send nothing.
 
 import itertools
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot import windows
@@ -28,6 +28,8 @@ _LATE_S: Final = 0.02
 _GAP: Final = 0.25
 # Where no hold time is declared a velocity has to end within so long, s.
 _ENDS_S: Final = 10.0
+#: How a velocity is commanded last: by both parts, by a PUT of the linear part, or by both as XML.
+Way = Literal["velocity", "linear", "xml"]
 
 
 def certain_s(hold_s: float | None, share: float = _COUNTED_ON) -> float:
@@ -51,7 +53,7 @@ class LetGo:
         turns: the readings since.
         resumed: the first reading after a pause without requests; None: there was no pause.
         due: when the pause was to end, s of the run's clock; None: there was no pause.
-        by_linear: whether the last command was a PUT of the linear part.
+        by: what the last command was: the velocity, its linear part, or the velocity as XML.
     """
 
     velocity: Velocity
@@ -60,12 +62,14 @@ class LetGo:
     turns: tuple[Turn, ...]
     resumed: int | None = None
     due: float | None = None
-    by_linear: bool = False
+    by: Way = "velocity"
 
     @property
     def command(self) -> str:
         """Return what commanded the velocity, as a noun phrase."""
-        return "a PUT of its linear part" if self.by_linear else "a PUT of the velocity"
+        return {"linear": "a PUT of its linear part", "xml": "a PUT of the velocity as XML"}.get(
+            self.by, "a PUT of the velocity"
+        )
 
     def holds_by(self, limits: Limits, count: int) -> bool | None:
         """Return whether the first ``count`` readings end with the velocity; None where they are too few to tell."""

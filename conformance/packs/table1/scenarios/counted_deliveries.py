@@ -9,7 +9,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.calls import call
 from conformance.api.soap.service import SoapService
-from conformance.packs.table1.delivery import COURIER
+from conformance.packs.table1.delivery import COFFEE, COURIER
 from conformance.packs.table1.robot.deliveries_seen import DeliveryObserver, NoObserverError, observer_of
 from conformance.packs.table1.robot.delivery import Delivery, path_of, put_delivery
 from conformance.packs.table1.robot.delivery_messages import request
@@ -25,10 +25,21 @@ _BAD_PARTS: Final = (
     *((0, text) for text in ("0", "5", "abc", "", "3.5", "2147483648")),
     *((place, text) for place in (1, 4, 6) for text in ("abc", "", "NaN", "Infinity", "-Infinity", "1e400")),
 )
-_NO_FORMAT: Final = Delivery(3, 21.0, 22.0, 23.0, 24.0, 25.0, 26.0)
-_LAST: Final = Delivery(3, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0)
-_TWICE: Final = Delivery(COURIER, 70.5, 71.5, 72.5, 73.5, 74.5, 75.5)
-_APART: Final = Delivery(COURIER, 80.5, 81.5, 82.5, 83.5, 84.5, 85.5)
+
+
+def _of(code: int, first: int) -> Delivery:
+    """Return a delivery whose numbers need all digits of a double."""
+    return Delivery(code, *(first + place + 1 / 7 for place in range(6)))
+
+
+_NO_FORMAT: Final = _of(3, 21)
+_LAST: Final = _of(3, 11)
+_TWICE: Final = _of(COURIER, 70)
+_APART: Final = _of(COURIER, 80)
+# The requests after refused ones, over either interface.
+_AFTER_REST: Final = _of(3, 90)
+_AFTER_SOAP: Final = _of(COURIER, 100)
+_AFTER_SOAP_COFFEE: Final = _of(COFFEE, 110)
 
 
 @dataclass(frozen=True)
@@ -68,6 +79,7 @@ class CountedDeliveries:
         no_format: the valid delivery whose Accept header excludes all formats.
         answer: its exchange, or None if no observer shows arrivals.
         last: a valid delivery after them, which must arrive.
+        after: valid deliveries just after invalid ones, with their exchanges.
         keyed: those with a key, or None if no observer shows arrivals.
         seen: the deliveries that arrived; None: no observer shows them.
         unseen: why no observer shows them, or empty.
@@ -78,6 +90,7 @@ class CountedDeliveries:
     no_format: Delivery = _NO_FORMAT
     answer: Exchange | None = None
     last: Delivery = _LAST
+    after: tuple[tuple[Delivery, Exchange], ...] = ()
     keyed: Keyed | None = None
     seen: tuple[Delivery, ...] | None = None
     unseen: str = ""
@@ -85,7 +98,8 @@ class CountedDeliveries:
     @property
     def known(self) -> set[Delivery]:
         """Return the valid deliveries among them."""
-        return {self.last, self.no_format, _TWICE, _APART, *(one.delivery for one in self.by_method)}
+        own = {self.last, self.no_format, _TWICE, _APART}
+        return own | {one.delivery for one in self.by_method} | {delivery for delivery, _ in self.after}
 
     @property
     def twice_arrived(self) -> int:
@@ -116,7 +130,13 @@ def counted_deliveries(api: RestInterface, soap: SoapServices, probe: RosProbe) 
     # No robot may know the keys from an earlier run.
     first, second, third = (str(uuid.uuid4()) for _ in range(3))
     keyed = Keyed(_put(api, _TWICE, (first, first)), _put(api, _APART, (second, third)))
-    wanted = 1 + answer.response.ok + keyed.twice[0].response.ok + keyed.accepted_apart
+    wanted = (
+        1
+        + sum(exchange.response.ok for _, exchange in trace.after)
+        + answer.response.ok
+        + keyed.twice[0].response.ok
+        + keyed.accepted_apart
+    )
     try:
         seen = [one.delivery for one in observer.collect(wanted)]
         # A robot that makes a message too many sends it in the place of the last one here.
@@ -133,13 +153,17 @@ def _invalid(api: RestInterface, soap: SoapServices) -> CountedDeliveries:
     for place, text in api.run.effort.subsample(_BAD_PARTS, 8):
         values = [*CORRECT[:place], text, *CORRECT[place + 1 :]]
         invalid.append(rest.send("PUT", path_of(*values), fresh=True))
+    after = [(_AFTER_REST, put_delivery(api, _AFTER_REST.rest_path, fresh=True))]
     by_method = []
     for number, method in enumerate(api.run.effort.subsample(_OTHER_METHODS, 3)):
-        delivery = Delivery(3, *(30.0 + 10 * number + place for place in range(6)))
+        delivery = _of(3, 200 + 10 * number)
         by_method.append(ByMethod(method, delivery, rest.send(method, delivery.rest_path, fresh=True)))
     if soap.publishers is not None:
         invalid += _invalid_soap(soap.publishers)
-    return CountedDeliveries(tuple(invalid), tuple(by_method))
+        after.append((_AFTER_SOAP_COFFEE, send_delivery(soap.publishers, _AFTER_SOAP_COFFEE, coffee=True)))
+        invalid.append(send_delivery(soap.publishers, Delivery(0, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5)))
+        after.append((_AFTER_SOAP, send_delivery(soap.publishers, _AFTER_SOAP)))
+    return CountedDeliveries(tuple(invalid), tuple(by_method), after=tuple(after))
 
 
 def _put(api: RestInterface, delivery: Delivery, keys: Sequence[str]) -> tuple[Exchange, ...]:

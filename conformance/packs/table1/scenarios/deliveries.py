@@ -109,7 +109,7 @@ def _crowd(turn: int) -> list[list[tuple[str, Delivery]]]:
     """Return rounds of deliveries to send at the same moment; no two of them share a number."""
     return [
         [
-            (how, Delivery(code, *(1e6 * turn + 1e4 * round_ + 100 * client + place + 0.5 for place in range(6))))
+            (how, Delivery(code, *(1e6 * turn + 1e4 * round_ + 100 * client + place + 1 / 3 for place in range(6))))
             for client, (how, code) in enumerate(_CLIENTS)
         ]
         for round_ in range(_ROUNDS)

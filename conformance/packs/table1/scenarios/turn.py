@@ -10,7 +10,7 @@ from conformance.packs.table1.robot.abilities import ABOUT, AHEAD, turn_beside
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART
 from conformance.packs.table1.robot.goals import make_room
-from conformance.packs.table1.robot.letting_go import LetGo, ends_by
+from conformance.packs.table1.robot.letting_go import LetGo, Way, ends_by
 from conformance.packs.table1.robot.robot import FARTHEST, STILL, Robot, Velocity
 from conformance.packs.table1.robot.undisturbed import arc, renewed
 from conformance.packs.table1.robot.velocity_range import both, fastest, handy, reach, slowest_along
@@ -68,8 +68,8 @@ def further_axes(robot: Robot) -> Driven:
 
 def unrenewed(
     bent: Velocity, ahead: Velocity, limits: tuple[Velocity, ...], effort: str, seed: int
-) -> list[tuple[Velocity, bool]]:
-    """Return velocities that are not renewed, and whether a PUT of the linear part commands them last.
+) -> list[tuple[Velocity, Way]]:
+    """Return velocities that are not renewed, and what commands them last.
 
     A robot may keep a watchdog for each path, one for each sign, and one for velocities at its limits. One at the
     limits that drives ahead is the one of its path and sign. At the effort "quick" the seed says which is tried.
@@ -83,13 +83,19 @@ def unrenewed(
     """
     chance = random.Random(f"{seed}/ways")  # noqa: S311 - no secret
     limits = tuple(chance.sample(limits, len(limits)))
-    ways = [(bent, bool(bent.linear_x)), (bent, False), (ahead, bool(ahead.linear_x)), (limits[0], False)]
+    ways: list[tuple[Velocity, Way]] = [
+        (bent, "linear" if bent.linear_x else "velocity"),
+        (bent, "velocity"),
+        (ahead, "linear" if ahead.linear_x else "velocity"),
+        (limits[0], "velocity"),
+        (ahead, "xml"),
+    ]
     if limits[0].linear_x <= 0:
-        ways.append((ahead, False))
+        ways.append((ahead, "velocity"))
     if effort == "quick":
         ways = [chance.choice(ways)]
     elif effort != "standard":
-        ways += [(one, False) for one in (*limits, ahead)]
+        ways += [(one, "velocity") for one in (*limits, ahead)]
     return [way for way in dict.fromkeys(ways) if any(way[0])]
 
 
@@ -142,16 +148,16 @@ class _Turning:
             # A small circle: either part has to end. The linear part is commanded last, and ends as well.
             bent, before = self._bent(bent)
             arc(robot, drive, bent, before)
-        for velocity, by_linear in self._unrenewed(bent, run):
-            self.let_go(velocity, by_linear=by_linear)
+        for velocity, by in self._unrenewed(bent, run):
+            self.let_go(velocity, by)
         if robot.actuated(AHEAD) and robot.actuated(ABOUT):
             self._ahead_from_rest()
 
-    def _unrenewed(self, bent: Velocity, run: Run) -> list[tuple[Velocity, bool]]:
+    def _unrenewed(self, bent: Velocity, run: Run) -> list[tuple[Velocity, Way]]:
         """Return what unrenewed() returns; without a declared hold time one velocity is enough."""
         robot = self.robot
         if robot.limits.hold_s is None:
-            return [(bent, False)]
+            return [(bent, "velocity")]
         ahead = robot.drivable(Velocity(*(-one for one in bent)))
         limits = (self._slow(), self.fastest) if robot.actuated(ABOUT) else (ahead,)
         return unrenewed(bent, ahead, limits, run.effort.name, run.seed)
@@ -220,8 +226,8 @@ class _Turning:
         expected = f"no angular part beside {ahead}: the one before it had ended"
         drive.saw("rest-resources/linear-keeps-angular", expected, seen, "came back", holds=keeps)
 
-    def let_go(self, turning: Velocity, *, by_linear: bool = False) -> None:
-        """Stop renewing a velocity, and watch how it ends; ``by_linear``: a PUT of the linear part commands it last.
+    def let_go(self, turning: Velocity, by: Way = "velocity") -> None:
+        """Stop renewing a velocity, and watch how it ends; ``by``: what commands it last.
 
         A measurement that a stall of the suite or a late response spoilt is made again. One that shows a robot that
         does not come to rest is never made again: a watchdog that stops most velocities is none. Where the robot still
@@ -229,7 +235,7 @@ class _Turning:
         """
         limits, tries = self.robot.limits, []
         for _ in range(_ATTEMPTS if limits.hold_s else 1):
-            let_go = self._watch(turning, by_linear=by_linear)
+            let_go = self._watch(turning, by)
             if let_go is None:
                 break
             tries.append(let_go)
@@ -246,7 +252,7 @@ class _Turning:
         if tries:
             self.tries.append(tuple(tries))
 
-    def _watch(self, turning: Velocity, *, by_linear: bool) -> LetGo | None:
+    def _watch(self, turning: Velocity, by: Way) -> LetGo | None:
         """Command a velocity, and look until the robot rests or its time is over; return None if it is rejected.
 
         With a declared hold time, the suite does not read the robot around the end of that time, because a velocity
@@ -257,14 +263,19 @@ class _Turning:
         if last is None or last.velocity != turning or clock.now() > drive.holds_until:
             drive.refresh(turning)
         # Given again once: a robot that takes that for a repetition ends it clearly too early.
-        if limits.hold_s is None or not self.tries or clock.now() > drive.trace.full_sent + _SOON * limits.hold_s:
+        if (
+            by == "xml"
+            or limits.hold_s is None
+            or not self.tries
+            or clock.now() > drive.trace.full_sent + _SOON * limits.hold_s
+        ):
             drive.keep(drive.trace.full_sent + _AGAIN * (limits.hold_s or 0.0) - clock.now())
-            drive.command(turning)
+            drive.command(turning, xml=by == "xml")
         last = drive.trace.last_full
         if last is None or not drive_rules.answer_of(last).holds:
             return None
         full = last.sent
-        if by_linear:
+        if by == "linear":
             drive.command_linear(turning)
         answered = drive.trace.commands[-1].answered
         first, resumed, due = len(drive.trace.turns), None, None
@@ -272,7 +283,7 @@ class _Turning:
         silent_from = math.inf if limits.hold_s is None else full + 0.95 * limits.hold_s
         while True:
             drive.glance() if drive.paces and resumed is None else drive.look()
-            let_go = LetGo(turning, full, answered, drive.trace.turns[first:], resumed, due, by_linear)
+            let_go = LetGo(turning, full, answered, drive.trace.turns[first:], resumed, due, by)
             if let_go.is_decided(limits, ends):
                 return let_go
             if resumed is None and clock.now() > silent_from:

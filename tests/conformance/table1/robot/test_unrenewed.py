@@ -15,8 +15,9 @@ def _ways(effort: str, seed: int) -> list[tuple[Velocity, bool]]:
 @pytest.mark.parametrize("seed", range(8))
 def test_each_path_and_each_sign_is_let_go_for_every_seed(effort, seed):
     ways = _ways(effort, seed)
-    assert {(velocity.linear_x > 0, by_linear) for velocity, by_linear in ways if velocity.linear_x} == {
-        (ahead, by_linear) for ahead in (False, True) for by_linear in (False, True)
+    assert {(velocity.linear_x > 0, by) for velocity, by in ways if velocity.linear_x} == {
+        (True, "xml"),
+        *((ahead, by) for ahead in (False, True) for by in ("velocity", "linear")),
     }
     assert {_SLOW, _BOTH} & {velocity for velocity, _ in ways}
 
@@ -29,4 +30,4 @@ def test_at_quick_seeds_let_each_of_them_go():
 
 def test_a_robot_without_a_reverse_gear_lets_no_rest_go():
     straight = Velocity(linear_x=0.2)
-    assert unrenewed(straight, Velocity(), (straight,), "standard", 0) == [(straight, True), (straight, False)]
+    assert unrenewed(straight, Velocity(), (straight,), "standard", 0) == [(straight, "linear"), (straight, "velocity")]

@@ -69,7 +69,7 @@ def hold(trace: Driven, run: Run) -> Iterator[Outcome]:
             late = "responses came too late to see a velocity in its hold time"
             seen_after = any(tries[-1].was_held(limits) for tries in trace.let_go)
             # The linear part is commanded after the whole velocity, and read one response later.
-            yield Note(f"{late} after {last.command}") if last.by_linear and seen_after else NotTested(late)
+            yield Note(f"{late} after {last.command}") if last.by == "linear" and seen_after else NotTested(late)
         else:
             seen = early or last.turns[0]
             yield Case(

@@ -41,6 +41,25 @@ def not_acceptable_delivery(trace: CountedDeliveries) -> Iterator[Outcome]:
 
 
 @rule("equivalence/delivery-rest", on=(counted_deliveries,))
+def rest_after_refusals(trace: CountedDeliveries) -> Iterator[Outcome]:
+    """Judge that a valid delivery just after invalid ones arrives as it was sent."""
+    yield from _arrived(trace, soap=False)
+
+
+@rule("equivalence/delivery-soap", on=(counted_deliveries,))
+def soap_after_refusals(trace: CountedDeliveries) -> Iterator[Outcome]:
+    """Judge that a valid delivery just after invalid messages arrives as it was sent."""
+    yield from _arrived(trace, soap=True)
+
+
+def _arrived(trace: CountedDeliveries, *, soap: bool) -> Iterator[Outcome]:
+    for delivery, exchange in trace.after if _shown(trace) else ():
+        if exchange.response.ok and (exchange.request.method == "POST") is soap:
+            found = f"{delivery} is not among {len(trace.seen or ())} messages"
+            yield Case(delivery in (trace.seen or ()), exchange, f"a message for {delivery}", found)
+
+
+@rule("equivalence/delivery-rest", on=(counted_deliveries,))
 def accepted_delivery(trace: CountedDeliveries) -> Iterator[Outcome]:
     """Judge that a delivery whose Accept header excludes all formats arrives if the robot accepts it."""
     if _shown(trace) and trace.answer is not None and trace.answer.response.ok:
