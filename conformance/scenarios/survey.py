@@ -37,6 +37,8 @@ _ACTING: Final = 12
 #: At standard effort the usual request is sent and timed so often before the groups of others and after each: a failure
 #: in one call of twenty is met.
 TIMED: Final = 5
+# One of so many requests is the first on its connection.
+_FRESH: Final = 5
 # How often a thing is created and deleted.
 _CYCLES: Final = 24
 # An operation that once took more than a second gets this part of the requests.
@@ -142,7 +144,9 @@ class _Surveyor:
         request = request or written(operation, variation.inputs)
         exchange, unanswered = None, None
         try:
-            exchange = self._recorded(request)
+            # A device may treat the first request on a connection in another way than those after it.
+            fresh = variation.kind is Kind.USUAL or len(self.probes) % _FRESH == 0
+            exchange = self._recorded(request, fresh=fresh)
         except NoAnswerError as none:
             unanswered = none.unanswered
             if none.kind in {NoAnswer.TIMEOUT, NoAnswer.CIRCUIT_OPEN}:
@@ -161,7 +165,7 @@ class _Surveyor:
             self.values.learn(operation, exchange)
         return self.probes[-1]
 
-    def _recorded(self, request: GeneratedRequest) -> Exchange:
+    def _recorded(self, request: GeneratedRequest, *, fresh: bool) -> Exchange:
         """Send a request whose exchange becomes a probe, so that no observer judges it as well.
 
         Raises:
@@ -169,7 +173,7 @@ class _Surveyor:
         """
         self.api.is_recorded = True
         try:
-            return request.send(self.api)
+            return request.send(self.api, fresh=fresh)
         finally:
             self.api.is_recorded = False
 

@@ -29,13 +29,13 @@ class GeneratedRequest:
         """The Content-Type without parameters."""
         return self.content_type.split(";", 1)[0].strip().lower()
 
-    def send(self, api: RestInterface) -> Exchange:
-        """Send the request through the run's client.
+    def send(self, api: RestInterface, *, fresh: bool = False) -> Exchange:
+        """Send the request through the run's client; ``fresh``: on a connection of its own.
 
         Raises:
             NoAnswerError: no HTTP response was received.
         """
         fields = [*self.headers, *([("Content-Type", self.content_type)] if self.content_type else [])]
         # Clients send these again when a kept connection ends (RFC 9112 9.3.1), which hides a device that hangs up.
-        fresh = self.method in {"PUT", "DELETE"}
+        fresh = fresh or self.method in {"PUT", "DELETE"}
         return api.client.send(self.method, self.target, headers=fields, body=self.body, fresh=fresh)

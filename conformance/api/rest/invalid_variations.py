@@ -121,6 +121,8 @@ def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:
     yield from _beyond_texts(schema)
     if isinstance(schema.get("enum"), list) and schema["enum"]:
         yield UNKNOWN, "which is none of its values"
+        if all(isinstance(one, str) for one in schema["enum"]):
+            yield f"{UNKNOWN}é", "which is none of its values, and beyond ASCII"
     if isinstance(schema.get("maxItems"), int) and schema["maxItems"] <= _MOST_ITEMS:
         items = schema.get("items")
         one = sample(items if isinstance(items, dict) else {})
