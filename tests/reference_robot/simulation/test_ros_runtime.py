@@ -40,7 +40,8 @@ def test_a_closed_runtime_leaves_no_node_on_the_graph_and_no_thread(domain_id):
                 until(lambda: {"base", "navigation", "delivery"} <= set(watcher.get_node_names()))
             until(lambda: watcher.get_node_names() == ["watcher"])
             assert simulation  # it is closing that ends the nodes, and not the garbage collector
-    assert set(threading.enumerate()) == threads
+    # Threads of tests before may have ended meanwhile.
+    assert set(threading.enumerate()) <= threads
 
 
 def test_closing_twice_and_starting_twice_do_nothing_more(domain_id):
