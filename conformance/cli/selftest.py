@@ -50,7 +50,9 @@ _SHORT = 15
     help="Effort of the first run; a survivor is tested again at standard.",
 )
 @click.option(
-    "--compare/--no-compare", default=True, help="Run the plain Schemathesis command line against REST mutants too."
+    "--compare/--no-compare",
+    default=True,
+    help="Run the plain Schemathesis command line against REST mutants too; with --api, also Specmatic if installed.",
 )
 @click.option(
     "--variants/--no-variants",

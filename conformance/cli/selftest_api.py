@@ -5,6 +5,7 @@ from __future__ import annotations
 import fnmatch
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
@@ -97,4 +98,5 @@ def run_api(
             if compared:
                 operations = callable_operations(report.contract, options)
                 mutants = [one.as_mutant() for one in chosen]
-                compare(report, pool, mutants, progress, lambda: best_settings(pool, operations, unchanged.seconds))
+                as_long = partial(best_settings, pool, operations=operations, seconds=unchanged.seconds)
+                compare(report, pool, mutants, progress, as_long)

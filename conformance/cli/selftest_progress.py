@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import click
@@ -10,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from conformance.mutation.mutant import Mutant
-    from conformance.selftest.comparison import SchemathesisResult, Settings
+    from conformance.selftest.comparison import Comparison, Settings, Tool, ToolResult
     from conformance.selftest.controls import ControlResult
     from conformance.selftest.generated.judging import GeneratedResult
     from conformance.selftest.mutant_run import MutantResult, Pool
@@ -24,7 +25,6 @@ class Progress:
         self.total = total
         self._report = report
         self._done = 0
-        self._compared = 0
         self._controls = 0
 
     def mutant(self, result: MutantResult) -> None:
@@ -44,12 +44,11 @@ class Progress:
         line = f"[{self._done}/{self.total}] {result.mutant.name}: {result.outcome}{by} ({result.seconds:.1f} s)"
         click.echo(line, err=True)
 
-    def compared(self, result: SchemathesisResult) -> None:
-        """Report the result of Schemathesis on a mutant."""
-        self._report.compared.append(result)
-        self._compared += 1
+    def compared(self, comparison: Comparison, result: ToolResult) -> None:
+        """Report the result of another tool on a mutant."""
+        comparison.results.append(result)
         said = f"killed: {result.findings[0]}" if result.killed else "survived"
-        click.echo(f"[{self._compared}] Schemathesis, {result.mutant}: {said}", err=True)
+        click.echo(f"[{len(comparison.results)}] {comparison.tool}, {result.mutant}: {said}"[:400], err=True)
 
     def control(self, result: ControlResult) -> None:
         """Report the result of a good device."""
@@ -74,18 +73,25 @@ def compare(
     pool: Pool,
     mutants: Iterable[Mutant],
     progress: Progress,
-    settings: Callable[[], Settings] | None = None,
+    settings: Callable[[Tool], Settings] | None = None,
 ) -> None:
-    """Run plain Schemathesis on the REST mutants, with settings that are made then, and add the results."""
+    """Run other tools on the REST mutants, and add the results: Specmatic only if ``settings`` makes the settings."""
     from conformance.selftest import comparison  # noqa: PLC0415 - it costs what --help need not pay
 
-    if comparison.command() is None:
+    plain = comparison.schemathesis()
+    if plain is None:
         report.notes.append("Schemathesis' command line is not installed, so that nothing was compared with it.")
         return
-    chosen = settings() if settings else comparison.Settings()
-    good, report.compared = comparison.compare(pool, mutants, settings=chosen, tell=progress.compared)
-    report.good = tuple(sorted(f"{operation} {code}" for operation, code in good))
+    mutants = list(mutants)
+    chosen = settings(plain) if settings else comparison.Settings()
+    beside = comparison.specmatic() if settings else None
+    for tool in filter(None, (plain, beside)):
+        one = comparison.Comparison(tool.name)
+        report.compared.append(one)
+        one.good = comparison.compare(pool, mutants, tool, chosen, partial(progress.compared, one))
     report.notes.append(
         f"Schemathesis ran with all checks, --max-examples {chosen.examples}, phases {chosen.phases}, and at most "
         f"{chosen.limit_s:g} s for each mutant; findings that it has of the good device as well do not count."
     )
+    if settings and beside is None:
+        report.notes.append("Specmatic is not installed (pip install specmatic, and a Java), so that it was not run.")

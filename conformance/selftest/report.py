@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from conformance.contract.pack import DEFAULT_PACK, Contract
-from conformance.selftest.comparison import SchemathesisResult
+from conformance.selftest.comparison import Comparison
 from conformance.selftest.controls import ControlResult
 from conformance.selftest.generated import api_report
 from conformance.selftest.generated import report as by_rule
@@ -23,7 +23,7 @@ class Report:
         target: the good device behind the mutants.
         mutant_results: results of the hand-written mutants.
         control_results: results of the good devices.
-        compared: results of Schemathesis on the mutants; ``good``: its findings on the good device.
+        compared: what each other tool reports.
         notes: remarks for the reader.
         generated_results: results of the generated mutants.
         seed: seed of the sample of generated mutants.
@@ -36,8 +36,7 @@ class Report:
     target: str
     mutant_results: list[MutantResult] = field(default_factory=list)
     control_results: list[ControlResult] = field(default_factory=list)
-    compared: list[SchemathesisResult] = field(default_factory=list)
-    good: tuple[str, ...] = ()
+    compared: list[Comparison] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     seconds: float = 0.0
     generated_results: list[GeneratedResult] = field(default_factory=list)
@@ -107,12 +106,15 @@ class Report:
                 }
                 for result in self.control_results
             ],
-            "schemathesis": {
-                "of_the_good_robot": list(self.good),
-                "faults": [
-                    {"name": seen.mutant, "caught": seen.killed, "findings": list(seen.findings)}
-                    for seen in self.compared
-                ],
+            "compared": {
+                one.tool: {
+                    "of_the_good_robot": list(one.good),
+                    "faults": [
+                        {"name": seen.mutant, "caught": seen.killed, "findings": list(seen.findings)}
+                        for seen in one.results
+                    ],
+                }
+                for one in self.compared
             },
             **(
                 {"generated": by_rule.document(self.exist, self.generated_results, self.seed)}
@@ -137,15 +139,16 @@ class Report:
     def matrix(self) -> str:
         """Return Markdown tables: each mutant with the requirements that killed it; rates of generated mutants."""
         if self.contract.described:
-            seen = self.generated_results, self.blamed, self.compared, self.good
-            return api_report.page(self.target, *seen, self.notes)
+            return api_report.page(self.target, self.generated_results, self.blamed, self.compared, self.notes)
         if self.generated_results:
-            theirs = {seen.mutant: seen.killed for seen in self.compared}
+            theirs = {seen.mutant: seen.killed for one in self.compared for seen in one.results}
             pack = "" if self.contract.name == DEFAULT_PACK else f" --contract {self.contract.name}"
             number = len(self.generated_results)
             command = f"roaas selftest --{self.option} {number} --seed {self.seed} --target {self.target}{pack}"
             return by_rule.rates_page(command, self.exist, self.generated_results, theirs, self.notes)
-        compared = {seen.mutant: "killed" if seen.killed else "survived" for seen in self.compared}
+        compared = {
+            seen.mutant: "killed" if seen.killed else "survived" for one in self.compared for seen in one.results
+        }
         lines = [
             "# Mutants, and what killed them",
             "",
@@ -199,14 +202,12 @@ class Report:
             alarms = "; ".join(f"{id_}: {why[:200]}" for id_, why in self.blamed.items()) or "none"
             lines.append(f"False alarms on the unchanged device: {alarms}")
             only = api_report.only_theirs(self.generated_results, self.compared)
-            lines += [f"KILLED BY SCHEMATHESIS ALONE {one}" for one in only]
-        if self.compared:
-            theirs = {seen.mutant for seen in self.compared if seen.killed}
+            lines += [f"KILLED BY {one}" for one in only]
+        for other in self.compared:
             ours = {result.mutant.name for result in self.tried if not result.survived}
             ours |= {result.mutant.name for result in self.generated_results if result.outcome == KILLED}
-            ours &= {seen.mutant for seen in self.compared}
             lines.append(
-                f"Of {len(self.compared)} mutants of REST, the plain Schemathesis command line killed {len(theirs)}, "
-                f"this suite {len(ours)}; of the good device it reports {len(self.good)} findings"
+                f"Of {len(other.results)} mutants of REST, {other.tool} killed {len(other.killed)}, this suite "
+                f"{len(ours & other.tried)}; of the good device it reports {len(other.good)} findings"
             )
         return "\n".join([*lines, *self.notes])

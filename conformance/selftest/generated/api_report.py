@@ -1,36 +1,32 @@
-"""The page of mutants by rule before a described device: this suite beside plain Schemathesis, in one table."""
+"""The page of mutants by rule before a described device: this suite beside other tools, in one table."""
 
 from collections.abc import Iterable, Mapping
 
-from conformance.selftest.comparison import SchemathesisResult
+from conformance.selftest.comparison import Comparison
 from conformance.selftest.generated.judging import KILLED, NOT_REACHED, SURVIVED, GeneratedResult
 from conformance.selftest.generated.sampling import Rate, group_of, rate_of, rates_by
 
 _COUNTED = frozenset({KILLED, SURVIVED})
+# How many of a tool's false alarms the table names.
+_ALARMS = 5
 
 
 def tools(
-    results: Iterable[GeneratedResult],
-    blamed: Mapping[str, str],
-    compared: Iterable[SchemathesisResult],
-    good: Iterable[str],
+    results: Iterable[GeneratedResult], blamed: Mapping[str, str], compared: Iterable[Comparison]
 ) -> list[tuple[str, Rate, list[str]]]:
     """Return for each tool its name, its kill rate on the same mutants, and what it says of the unchanged device.
 
     Args:
         results: ours of each mutant; those that altered nothing do not count.
         blamed: requirements that the unchanged device does not pass.
-        compared: those of plain Schemathesis; empty: it was not run.
-        good: what Schemathesis reports of the unchanged device.
+        compared: what the other tools report.
     """
     counted = [one for one in results if one.outcome in _COUNTED]
     rows = [("roaas certify", rate_of(counted), sorted(blamed))]
-    killed = {one.mutant for one in compared if one.killed}
-    there = {one.mutant for one in compared}
-    if there:
-        both = [one for one in counted if one.mutant.name in there]
-        by_them = sum(one.mutant.name in killed for one in both)
-        rows.append(("plain Schemathesis", Rate(by_them, len(both) - by_them, 0), sorted(good)))
+    for one in compared:
+        both = [result.mutant.name for result in counted if result.mutant.name in one.tried]
+        by_them = sum(name in one.killed for name in both)
+        rows.append((one.tool, Rate(by_them, len(both) - by_them, 0), list(one.good)))
     return rows
 
 
@@ -38,13 +34,14 @@ def _cells(rate: Rate) -> str:
     return f"{rate.killed} | {rate.reached} | {rate.share:.1%} | {rate.bound:.1%} to {rate.top:.1%}"
 
 
-def only_theirs(results: Iterable[GeneratedResult], compared: Iterable[SchemathesisResult]) -> list[str]:
-    """Return the mutants that Schemathesis kills and this suite does not, with what it reports."""
-    theirs = {one.mutant: ", ".join(one.findings) for one in compared if one.killed}
+def only_theirs(results: Iterable[GeneratedResult], compared: Iterable[Comparison]) -> list[str]:
+    """Return the mutants that another tool kills and this suite does not, with what it reports."""
+    ours = {one.mutant.name for one in results if one.outcome == KILLED}
     return [
-        f"{one.mutant.name}: {theirs[one.mutant.name]}"
-        for one in results
-        if one.outcome != KILLED and one.mutant.name in theirs
+        f"{one.tool} alone: {name}: {', '.join(findings)}"
+        for one in compared
+        for name, findings in one.killed.items()
+        if name not in ours
     ]
 
 
@@ -52,8 +49,7 @@ def page(
     target: str,
     results: Iterable[GeneratedResult],
     blamed: Mapping[str, str],
-    compared: Iterable[SchemathesisResult],
-    good: Iterable[str],
+    compared: Iterable[Comparison],
     notes: Iterable[str],
 ) -> str:
     """Return a Markdown page."""
@@ -70,20 +66,20 @@ def page(
         "| tool | killed | of | rate | interval | false alarms on the unchanged device |",
         "|---|---|---|---|---|---|",
     ]
-    for name, rate, alarms in tools(results, blamed, compared, good):
-        said = f"{len(alarms)}: {', '.join(alarms)}" if alarms else "0"
+    for name, rate, alarms in tools(results, blamed, compared):
+        said = f"{len(alarms)}: {'; '.join(alarms[:_ALARMS])}" if alarms else "0"
+        said += f"; and {len(alarms) - _ALARMS} more" if len(alarms) > _ALARMS else ""
         lines.append(f"| {name} | {_cells(rate)} | {said} |")
-    killed_by_them = {one.mutant for one in compared if one.killed}
-    more = (" plain Schemathesis |", "---|") if compared else ("", "")
+    heads = "".join(f" {one.tool} |" for one in compared), "---|" * len(compared)
     for key in ("class", "operator"):
-        lines += ["", f"| {key} | killed | of | rate | interval |{more[0]}", f"|---|---|---|---|---|{more[1]}"]
+        lines += ["", f"| {key} | killed | of | rate | interval |{heads[0]}", f"|---|---|---|---|---|{heads[1]}"]
         for name, rate in rates_by(results, key).items():
-            named = [one.mutant.name for one in results if one.outcome in _COUNTED and group_of(one, key) == name]
-            theirs = f" {len(killed_by_them.intersection(named))} |" if compared else ""
+            named = {one.mutant.name for one in results if one.outcome in _COUNTED and group_of(one, key) == name}
+            theirs = "".join(f" {len(named & one.killed.keys())} |" for one in compared)
             lines.append(f"| `{name}` | {_cells(rate)} |{theirs}")
     if compared:
-        lines += ["", "Killed by plain Schemathesis alone:", ""]
-        lines += [f"- `{one}`" for one in only_theirs(results, compared)] or ["- none"]
+        lines += ["", "Killed by another tool alone:", ""]
+        lines += [f"- {one}" for one in only_theirs(results, compared)] or ["- none"]
     lines += ["", "| not killed | what it does | outcome | how often |", "|---|---|---|---|"]
     lines += [
         f"| `{one.mutant.name}` | {one.mutant.says} | {one.outcome} | {one.altered} |"

@@ -8,7 +8,7 @@ import pytest
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.mutation.messages import Request, Response
-from conformance.selftest.comparison import SchemathesisResult
+from conformance.selftest.comparison import Comparison, ToolResult
 from conformance.selftest.generated.api_report import only_theirs, page
 from conformance.selftest.generated.described import described_mutants
 from conformance.selftest.generated.judging import KILLED, SURVIVED, GeneratedResult
@@ -117,14 +117,16 @@ def test_a_valid_request_is_left_as_it_is(mutants: dict[str, GeneratedMutant]) -
     assert _sent(mutants["takes-above:lamp:path.id"], "/v1/lamps/3")[1] == 0
 
 
-def test_the_page_has_both_tools_in_one_table_and_names_what_only_the_other_kills(
+def test_the_page_has_all_tools_in_one_table_and_names_what_only_another_kills(
     mutants: dict[str, GeneratedMutant],
 ) -> None:
     """Compare on the same mutants, and name each that only Schemathesis kills."""
     ours, theirs = mutants["drop:lamp:200.id"], mutants["enum:lamp:200.state"]
     results = [GeneratedResult(ours, KILLED, altered=1), GeneratedResult(theirs, SURVIVED, altered=1)]
-    compared = [SchemathesisResult(ours.name, False, ()), SchemathesisResult(theirs.name, True, ("GET /x ST108",))]
-    text = page("http://lamp", results, {}, compared, ("GET /x ST104",), ())
+    seen = [ToolResult(ours.name, False, ()), ToolResult(theirs.name, True, ("GET /x ST108",))]
+    compared = [Comparison("plain Schemathesis", ("GET /x ST104",), seen), Comparison("Specmatic", (), seen[:1])]
+    text = page("http://lamp", results, {}, compared, ())
     assert "| roaas certify | 1 | 2 | 50.0% |" in text
     assert "| plain Schemathesis | 1 | 2 | 50.0% |" in text
-    assert only_theirs(results, compared) == [f"{theirs.name}: GET /x ST108"]
+    assert "| Specmatic | 0 | 1 | 0.0% |" in text
+    assert only_theirs(results, compared) == [f"plain Schemathesis alone: {theirs.name}: GET /x ST108"]

@@ -12,7 +12,7 @@ from conformance.documents.openapi import operations_of
 from conformance.mutation.messages import Request, Response
 from conformance.packs.table1.selftest import PLAIN
 from conformance.selftest.certifying import Outcome
-from conformance.selftest.comparison import SchemathesisResult
+from conformance.selftest.comparison import Comparison, ToolResult
 from conformance.selftest.generated import judging
 from conformance.selftest.generated.catalogue import every_change, generated_mutants
 from conformance.selftest.generated.judging import GIVEN_UP, KILLED, NOT_REACHED, GeneratedResult, judge
@@ -153,7 +153,8 @@ def test_five_mutants_are_killed_and_one_that_alters_nothing_is_told_apart():
     assert document(7, results, 0)["all"]["rate"] == 1.0
     assert "5 of 5 (100.0%, at least 56.6%), 1 not reached" in summary(7, results)
     report = Report(CONTRACT, "plain", generated_results=results, seed=7)
-    report.compared = [SchemathesisResult(names[0], killed=True, findings=()), SchemathesisResult(names[2], False, ())]
+    seen = [ToolResult(names[0], killed=True, findings=()), ToolResult(names[2], False, ())]
+    report.compared = [Comparison("plain Schemathesis", results=seen)]
     page = report.matrix()
     assert "--generated 6 --seed 7 --target plain" in page
     for said in ("| `rest-resources` | 3 | 3 | 100.0% |", "this suite: 2 of 2", "plain Schemathesis: 1 of 2"):
