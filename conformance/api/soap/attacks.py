@@ -6,9 +6,10 @@ Each attack names the requirement that it is for and what a robot must not do wi
 import codecs
 import gzip
 import zlib
-from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import islice
 from typing import Final
 
 # In a document: where text is that the robot reads as a value; and where it is that it may pass over.
@@ -83,13 +84,10 @@ def attacks(template: Template, url: Callable[[str], str], each: int, place: str
         each: how many for one requirement at most.
         place: tells the canaries of this document from those of another.
     """
-    # What names an address before what takes long, in which a robot may come to call it.
-    for make in (_doctypes, _internal, _external, _expansions, _inclusions, _instructions, _sizes):
-        made: Counter[str] = Counter()
-        for attack in make(template, lambda canary: url(f"{place}{canary}")):
-            made[attack.name] += 1
-            if made[attack.name] <= each:
-                yield replace(attack, canary=f"{place}{attack.canary}") if attack.canary else attack
+    for make in _KINDS:
+        # One that is not sent is not made: some take 10 MiB.
+        for attack in islice(make(template, lambda canary: url(f"{place}{canary}")), each):
+            yield replace(attack, canary=f"{place}{attack.canary}") if attack.canary else attack
 
 
 def _doctypes(template: Template, _url: Callable[[str], str]) -> Iterator[Attack]:
@@ -135,6 +133,10 @@ def _external(template: Template, url: Callable[[str], str]) -> Iterator[Attack]
     yield Attack("external-entity", "an entity from elsewhere", template.octets("&x;", prolog=subset), canary="entity")
     subset = f'<!DOCTYPE {root} [<!ENTITY x PUBLIC "-//A//B//EN" "{url("public")}">]>'
     yield Attack("external-entity", "a public entity", template.octets("&x;", prolog=subset), canary="public")
+
+
+def _parameters(template: Template, url: Callable[[str], str]) -> Iterator[Attack]:
+    root = template.root
     for what, prolog, canary in (
         ("an external DTD", f'<!DOCTYPE {root} SYSTEM "{url("dtd")}">', "dtd"),
         ("an external DTD that is a file", f'<!DOCTYPE {root} SYSTEM "{_FILES[0]}">', ""),
@@ -161,6 +163,9 @@ def _expansions(template: Template, _url: Callable[[str], str]) -> Iterator[Atta
     yield Attack("expansion", "the billion laughs attack by parameter entities", template.octets(prolog=subset))
     subset = f'<!DOCTYPE {template.root} [<!ENTITY a "&b;"><!ENTITY b "&a;">]>'
     yield Attack("expansion", "entities that hold each other", template.octets("&a;", prolog=subset))
+
+
+def _quadratic(template: Template, _url: Callable[[str], str]) -> Iterator[Attack]:
     subset = f'<!DOCTYPE {template.root} [<!ENTITY a "{"a" * 50_000}">]>'
     yield Attack(
         "quadratic",
@@ -179,6 +184,9 @@ def _inclusions(template: Template, url: Callable[[str], str]) -> Iterator[Attac
             include = f'<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="{target}" parse="text"/>'
             body = template.octets(include) if where == "value" else template.octets(ignored=include)
             yield Attack("xinclude", f"XInclude of {what} ({where})", body, must_refuse=False, canary=canary)
+
+
+def _schemas(template: Template, url: Callable[[str], str]) -> Iterator[Attack]:
     hint = (
         ' xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance"'
         f' xsi:schemaLocation="urn:example:a {url("schema")}" xsi:noNamespaceSchemaLocation="{url("schema")}"'
@@ -194,17 +202,34 @@ def _with_attributes(template: Template, attributes: str) -> bytes:
     return template.octets().replace(start.encode(), f"{start}{attributes}".encode(), 1)
 
 
-def _sizes(template: Template, _url: Callable[[str], str]) -> Iterator[Attack]:
+def _depths(template: Template, _url: Callable[[str], str]) -> Iterator[Attack]:
     yield Attack("depth", "100,000 elements in each other", template.octets(ignored="<d>" * _DEPTH + "</d>" * _DEPTH))
     yield Attack("depth", "100,000 start tags", template.octets("<d>" * _DEPTH))
+
+
+def _attributes(template: Template, _url: Callable[[str], str]) -> Iterator[Attack]:
     many = ' xmlns:q="urn:example:q"' + "".join(f' q:a{number}=""' for number in range(_ATTRIBUTES))
     yield Attack("attributes", "20,000 attributes", _with_attributes(template, many))
-    name = "n" * _LONG
-    yield Attack("long-name", "a name of a million characters", template.octets(ignored=f"<{name}/>"))
-    yield Attack("size", "a comment of 10.5 MiB", template.octets(ignored=f"<!--{' ' * _OVER}-->"))
+
+
+def _names(template: Template, _url: Callable[[str], str]) -> Iterator[Attack]:
+    yield Attack("long-name", "a name of a million characters", template.octets(ignored=f"<{'n' * _LONG}/>"))
+
+
+def _sizes(template: Template, _url: Callable[[str], str]) -> Iterator[Attack]:
+    yield Attack("size", "a comment of 10.5 MiB", _wide(template))
     yield Attack("size", "white space of 10.5 MiB", template.octets(" " * _OVER + template.value))
-    wide = template.octets(ignored=f"<!--{' ' * _OVER}-->")
-    for coding, packed in (("gzip", gzip.compress(wide, 1, mtime=0)), ("deflate", zlib.compress(wide, 1))):
+
+
+def _wide(template: Template) -> bytes:
+    """Return the document with a comment of 10.5 MiB."""
+    return template.octets(ignored=f"<!--{MARK}-->").replace(MARK.encode(), b" " * _OVER, 1)
+
+
+def _compressed(template: Template, _url: Callable[[str], str]) -> Iterator[Attack]:
+    wide = _wide(template)
+    for coding, pack in (("gzip", partial(gzip.compress, mtime=0)), ("deflate", zlib.compress)):
+        packed = pack(wide, 1)
         yield Attack(
             "compressed",
             f"10.5 MiB in {len(packed) // 1024} KiB of {coding}",
@@ -222,3 +247,22 @@ def _instructions(template: Template, url: Callable[[str], str]) -> Iterator[Att
         template.octets(ignored="<?run this?>"),
     )
     yield Attack("processing-instruction", "an instruction at the end", template.octets() + b"<?run this?>")
+
+
+# One for each requirement; what names an address before what takes long, in which a robot may come to call it.
+_KINDS: Final = (
+    _doctypes,
+    _internal,
+    _external,
+    _parameters,
+    _expansions,
+    _quadratic,
+    _inclusions,
+    _schemas,
+    _instructions,
+    _depths,
+    _attributes,
+    _names,
+    _sizes,
+    _compressed,
+)
