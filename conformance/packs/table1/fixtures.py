@@ -5,8 +5,10 @@ from contextlib import suppress
 
 import pytest
 
+from conformance.api.interfaces import Interfaces
 from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.plugin import Device
+from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliveries
 from conformance.packs.table1.robot.clock import Clock
 from conformance.packs.table1.robot.delivery_sender import DeliverySender
 from conformance.packs.table1.robot.probe.client import RosProbe
@@ -55,6 +57,39 @@ def standstill(api: RestInterface, _standstills: list[Standstill]) -> Standstill
     if not _standstills:
         _standstills.append(Standstill(api))
     return _standstills[0]
+
+
+@pytest.fixture(scope="session")
+def _accepted(run: Run, interfaces: Interfaces) -> list[AcceptedDeliveries]:
+    """Return what listens to the deliveries of the run; empty without a REST interface."""
+    device = interfaces.rest.device if interfaces.rest is not None else None
+    if not isinstance(device, Device) or not run.allow_motion:
+        return []
+    for one in device.accepted:
+        with suppress(NoAnswerError):
+            one.read()  # what is listed before the first delivery is older
+    return device.accepted
+
+
+@pytest.fixture
+def accepted(_accepted: list[AcceptedDeliveries]) -> AcceptedDeliveries:
+    """Return what listens to the deliveries of the run.
+
+    Raises:
+        NotPossibleError: there is no REST interface to read their list at.
+    """
+    if not _accepted:
+        raise NotPossibleError("there is no REST interface whose list shows the deliveries")
+    return _accepted[0]
+
+
+@pytest.fixture(autouse=True)
+def _listed(_accepted: list[AcceptedDeliveries]) -> Iterator[None]:
+    """Look after each check for the deliveries that the robot has accepted."""
+    yield
+    for one in _accepted:
+        with suppress(NoAnswerError):  # the next check meets that as well
+            one.read()
 
 
 @pytest.fixture(autouse=True)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from conformance.api import device
 from conformance.documents.wsdl import Operation
@@ -12,6 +12,9 @@ from conformance.packs.table1.robot.clock import Clock
 from conformance.packs.table1.robot.examples import Examples
 from conformance.packs.table1.statement import Statement, StatementFile, said_of
 from conformance.transport.exchange import Listener
+
+if TYPE_CHECKING:
+    from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliveries
 
 _TEMPLATE = """
 [limits]
@@ -76,6 +79,11 @@ class Device(device.Device):
         return said_of(self.run).limits.hold_s
 
     @cached_property
+    def accepted(self) -> "list[AcceptedDeliveries]":
+        """What listens to the deliveries of the run; empty without a REST interface."""
+        return []
+
+    @cached_property
     def _examples(self) -> Examples:
         from conformance.packs.table1.robot.examples import Examples  # noqa: PLC0415 - see the class
 
@@ -124,11 +132,14 @@ class Device(device.Device):
 
     def observers(self, api: device.Rest) -> Iterable[Listener]:
         """Return what judges every exchange with the robot's resources."""
+        from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliveries  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.goal_observer import GoalObserver  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.observer import Observer  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.plan_observer import PlanObserver  # noqa: PLC0415 - see the class
 
-        return (Observer(api, self.clock), GoalObserver(api), PlanObserver(api))
+        accepted = AcceptedDeliveries(api)
+        self.accepted.append(accepted)
+        return (Observer(api, self.clock), GoalObserver(api), PlanObserver(api), accepted)
 
     def halt(self, api: device.Rest) -> None:
         """Cancel and stop what the robot may be doing, without waiting until it stands still."""

@@ -47,6 +47,22 @@ class EveryNth:
         return forward(request)
 
 
+class First:
+    """A change that rewrites the first request alone."""
+
+    def __init__(self, where: Callable[[Request], bool], edit: Callable[[Request], object]) -> None:
+        self._where, self._edit = where, edit
+        self._done = False
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """Forward the request, rewritten if it is the first."""
+        if self._done or not self._where(request):
+            return forward(request)
+        self._done, request = True, request.copy()
+        self._edit(request)
+        return forward(request)
+
+
 class OutOfOrder:
     """A change that forwards a REST delivery only after the next delivery, or before the next other request."""
 

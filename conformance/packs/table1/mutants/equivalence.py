@@ -13,6 +13,7 @@ from conformance.packs.table1.delivery import COFFEE, COORDINATES, PATH_NAMES
 from conformance.packs.table1.mutants.delivery import OnlyOnce, segments
 from conformance.packs.table1.mutants.distortion import (
     EveryNth,
+    First,
     ListedOnly,
     OutOfOrder,
     as_delivery,
@@ -166,6 +167,9 @@ _soap_delivery("same-coffee-code", "coffee-soap", "A coffee is published with co
 _soap_delivery("same-coffee-lost", "coffee-soap", "Every second coffee is lost.").made(
     lambda: EveryNth(_COFFEE, enveloped(f'<t:ExecuteCoffeeRequestResponse xmlns:t="{TNS}"/>'), 2)
 )
+_soap_delivery(
+    "same-coffee-first-swapped", "coffee-soap", "The first coffee has the values of source_x and destination_x swapped."
+).made(lambda: First(_COFFEE, swapped_soap))
 _soap_delivery("same-soap-rounded", "delivery-same", "SOAP rounds to three digits; REST does not.").rewritten(
     _BOTH, rounded_soap
 )

@@ -3,6 +3,7 @@
 import pytest
 
 from conformance.api.rest.interface import RestInterface
+from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliveries
 from conformance.packs.table1.robot.delivery import Delivery, put_delivery
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
 from conformance.packs.table1.robot.message_shapes import read_as
@@ -11,7 +12,7 @@ from conformance.transport.client import HttpClient
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("acting"), pytest.mark.needs("rest")]
+pytestmark = pytest.mark.needs("rest")
 # What the list holds at least.
 _LEAST = 50
 
@@ -32,6 +33,7 @@ def _read(rest: HttpClient, judge: Judge) -> list[Delivery] | None:
     return None if problem else [Delivery.of(entry["request"]) for entry in value]
 
 
+@pytest.mark.phase("acting")
 @pytest.mark.requirement("rest-delivery/list")
 def test_list(rest: HttpClient, judge: Judge, effort: Effort) -> None:
     """Check each reading of the list by its schema."""
@@ -39,6 +41,7 @@ def test_list(rest: HttpClient, judge: Judge, effort: Effort) -> None:
         _read(rest, judge)
 
 
+@pytest.mark.phase("acting")
 @pytest.mark.motion
 @pytest.mark.requirement("rest-delivery/list-newest-first", "rest-delivery/list-values")
 def test_list_of_many(api: RestInterface, rest: HttpClient, judge: Judge, effort: Effort) -> None:
@@ -74,3 +77,11 @@ def test_list_of_many(api: RestInterface, rest: HttpClient, judge: Judge, effort
         "each delivery with its values, by rest",
         found=f"a list without {missing}" if missing else f"a delivery by {other}",
     )
+
+
+@pytest.mark.phase("last")
+@pytest.mark.motion
+@pytest.mark.requirement("rest-delivery/list-values", "equivalence/delivery-rest", "equivalence/delivery-soap")
+def test_every_accepted_delivery_is_listed(accepted: AcceptedDeliveries) -> None:
+    """Look for the last deliveries that the robot has accepted in the run, as after each check for those before."""
+    accepted.read(to_the_last=True)

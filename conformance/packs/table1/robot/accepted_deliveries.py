@@ -1,0 +1,194 @@
+"""Judge the robot's list of deliveries, where it has one, by every delivery of a run that it has accepted.
+
+A fault in one delivery of many, such as the first one or the one after an error, is found only if all are looked at,
+whichever check has sent them.
+"""
+
+import json
+import math
+import time
+from collections import Counter
+from dataclasses import dataclass
+from typing import Final
+from urllib.parse import unquote
+
+from conformance.api.rest.interface import RestInterface
+from conformance.documents.xml import NotXmlError, elements, parse, text_of
+from conformance.documents.xml_names import clark, local
+from conformance.packs.table1.delivery import COFFEE, COORDINATES, MESSAGE_FIELDS, PATH_NAMES
+from conformance.packs.table1.robot.delivery import Delivery
+from conformance.packs.table1.robot.delivery_messages import NAMESPACE
+from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
+from conformance.packs.table1.robot.message_shapes import read_as
+from conformance.packs.table1.robot.probe.client import ARRIVES_S
+from conformance.packs.table1.robot.robot import ACCEPT_JSON, DELIVERIES
+from conformance.packs.table1.statement import said_of
+from conformance.transport.exchange import Exchange, Listener, Request
+
+# So many deliveries may wait to be looked for, and the oldest of them for so long, s.
+_MANY: Final = 10
+_WAITS_S: Final = 1.0
+_STEP_S: Final = 0.1
+# What the list holds at least.
+_HELD: Final = 50
+# A message of more octets is not read.
+_LARGE: Final = 100_000
+_OPERATIONS: Final = {clark(NAMESPACE, f"Execute{name}Request"): name == "Coffee" for name in ("Coffee", "Delivery")}
+
+
+@dataclass(frozen=True)
+class _Accepted:
+    """A delivery that the robot has accepted."""
+
+    delivery: Delivery
+    interface: str
+    exchange: Exchange
+
+    @property
+    def entry(self) -> tuple[Delivery, str]:
+        """Return what an entry of the list shows of it."""
+        return self.delivery, self.interface
+
+    def age_s(self, now_s: float) -> float:
+        """Return for how long it has been accepted, s."""
+        return now_s - self.exchange.response.received_s
+
+
+class AcceptedDeliveries(Listener):
+    """Listens to all exchanges of one run, keeps the accepted deliveries, and looks for them in each list that is read.
+
+    Args:
+        api: the robot's REST interface.
+    """
+
+    def __init__(self, api: RestInterface) -> None:
+        self._api = api
+        self._url = api.client.url(DELIVERIES)
+        self._waiting: list[_Accepted] = []
+        # Entries of the list that was read last, with how often each is there; None: none was read.
+        self._before: Counter[str] | None = None
+        # New entries that no accepted delivery has been found for, yet: its response may come after the list.
+        self._new: Counter[tuple[Delivery, str]] = Counter()
+        self._has_list = True
+
+    def answered(self, exchange: Exchange) -> None:
+        """Take one exchange of the run: a delivery, or the list of them."""
+        request = exchange.request
+        if request.method == "GET" and request.url == self._url:
+            if exchange.response.media_type == "application/json":
+                self._look(exchange)
+            return
+        if not exchange.response.ok or not self._has_list:
+            return
+        values = self._of_path(request) or _of_message(request)
+        if values is not None:
+            self._waiting.append(_Accepted(values, "rest" if request.method == "PUT" else "soap", exchange))
+
+    def read(self, *, to_the_last: bool = False) -> None:
+        """Read the list if many deliveries wait to be looked for, or one for long; or until none does.
+
+        Raises:
+            NoAnswerError: no HTTP response came.
+        """
+        until = time.monotonic() + ARRIVES_S
+        while self._has_list and (self._is_due or (to_the_last and self._waiting)):
+            self._has_list = self._api.client.send("GET", DELIVERIES, headers=ACCEPT_JSON).response.ok
+            if not to_the_last or time.monotonic() > until:
+                break
+            time.sleep(_STEP_S)
+
+    @property
+    def _is_due(self) -> bool:
+        if self._before is None or len(self._waiting) >= _MANY:
+            return True
+        return bool(self._waiting) and self._waiting[0].age_s(time.monotonic()) > _WAITS_S
+
+    def _of_path(self, request: Request) -> Delivery | None:
+        """Return the values of a delivery PUT; None for any other request."""
+        if request.method != "PUT" or not request.url.startswith(self._url) or _is_repeatable(request):
+            return None
+        code, *rest = map(unquote, request.url.removeprefix(self._url).split("/"))
+        return _delivery(code, rest[1::2]) if tuple(rest[::2]) == PATH_NAMES else None
+
+    def _look(self, exchange: Exchange) -> None:
+        """Judge the deliveries that were accepted before the list was asked for."""
+        value, problem = read_as(exchange.response, LIST)
+        if problem:
+            return
+        entries = Counter(json.dumps([entry["request"], entry["accepted"], entry["interface"]]) for entry in value)
+        listed = Counter((Delivery.of(entry["request"]), str(entry["interface"])) for entry in value)
+        first = self._before is None and not self._waiting
+        before = entries if first else self._before or Counter()
+        for entry in (entries - before).elements():
+            request, _, interface = json.loads(entry)
+            self._new[Delivery.of(request), interface] += 1
+        # Equal deliveries that were accepted within one unit of the robot's clock cannot be told apart.
+        there = self._new if max(entries.values(), default=1) == 1 else self._new | listed
+        # What was listed before they were accepted is older; where it still is, they were not pushed out.
+        whole = len(value) < _HELD or bool(entries & before)
+        asked_s = exchange.response.received_s - exchange.response.elapsed_ms / 1000
+        waiting, self._waiting, self._before = self._waiting, [], entries
+        found = [self._take(one, there) for one in waiting]
+        for number, one in enumerate(waiting):
+            later = zip(waiting[number + 1 :], found[number + 1 :], strict=True)
+            overtaken = any(listed for other, listed in later if other.interface == one.interface)
+            if found[number]:
+                self._judge(one, there=True)
+            elif whole and one.age_s(asked_s) < (_WAITS_S if overtaken else ARRIVES_S):
+                self._waiting.append(one)
+            elif whole:
+                self._judge(one, there=False)
+
+    def _take(self, one: _Accepted, there: Counter[tuple[Delivery, str]]) -> bool:
+        """Return whether there is an entry for a delivery that is no other's; it is then this one's."""
+        if there[one.entry] < 1:
+            return False
+        self._new[one.entry] -= 1
+        return True
+
+    def _judge(self, one: _Accepted, *, there: bool) -> None:
+        run = self._api.run
+        # Where the robot's own topic is watched, that alone shows what was published.
+        published = () if said_of(run).ros.domain_id is not None else (f"equivalence/delivery-{one.interface}",)
+        for id_ in ("rest-delivery/list-values", *published):
+            run.judge.check(
+                id_,
+                there,
+                one.exchange,
+                f"an entry for the delivery in GET {DELIVERIES}",
+                found="" if there else f"no entry by {one.interface} with {one.delivery}",
+                cause="" if there else f"missing after {one.interface}",
+            )
+
+
+def _is_repeatable(request: Request) -> bool:
+    return any(name.lower() == "idempotency-key" for name, _ in request.headers)
+
+
+def _of_message(request: Request) -> Delivery | None:
+    """Return the values of a SOAP delivery that has each of them once; None for any other request."""
+    if request.method != "POST" or b"Execute" not in request.body or len(request.body) > _LARGE:
+        return None
+    try:
+        root = parse(request.body)
+    except NotXmlError:
+        return None
+    wrappers = [child for part in elements(root) if local(str(part.tag)) == "Body" for child in elements(part)]
+    if len(wrappers) != 1 or str(wrappers[0].tag) not in _OPERATIONS:
+        return None
+    arguments = elements(wrappers[0])
+    texts = [(local(str(leaf.tag)), text_of(leaf).strip()) for argument in arguments for leaf in elements(argument)]
+    coffee, values = _OPERATIONS[str(wrappers[0].tag)], dict(texts)
+    if coffee:
+        values["message_code"] = str(COFFEE)
+    if len(arguments) != 1 or len(dict(texts)) != len(texts) or values.keys() != set(MESSAGE_FIELDS):
+        return None
+    return _delivery(values["message_code"], [values[name] for name in COORDINATES])
+
+
+def _delivery(code: str, coordinates: list[str]) -> Delivery | None:
+    try:
+        delivery = Delivery(int(code), *map(float, coordinates))
+    except (TypeError, ValueError):
+        return None
+    return delivery if all(map(math.isfinite, delivery[1:])) else None
