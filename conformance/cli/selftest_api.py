@@ -76,6 +76,7 @@ def run_api(
     """Judge the unchanged device and the mutants, and add the results to the report."""
     from conformance.selftest.comparison import best_settings  # noqa: PLC0415 - see selftest.py
     from conformance.selftest.generated.judging import judge  # noqa: PLC0415 - as above
+    from conformance.selftest.generated.reach import Recorder, unreached  # noqa: PLC0415 - as above
     from conformance.selftest.mutant_run import DescribedPool, run_unchanged  # noqa: PLC0415 - as above
 
     progress = Progress(report, len(chosen))
@@ -84,13 +85,21 @@ def run_api(
         allow, never = (", ".join(map(basic_string, options[key])) for key in ("allow", "never"))
         statement.write_text(f"[calls]\nallow = [{allow}]\nnever = [{never}]\n", encoding="utf-8")
         with DescribedPool(report.contract, base_url, statement, options["parallel"]) as pool:
-            unchanged = run_unchanged(pool, "standard")
+            seen = Recorder()
+            unchanged = run_unchanged(pool, "standard", change=seen)
             report.blamed = {id_: unchanged.reasons.get(id_, "") for id_ in unchanged.not_passed()}
             for id_, reason in report.blamed.items():
                 click.echo(f"the unchanged device: {id_}: {reason}"[:400], err=True)
             efforts = ("quick", "standard") if options["effort"] == "quick" else ("standard",)
             started = time.monotonic()
-            report.generated_results = judge(pool, chosen, efforts=efforts, seed=options["seed"], tell=progress.by_rule)
+            report.generated_results = judge(
+                pool,
+                chosen,
+                efforts=efforts,
+                seed=options["seed"],
+                unreached=unreached(chosen, seen.messages),
+                tell=progress.by_rule,
+            )
             report.notes.append(
                 f"A run of the unchanged device took {unchanged.seconds:.0f} s at standard effort with "
                 f"{unchanged.requests} requests; the mutants took {time.monotonic() - started:.0f} s."

@@ -38,13 +38,19 @@ def run_generated(report: Report, mutants: list[GeneratedMutant], options: dict[
         RobotError: the device does not start.
     """
     from conformance.selftest.generated.judging import judge  # noqa: PLC0415 - see selftest.py
-    from conformance.selftest.mutant_run import RobotPool  # noqa: PLC0415 - see selftest.py
+    from conformance.selftest.generated.reach import Recorder, unreached  # noqa: PLC0415 - see selftest.py
+    from conformance.selftest.mutant_run import RobotPool, run_unchanged  # noqa: PLC0415 - see selftest.py
     from conformance.selftest.robots import target_of  # noqa: PLC0415 - see selftest.py
 
     progress = Progress(report, len(mutants))
     efforts = ("quick", "standard") if options["effort"] == "quick" else ("standard",)
     target = target_of(report.contract, report.target)
     with RobotPool(report.contract, target, options["parallel"], options["domain_id"]) as pool:
-        report.generated_results = judge(pool, mutants, efforts=efforts, tell=progress.by_rule)
+        seen = Recorder()
+        if options["adversary"]:
+            click.echo("a whole run of the good device shows which faults would alter anything", err=True)
+            run_unchanged(pool, efforts[-1], change=seen)
+        never = unreached(mutants, seen.messages) if seen.messages else frozenset()
+        report.generated_results = judge(pool, mutants, efforts=efforts, unreached=never, tell=progress.by_rule)
         if compared:
             compare(report, pool, [mutant.as_mutant() for mutant in mutants], progress)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from conformance.contract.pack import Contract
-from conformance.mutation.messages import unchanged
+from conformance.mutation.messages import Change, unchanged
 from conformance.mutation.mutant import Mutant
 from conformance.mutation.self_test import GoodDevice
 from conformance.selftest.at_once import each_at_once
@@ -136,10 +136,18 @@ def job_for(robot: Robot, proxy: Proxy, effort: str, seed: int, token: str = "",
     return job_at(proxy.before(robot), effort=effort, seed=seed, timeout_s=_TIMEOUTS[effort], **more)
 
 
-def run_unchanged(pool: Pool, effort: str = "quick", seed: int = 0) -> Outcome:
-    """Return the outcome of the good robot behind a proxy that changes nothing: the A/A control."""
+def run_unchanged(pool: Pool, effort: str = "quick", seed: int = 0, change: Change = unchanged) -> Outcome:
+    """Return the outcome of the good robot behind a proxy that changes nothing: the A/A control.
+
+    Args:
+        pool: the devices.
+        effort: of the run.
+        seed: of everything random.
+        change: what the proxy does; it changes nothing.
+    """
     robot, proxy = pool.take()
     try:
+        proxy.change = change
         return run_job(job_for(robot, proxy, effort, seed, domain_id=robot.domain_id))
     finally:
         pool.give(robot, proxy)

@@ -14,7 +14,7 @@ EFFORTS = ("quick", "standard", "deep")
 _FACTORS = {"quick": 0.1, "standard": 1.0}
 _BUDGETS_S = {"quick": 2.0, "standard": 10.0}
 _FEWEST = 3
-# The share of alternatives that a fast robot is tried with.
+# The share of values of one kind that a fast robot is tried with.
 _KEPT = {"quick": 0.5}
 # A run beside others on a loaded machine takes twice its time; three times is more than load explains.
 _LONGEST = 3.0
@@ -143,11 +143,12 @@ class Effort:
         return self.speed.share < 1
 
     def subsample(self, items: Sequence[_Item], count: int) -> list[_Item]:
-        """Return all items, at quick effort every other one, and for a slow robot ``count`` evenly spaced ones."""
-        kept = count if self.slow else max(count, math.ceil(len(items) * _KEPT.get(self.name, 1.0)))
-        if len(items) <= kept:
-            return list(items)
-        return [items[index * len(items) // kept] for index in range(kept)]
+        """Return all items for a fast robot, and ``count`` evenly spaced ones for a slow robot."""
+        return _spaced(items, count if self.slow else len(items))
+
+    def alternatives(self, items: Sequence[_Item], count: int) -> list[_Item]:
+        """Return values of one kind: as subsample(), and at quick effort every other one."""
+        return _spaced(items, count if self.slow else max(count, math.ceil(len(items) * _KEPT.get(self.name, 1.0))))
 
     def draw(self, items: Sequence[_Item], standard: int, seed: str) -> list[_Item]:
         """Return ``cases(standard)`` of the items at random, in their order; the same ones for the same seed."""
@@ -156,3 +157,9 @@ class Effort:
             return list(items)
         chooser = random.Random(zlib.crc32(seed.encode()))  # noqa: S311 - no secret
         return [items[index] for index in sorted(chooser.sample(range(len(items)), count))]
+
+
+def _spaced(items: Sequence[_Item], count: int) -> list[_Item]:
+    if len(items) <= count:
+        return list(items)
+    return [items[index * len(items) // count] for index in range(count)]

@@ -63,7 +63,7 @@ def test_problem_of_a_body(api: RestInterface) -> None:
             for item in mutations(call.value, operation.bodies[JSON].schema)
             if item.kind in {"missing", "type"} and (item.shown or "missing" in item.what)
         ]
-        for item in api.run.effort.subsample(made[:: max(1, len(made) // 6)], 2):
+        for item in api.run.effort.alternatives(made[:: max(1, len(made) // 6)], 2):
             judge_refusal(
                 api,
                 partial(call.carrying(item.made).send, api),

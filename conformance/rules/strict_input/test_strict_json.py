@@ -41,7 +41,7 @@ def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort)
             continue
         for kind, made in by_kind.items():
             drawn = effort.draw(made, _count(effort, kind), f"{api.run.seed}/{operation.id} {kind}")
-            for item in effort.subsample(drawn, 1):
+            for item in effort.alternatives(drawn, 1):
                 _try(api, judge, call, item)
         api.device.halt(api)
         when = f"a valid {operation.id} follows invalid ones"

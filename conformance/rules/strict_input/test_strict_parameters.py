@@ -89,7 +89,7 @@ def _chosen(api: RestInterface, operation: Operation, where: str) -> list[Wrong]
     for item in wrong:
         named.setdefault(item.name, item)
     if api.run.effort.slow:
-        return api.run.effort.subsample(wrong, 6)
+        return api.run.effort.alternatives(wrong, 6)
     basic = list(dict.fromkeys([*first.values(), *named.values()]))
     return list(dict.fromkeys(basic + api.run.effort.draw(wrong, _STANDARD, f"{api.run.seed}/{operation.id}")))
 

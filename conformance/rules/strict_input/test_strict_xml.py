@@ -33,7 +33,7 @@ def test_xml_mutations_are_refused(api: RestInterface, judge: Judge) -> None:
         schema = operation.bodies[XML].schema
         made = xml_mutations(call.value, schema, root_name(schema) or "value")
         drawn = api.run.effort.draw(made, _EACH, f"{api.run.seed}/{operation.id}")
-        for item in api.run.effort.subsample(drawn, 3):
+        for item in api.run.effort.alternatives(drawn, 3):
             wrong = call.carrying(item.made)
             if not judge_refusal(api, partial(wrong.send, api), _ID, item.what, json=False):
                 api.device.halt(api)

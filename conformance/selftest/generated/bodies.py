@@ -36,11 +36,16 @@ _NUMBERS: dict[str, Callable[[bytes], bytes]] = {
 }
 
 
-def of_bodies(exchange: Exchange) -> Iterator[GeneratedMutant]:
-    """Yield mutants that alter the whole body of successful responses in each format, and the numbers in plain text."""
+def of_bodies(exchange: Exchange, *, numbers: bool) -> Iterator[GeneratedMutant]:
+    """Yield mutants that alter the whole body of successful responses in each format.
+
+    Args:
+        exchange: the operation.
+        numbers: whether its responses have numbers, which are altered in plain text; a robot's own additions are not.
+    """
     for media_type in exchange.formats:
         form = media_type.rpartition("/")[2].replace("plain", "text")
-        edits = {**BODIES, **_NUMBERS} if form == "text" else BODIES
+        edits = {**BODIES, **_NUMBERS} if form == "text" and numbers else BODIES
         json_ = form == "json"
         classes = classes_of_answers(exchange) if json_ or exchange.side == "soap" else ("rest-formats", "http")
         for operator, edit in edits.items():

@@ -9,7 +9,7 @@ from conformance.selftest.generated import bodies, heads, lenience
 from conformance.selftest.generated.described import described_mutants
 from conformance.selftest.generated.mutant import MODES, GeneratedMutant, classes_of_answers, of_answer, of_request
 from conformance.selftest.generated.open_places import open_place
-from conformance.selftest.generated.operators import OPERATORS, Operator
+from conformance.selftest.generated.operators import NUMERIC, OPERATORS, Operator
 from conformance.selftest.generated.places import Exchange, Place, exchanges, places
 
 _NULL = next(operator for operator in OPERATORS if operator.name == "null")
@@ -75,10 +75,11 @@ def _classes(place: Place) -> tuple[str, ...]:
 
 
 def _of_exchanges(contract: Contract) -> Iterator[GeneratedMutant]:
+    numeric = {one.exchange.name for one in places(contract) if one.part == "answer" and one.kind in NUMERIC}
     for exchange in exchanges(contract):
         yield from heads.of_statuses(exchange)
         yield from heads.of_headers(exchange)
-        yield from bodies.of_bodies(exchange)
+        yield from bodies.of_bodies(exchange, numbers=exchange.name in numeric)
         for what, make in _WHOLE.items():
             if what == "cut" and not exchange.formats:
                 continue

@@ -61,6 +61,7 @@ def judge(
     *,
     efforts: tuple[str, ...] = ("quick", "standard"),
     seed: int = 0,
+    unreached: frozenset[str] = frozenset(),
     tell: Callable[[GeneratedResult], None],
 ) -> list[GeneratedResult]:
     """Judge generated mutants, several in parallel, and return the results.
@@ -70,11 +71,14 @@ def judge(
         mutants: the mutants to judge.
         efforts: efforts to try in this order until the mutant is killed.
         seed: seed of everything random.
+        unreached: names of mutants that are known to alter nothing in any run.
         tell: called with each result when it is ready.
     """
     control = _Control(seed)
 
     def one(mutant: GeneratedMutant) -> GeneratedResult:
+        if mutant.name in unreached:
+            return GeneratedResult(mutant, NOT_REACHED, effort=efforts[-1])
         robot, proxy = pool.take()
         try:
             return _judge(pool.contract, mutant, robot, proxy, efforts, seed, control)

@@ -10,8 +10,8 @@ from conformance.selftest.generated.places import Place
 from conformance.selftest.generated.slots import Edit, Slot, same
 
 _SCALE, _CLAMP = 1.5, 0.05
-_NUMERIC = frozenset({"number", "integer"})
-_SCALAR = _NUMERIC | {"string", "boolean"}
+NUMERIC = frozenset({"number", "integer"})
+_SCALAR = NUMERIC | {"string", "boolean"}
 _ALL = _SCALAR | {"object", "array"}
 
 
@@ -189,24 +189,22 @@ OPERATORS = (
     _operator("drop", "is left out", _ALL, "answer", _BODIES, _always(lambda slot: slot.drop())),
     _operator("null", "is null, in XML empty", _ALL, "answer", _BODIES, _each(lambda _: None)),
     _operator("retype", "is of another type", _ALL, "answer", "json", _each(_other_type)),
-    _operator("retype", "is a text that is no number", _NUMERIC, "answer", "xml soap", _each(_other_type)),
+    _operator("retype", "is a text that is no number", NUMERIC, "answer", "xml soap", _each(_other_type)),
     _operator("rename", "has another name", _ALL, "answer", _BODIES, _always(lambda slot: slot.rename("renamed"))),
     _operator(
         "swap", "has its sibling's value, and that its", _ALL, "answer request", _EVERYWHERE, _swap, sibling=True
     ),
     _operator("freeze", "is for ever the first one", _ALL, "answer", _BODIES, _remembering(for_ever=True)),
     _operator("delay", "is the one of the answer before", _ALL, "answer", _BODIES, _remembering(for_ever=False)),
-    _operator(
-        "scale", "is half as great again", _NUMERIC, "answer request", _EVERYWHERE, _number(lambda n: n * _SCALE)
-    ),
-    _operator("negate", "has the other sign", _NUMERIC, "answer request", _EVERYWHERE, _number(lambda n: -n)),
+    _operator("scale", "is half as great again", NUMERIC, "answer request", _EVERYWHERE, _number(lambda n: n * _SCALE)),
+    _operator("negate", "has the other sign", NUMERIC, "answer request", _EVERYWHERE, _number(lambda n: -n)),
     _operator(
         "single", "goes through a 32-bit float", frozenset({"number"}), "answer request", _EVERYWHERE, _number(single)
     ),
     _operator(
         "ulp",
         "is the next greater number",
-        _NUMERIC,
+        NUMERIC,
         "answer request",
         _EVERYWHERE,
         _number(lambda n: n + 1 if isinstance(n, int) else math.nextafter(n, math.inf)),
@@ -218,12 +216,12 @@ OPERATORS = (
     ),
     _operator("truncate", "is cut", frozenset({"string", "array"}), "answer request", _EVERYWHERE, _each(_half)),
     _operator("default", "is taken for zero or empty", _SCALAR, "request", _EVERYWHERE, _each(_default)),
-    _operator("coerce", "is taken for zero where it is no number", _NUMERIC, "request", _EVERYWHERE, _each(_coerced)),
+    _operator("coerce", "is taken for zero where it is no number", NUMERIC, "request", _EVERYWHERE, _each(_coerced)),
     _operator("ignore", "is for ever what it was first", _SCALAR, "request", _EVERYWHERE, _remembering(for_ever=True)),
     _operator(
         "lag", "is what it was in the request before", _SCALAR, "request", _EVERYWHERE, _remembering(for_ever=False)
     ),
-    _operator("clamp", f"is clamped to {_CLAMP}", _NUMERIC, "request", _EVERYWHERE, _number(_clamped)),
+    _operator("clamp", f"is clamped to {_CLAMP}", NUMERIC, "request", _EVERYWHERE, _number(_clamped)),
     _operator("forward", "is written over its sibling", _SCALAR, "request", _EVERYWHERE, _forward, sibling=True),
     _operator(
         "round",

@@ -8,6 +8,7 @@ from conformance.selftest.generated import whens
 from conformance.selftest.generated.adversary import composed, kinds_in_requests
 from conformance.selftest.generated.catalogue import generated_mutants
 from conformance.selftest.generated.mutant import Tally
+from conformance.selftest.generated.reach import unreached
 
 CONTRACT = Contract.load()
 JSON = [("Content-Type", "application/json")]
@@ -94,3 +95,11 @@ def test_times_pass(faults, monkeypatch):
             now[0] = 100.0 + moment
             found.append(change(_get(), lambda _: Response(200, list(JSON), _VELOCITY % b"0.5")).status)
         assert [number for number, status in enumerate(found) if status == 500] == struck
+
+
+def test_what_alters_no_message_of_a_run_is_known_beforehand(faults):
+    """Try faults on the messages of a run, but not those whose condition time or other requests decide."""
+    first, late, together = (faults[f"status@{when}:getVelocity:200-500"] for when in ("first", "late", "together"))
+    messages = [(_get(), Response(200, list(JSON), _VELOCITY % b"0.5"))] * 20
+    assert unreached([first, late, together], messages) == {late.name}
+    assert unreached([first, late, together], []) == {first.name, late.name}

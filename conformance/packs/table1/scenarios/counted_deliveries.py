@@ -150,12 +150,12 @@ def counted_deliveries(api: RestInterface, soap: SoapServices, probe: RosProbe) 
 def _invalid(api: RestInterface, soap: SoapServices) -> CountedDeliveries:
     rest = api.client
     invalid = []
-    for place, text in api.run.effort.subsample(_BAD_PARTS, 8):
+    for place, text in api.run.effort.alternatives(_BAD_PARTS, 8):
         values = [*CORRECT[:place], text, *CORRECT[place + 1 :]]
         invalid.append(rest.send("PUT", path_of(*values), fresh=True))
     after = [(_AFTER_REST, put_delivery(api, _AFTER_REST.rest_path, fresh=True))]
     by_method = []
-    for number, method in enumerate(api.run.effort.subsample(_OTHER_METHODS, 3)):
+    for number, method in enumerate(api.run.effort.alternatives(_OTHER_METHODS, 3)):
         delivery = _of(3, 200 + 10 * number)
         by_method.append(ByMethod(method, delivery, rest.send(method, delivery.rest_path, fresh=True)))
     if soap.publishers is not None:

@@ -47,7 +47,7 @@ def invalid_goals(api: RestInterface, robot: Robot) -> tuple[InvalidGoal, ...]:
     number = "goal.target_pose.pose.position.x"
     bodies = invalid_bodies(api, GOAL_PATH, goal_body(near, frame, "not to be followed"), number)
     bodies += [(what, JSON, body_of(body)) for what, body in _invalid_goals(near, frame)]
-    bodies = api.run.effort.subsample(bodies, 8)
+    bodies = api.run.effort.alternatives(bodies, 8)
     sent: list[InvalidGoal] = []
     try:
         _send_without(robot, bodies, sent)

@@ -46,7 +46,7 @@ def _send(api: RestInterface, robot: Robot, rests: list[Rest]) -> tuple[Drive, l
     drive = Drive(robot)
     sent: list[tuple[str, Exchange]] = []
     for path, valid, number in ((VELOCITY, fast.twist, "linear.x"), (LINEAR, fast.linear, "x")):
-        for what, media_type, body in api.run.effort.subsample(invalid_bodies(api, path, valid, number), 8):
+        for what, media_type, body in api.run.effort.alternatives(invalid_bodies(api, path, valid, number), 8):
             sent.append((f"PUT {path} with {what}", put_body(robot, path, media_type, body)))
             rests.append(_read(drive, sent))
             if rests[-1].found:

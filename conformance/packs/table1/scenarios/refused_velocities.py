@@ -91,7 +91,7 @@ class _Player:
 
     def play(self) -> None:
         robot = self.robot
-        for velocity in self.effort.subsample(list(_beyond(robot)), 8):
+        for velocity in self.effort.alternatives(list(_beyond(robot)), 8):
             self._send(velocity)
         if not robot.limits_declared:
             self.trace = replace(self.trace, settled=watch_rest(Drive(robot), _AFTER, robot.limits.settle_s))

@@ -107,11 +107,11 @@ def test_what_is_no_delivery(rest: HttpClient, judge: Judge, explore: Explorer, 
             cause=f"{text} {exchange.came}",
         )
 
-    for place, text in effort.subsample([(place, text) for text in _TEXTS for place in range(7)], 8):
+    for place, text in effort.alternatives([(place, text) for text in _TEXTS for place in range(7)], 8):
         refused("refuses-text", place, text)
-    for place, text in effort.subsample([(place, text) for text in _NON_FINITE for place in range(1, 7)], 8):
+    for place, text in effort.alternatives([(place, text) for text in _NON_FINITE for place in range(1, 7)], 8):
         refused("refuses-non-finite", place, text)
-    for code in effort.subsample(_CODES, 8):
+    for code in effort.alternatives(_CODES, 8):
         refused("refuses-code", 0, code)
     explore(
         st.integers(-(2**31), 2**31 - 1).filter(lambda code: code not in {3, 4}),

@@ -1,0 +1,61 @@
+"""Which composed faults a run would meet at all: each is tried on the messages of a run of the good device.
+
+A fault that alters none of them cannot be noticed, and a run that shows it takes as long as any.
+"""
+
+from collections.abc import Iterable
+from typing import Final
+
+from conformance.mutation.messages import Forward, HangUpError, Request, Response
+from conformance.selftest.generated.mutant import GeneratedMutant, Tally
+
+# Larger messages are attacks by their size, which no fault by rule is about.
+_LARGEST: Final = 100_000
+# Conditions that the clock or other requests decide, which messages alone do not show.
+_OF_TIME: Final = frozenset({"now-and-then", "after-pause", "together"})
+Message = tuple[Request, Response]
+
+
+class Recorder:
+    """A change that changes nothing and keeps each exchange.
+
+    Attributes:
+        messages: requests and responses, in the order of the responses.
+    """
+
+    def __init__(self) -> None:
+        self.messages: list[Message] = []
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        """Forward the request, and keep it with its response."""
+        response = forward(request)
+        if len(request.body) + len(response.body) < _LARGEST:
+            self.messages.append((request.copy(), response.copy()))
+        return response
+
+
+def unreached(mutants: Iterable[GeneratedMutant], messages: list[Message]) -> frozenset[str]:
+    """Return the names of the faults with a condition that messages alone decide, and that alter none of them."""
+    return frozenset(one.name for one in mutants if _is_decidable(one) and not _alters(one, messages))
+
+
+def _is_decidable(mutant: GeneratedMutant) -> bool:
+    _, _, condition = mutant.operator.partition("@")
+    return bool(condition) and condition not in _OF_TIME
+
+
+def _alters(mutant: GeneratedMutant, messages: list[Message]) -> bool:
+    tally = Tally()
+    change = mutant.make(tally)
+    for request, response in messages:
+
+        def forward(_request: Request, response: Response = response) -> Response:
+            return response.copy()
+
+        try:
+            change(request.copy(), forward)
+        except HangUpError:
+            return True
+        if tally.altered:
+            return True
+    return False
