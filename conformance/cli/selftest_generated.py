@@ -19,12 +19,14 @@ def chosen_mutants(contract: Contract, options: dict[str, Any]) -> tuple[list[Ge
     """
     from conformance.selftest.generated.adversary import composed, kinds_in_requests  # noqa: PLC0415 - see selftest.py
     from conformance.selftest.generated.catalogue import generated_mutants  # noqa: PLC0415 - see selftest.py
+    from conformance.selftest.generated.open_places import open_place  # noqa: PLC0415 - see selftest.py
     from conformance.selftest.generated.sampling import sample  # noqa: PLC0415 - see selftest.py
 
     patterns = options["patterns"] or ("*",)
     every = generated_mutants(contract)
     if options["adversary"]:
-        every = composed(every, kinds_in_requests(contract))
+        made = composed(every, kinds_in_requests(contract))
+        every = tuple(one for one in made if open_place(contract, one) is None)
     fitting = [one for one in every if any(fnmatch.fnmatch(one.name, pattern) for pattern in patterns)]
     if not fitting:
         raise click.UsageError(f"no mutant by rule has a name like {', '.join(patterns)}; --list shows them")

@@ -189,6 +189,19 @@ _OPEN_PLACES = (
         "(contract.md#goals).",
     ),
     OpenPlace(
+        r"(freeze|delay|ulp)(@[\w-]+)?:putGoal:answer\.(goal_id|header|goal\.target_pose\.header)\.stamp(\.\w+)?:\w+",
+        "The response to a PUT acknowledges the goal; which time its stamps show there, no clause says.",
+    ),
+    OpenPlace(
+        r"ulp(@[\w-]+)?:getDeliveries:answer\[\]\.accepted\.\w+:\w+",
+        "When a delivery counts as accepted, to the nanosecond, is the robot's own affair (contract.md#deliveries).",
+    ),
+    OpenPlace(
+        r"[\w-]+@first:[gG]et(Sensors|NavigationServices):answer(\.return)?\[\]\.\w+:\w+",
+        "The lists show what is on the robot's graph, which may change after any response: one that differs from all "
+        "later ones is no breach (contract.md#sensors-and-services).",
+    ),
+    OpenPlace(
         r"body-empty(@[\w-]+)?:putGoal:body:\w+",
         "A goal is acknowledged by the status (contract.md#goals); no clause requires a response body.",
     ),
