@@ -8,6 +8,7 @@ from typing import Final
 
 from conformance.mutation.messages import Forward, HangUpError, Request, Response
 from conformance.selftest.generated.mutant import GeneratedMutant, Tally
+from conformance.selftest.generated.places import Exchange
 
 # Larger messages are attacks by their size, which no fault by rule is about.
 _LARGEST: Final = 100_000
@@ -36,7 +37,16 @@ class Recorder:
 
 def unreached(mutants: Iterable[GeneratedMutant], messages: list[Message]) -> frozenset[str]:
     """Return the names of the faults with a condition that messages alone decide, and that alter none of them."""
-    return frozenset(one.name for one in mutants if _is_decidable(one) and not _alters(one, messages))
+    decidable = [one for one in mutants if _is_decidable(one)]
+    exchanges = {one.exchange.name: one.exchange for one in decidable}
+    by_operation = {name: _around(exchange, messages) for name, exchange in exchanges.items()}
+    return frozenset(one.name for one in decidable if not _alters(one, by_operation[one.exchange.name]))
+
+
+def _around(exchange: Exchange, messages: list[Message]) -> list[Message]:
+    """Return the messages of an operation, each after the one before it, on which a condition may depend."""
+    concerned = {number for number, (request, _) in enumerate(messages) if exchange.concerns(request)}
+    return [message for number, message in enumerate(messages) if number in concerned or number + 1 in concerned]
 
 
 def _is_decidable(mutant: GeneratedMutant) -> bool:

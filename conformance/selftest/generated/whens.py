@@ -162,21 +162,21 @@ def striking(make: Callable[[], Change], exchange: Exchange, when: When) -> Chan
     change, lock = make(), threading.Lock()
     state: dict[str, Any] = {"number": 0, "under_way": 0, "before": None, "began": None, "last": None}
 
-    def arrived(request: Request) -> Seen:
+    def arrived(request: Request, *, concerned: bool) -> Seen:
         now = time.monotonic()
         with lock:
-            state["number"] += exchange.concerns(request)
+            state["number"] += concerned
             state["under_way"] += 1
             began, last = state["began"] or now, state["last"] or now
             state.update(began=began, last=now)
             return Seen(request, state["number"], now - last, now - began, state["under_way"] - 1, state["before"])
 
     def strikes(request: Request, forward: Forward) -> Response:
-        seen = arrived(request)
+        concerned = exchange.concerns(request)
+        seen = arrived(request, concerned=concerned)
         response: Response | None = None
         try:
-            # The change itself leaves other operations alone.
-            response = change(request, forward) if when(seen) else forward(request)
+            response = change(request, forward) if concerned and when(seen) else forward(request)
             return response
         finally:
             with lock:
