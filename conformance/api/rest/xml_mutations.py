@@ -47,7 +47,8 @@ def _of_places(value: Any, schema: Schema, root: str) -> Iterator[Mutation[bytes
                 yield Mutation("type", f"text at {place.where}", write("stop"))
         elif place.is_number:
             for text in _NO_NUMBERS:
-                yield Mutation("lexical", f"{text or 'nothing'!r} at {place.where}", write(text))
+                named = (place.field, text) if text == STRANGE_TEXT else ()
+                yield Mutation("lexical", f"{text or 'nothing'!r} at {place.where}", write(text), *named)
             yield Mutation("type", f"an element at {place.where}", write({STRANGE_NAME: 0}))
 
 

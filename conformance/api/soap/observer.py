@@ -35,6 +35,7 @@ PASSIVE: Final = tuple(
         "R1001",
         "fault-complete",
         "R1004",
+        "fault-code",
         "faultcode-qualified",
         "R1005",
         "R1006",
@@ -195,6 +196,14 @@ def _judge_fault(rules: _Rules, response: Response, fault: Fault) -> None:
         is_standard = fault.code_namespace != ENVELOPE or fault.code in _FAULT_CODES
         expected = "one of SOAP's fault codes, or a fault code in a namespace of its own"
         judge("R1004", is_standard, expected, lambda: f"{fault.code!r} in SOAP's namespace")
+        # A service that implements WS-Addressing has codes of its own for headers of it that are wrong.
+        addressed = b"addressing" in rules.exchange.request.body and "addressing" in fault.code_namespace
+        judge(
+            "fault-code",
+            fault.standard in _FAULT_CODES or addressed,
+            f"one of the fault codes {', '.join(sorted(_FAULT_CODES))}",
+            lambda: f"{fault.code!r} in the namespace {fault.code_namespace!r}",
+        )
 
 
 def _encoding(response: Response) -> str:

@@ -3,16 +3,17 @@
 import re
 from collections.abc import Callable
 
-from conformance.mutation.changes import JSON, becomes, hanging_up, page, plain, problem
+from conformance.mutation.changes import JSON, becomes, hanging_up, page, plain, problem, rest
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
-from conformance.packs.table1.mutants.paths import deliveries
+from conformance.packs.table1.mutants.paths import DELIVERIES, deliveries
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("rest-delivery", "rest")
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d+)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _NON_FINITE = re.compile(r"[+-]?(nan|inf|infinity|1e400|\d+e\d{3,})", re.IGNORECASE)
+_LIST = rest("GET", DELIVERIES)
 # Where the values are among a delivery path's segments: /robot/app/delivery/CODE/depot_x/VALUE/...
 _CODE, _VALUES = 4, range(6, 17, 2)
 
@@ -82,6 +83,17 @@ _mutant("delivery-crashes", "put", "PUT of a delivery returns 500.").altered(del
 _mutant("delivery-coffee-unknown", "put", "PUT of a coffee (code 4) returns 404.").instead(
     lambda request: deliveries(request) and request.path.split("/")[_CODE] == "4", problem(404, "code: 4 is not known")
 )
+_mutant("delivery-list-oldest-first", "list-newest-first", "The list of deliveries has the oldest first.").json(
+    _LIST, lambda entries: entries[::-1]
+)
+_mutant("delivery-list-all-soap", "list-values", "The list says of each delivery that it came over SOAP.").json(
+    _LIST, lambda entries: [{**entry, "interface": "soap"} for entry in entries]
+)
+_mutant(
+    "delivery-list-states",
+    "list",
+    "The entries of the list of deliveries have a state that the contract does not have.",
+).json(_LIST, lambda entries: [{**entry, "state": "lost"} for entry in entries])
 _mutant("delivery-silent", "put", "The robot accepts a delivery and closes the connection without responding.").made(
     hanging_up(deliveries)
 )

@@ -164,6 +164,12 @@ _mutant("goal-without-status", "goal-status", "The active goal has no status.").
 _mutant("goal-status-succeeded", "goal-status", "The active goal has status 4, succeeded.").json(
     _GET, field("status.code", 4)
 )
+_mutant("goal-put-back-new", "goal-put-back", "PUT of the goal as GET shows it returns 201.").instead(
+    lambda request: _PUT(request) and b'"status"' in request.body, plain(201)
+)
+_mutant("goal-stamp-zero", "goal-fills-in", "A goal that is sent without a header gets the stamp 0.").json(
+    _GET, field("header.stamp", {"sec": 0, "nanosec": 0})
+)
 _mutant("goal-wants-id", "goal-fills-in", "The robot refuses a goal without goal_id.").instead(
     _without_id, problem(422, "goal_id: missing")
 )

@@ -207,6 +207,14 @@ _mutant("http-problem-other-status", "problem-status", "The status member of pro
 _mutant("http-problem-vague", "problem-detail", "The detail of problem details is always 'invalid input'.").made(
     _problems(lambda value: value.update(detail="invalid input"), _INPUT)
 )
+_mutant(
+    "http-problem-vague-of-xml", "problem-detail", "The detail for an invalid XML body is always 'invalid input'."
+).made(
+    _problems(
+        lambda value: value.update(detail="invalid input"),
+        lambda request: _INPUT(request) and request.media_type.endswith("xml"),
+    )
+)
 _mutant("http-problem-mute", "problem-detail", "Problem details have no detail.").made(
     _problems(lambda value: value.pop("detail", None) and None)
 )

@@ -1,10 +1,11 @@
 """Mutants that return an error and carry the request out nevertheless."""
 
 import json
+import re
 from collections.abc import Callable, Container
 from typing import Any
 
-from conformance.mutation.changes import Make, parsed, problem, rest, success, unwanted
+from conformance.mutation.changes import SOAP, Make, page, parsed, posted, problem, rest, success, unwanted
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import DELIVERIES, GOAL, LINEAR, POSE, TNS, VELOCITY, deliveries
@@ -15,6 +16,8 @@ _mutant = MUTANTS.of_class("strict-input", "rest")
 
 _ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
 _INVALID = {400, 415, 422}
+# The namespace of the Envelope that one test sends in place of SOAP's.
+_ENVELOPE = re.compile(rb"http://example\.com/unknown")
 
 
 def sent(request: Request, forward: Forward, method: str, target: str, value: Any = None) -> Response:
@@ -109,6 +112,23 @@ def _soap_refusal(request: Request, forward: Forward) -> Response:
     return response
 
 
+@_mutant(
+    "input-old-version-refused-and-made",
+    "delivery-refused",
+    "A delivery in an Envelope of another version returns a VersionMismatch fault and is published.",
+    observer=True,
+    interface="soap",
+)
+def _old_version(request: Request, forward: Forward) -> Response:
+    response = forward(request)
+    if posted(request) and b"Execute" in request.body and b"VersionMismatch" in response.body:
+        forward(request.copy(body=_ENVELOPE.sub(SOAP.encode(), request.body)))
+    return response
+
+
+_mutant(
+    "input-goal-cancel-refused", "goal-refused", "A DELETE of the goal returns 406, and the goal is cancelled."
+).altered(unwanted(rest("DELETE", GOAL)), page(406))
 _mutant(
     "input-velocity-refused-and-driven",
     "velocity-refused",

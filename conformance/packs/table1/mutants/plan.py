@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from conformance.mutation.changes import JSON, becomes, page, query, rest, status
+from conformance.mutation.changes import JSON, becomes, page, problem, query, rest, status
 from conformance.mutation.fields import field
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import PLAN
@@ -77,6 +77,12 @@ _mutant("plan-frameless", "plan-frame", "The path's header has an empty frame_id
     _GET, field("plan.header.frame_id", "")
 )
 _mutant("plan-other-defaults", "plan-defaults", "The default yaw is a quarter turn.").rewritten(_GET, query(_quarter))
+_mutant("plan-no-exponents", "plan-numbers", "The robot refuses a query with an exponent such as e+00.").instead(
+    lambda request: _GET(request) and "e%2B" in request.query, problem(422, "x: no number")
+)
+_mutant("plan-none-not-found", "plan-none", "Where no plan exists, the robot returns 404.").altered(
+    _GET, becomes(404), status(422)
+)
 _mutant("plan-none-empty", "plan-none", "Where no plan exists, the robot returns 200 with an empty plan.").altered(
     _GET, page(200, _EMPTY, JSON), status(404, 422)
 )

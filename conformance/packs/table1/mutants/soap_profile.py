@@ -108,7 +108,12 @@ _mutant("bp-fault-mute", "fault-complete", "A Fault has no faultstring.").made(
 _mutant("bp-fault-codeless", "fault-complete", "A Fault has no faultcode.").made(
     _faults(fault_tree(each("faultcode", gone)))
 )
-_mutant("bp-fault-own-code", "R1004", "faultcode is a code that SOAP 1.1 does not define.").made(_faults(coded("Oops")))
+_mutant("bp-fault-own-namespace", "fault-code", "faultcode is a code in a namespace of the robot's own.").made(
+    _faults(text(r"<faultcode([^>]*)>\s*[\w.-]+:", r'<faultcode xmlns:own="urn:example:own"\1>own:'))
+)
+_mutant("bp-fault-own-code", ("R1004", "fault-code"), "faultcode is a code that SOAP 1.1 does not define.").made(
+    _faults(coded("Oops"))
+)
 _mutant("bp-fault-unbound", "faultcode-qualified", "The prefix of faultcode is not bound.").made(_faults(unbound))
 _mutant("bp-fault-code-bare", "faultcode-qualified", "faultcode has no prefix.").made(
     _faults(text(r"(<faultcode[^>]*>\s*)[\w.-]+:", r"\1"))
@@ -146,6 +151,22 @@ _mutant("bp-quoted-charset", "charset-forms", "A charset in quotation marks retu
     lambda request: posted(request) and '"' in (request.field("Content-Type") or ""), problem(415, "text/xml, please")
 )
 _mutant("bp-token-ignored", "authentication", "SOAP messages need no token.", token=_SESAME)(unchanged)
+
+
+@_mutant(
+    "bp-token-refused-and-made",
+    "authentication",
+    "A SOAP delivery without the token returns 401 and is published.",
+    token=_SESAME,
+    observer=True,
+)
+def _unauthorized_and_made(request: Request, forward: Forward) -> Response:
+    if posted(request) and request.field("Authorization") != f"Bearer {_SESAME}":
+        forward(request)
+        return problem(401, "no token", ("WWW-Authenticate", "Bearer"))(request)
+    return forward(request)
+
+
 _mutant("bp-no-chunks", "chunked", "A chunked message returns 400.").instead(
     _in_chunks, problem(400, "a length, please")
 )

@@ -77,11 +77,11 @@ def speeds(request: Request) -> tuple[float, float]:
         return 0.0, 0.0
 
 
-def _while_goal(response: Callable[[Request], Response]) -> Make:
+def _while_goal(response: Callable[[Request], Response], where: Callable[[Request], bool] = _PUT) -> Make:
     """Return a change that answers velocity commands itself while a goal is active."""
 
     def change(request: Request, forward: Forward) -> Response:
-        active = _PUT(request) and forward(request.copy(method="GET", target=GOAL, body=b"")).status == 200
+        active = where(request) and forward(request.copy(method="GET", target=GOAL, body=b"")).status == 200
         return response(request) if active else forward(request)
 
     return lambda: change
@@ -165,6 +165,9 @@ def _short_of(share: float) -> Callable[[Any], None]:
 _mutant("velocity-locked-by-goal", "velocity-goal", "PUT of a velocity returns 423 while a goal is active.").made(
     _while_goal(problem(423, "linear.x: a goal is active"))
 )
+_mutant(
+    "velocity-linear-locked-by-goal", "velocity-goal", "PUT of a linear velocity returns 423 while a goal is active."
+).made(_while_goal(problem(423, "x: a goal is active"), _PUT_LINEAR))
 _mutant(
     "velocity-forgotten-for-goal",
     "velocity-goal",

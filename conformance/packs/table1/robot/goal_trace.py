@@ -85,10 +85,13 @@ class GoalLife:
         first: the PUT of the first goal, which has all optional members.
         stamps: the first goal's stamp in two readings.
         repeated: repeated PUTs of the active goal.
+        put_back: PUTs of the active goal as GET showed it.
         contradicted: PUTs of another pose under the active goal's id.
         velocity: the response to a velocity PUT while a goal was active; None: no velocity was sent.
         drive: commands and readings of that velocity, where the robot accepted it.
+        linear: the response to a PUT of a linear velocity after it; None: none was sent.
         second: the PUT of another goal without an id.
+        now_s: the stamp of the robot's odometry just after that, s; None: it could not be read.
         renamed: whether the robot accepted the second goal only with an id; None: it accepted it without one.
         cancelled: DELETEs of the active goal; empty: the goal had ended before.
         cancels: all DELETEs that were sent while a goal was active, also where the goal had ended when they arrived.
@@ -98,10 +101,13 @@ class GoalLife:
     first: Put | None = None
     stamps: tuple[Any, ...] = ()
     repeated: tuple[Put, ...] = ()
+    put_back: tuple[Put, ...] = ()
     contradicted: tuple[Put, ...] = ()
     velocity: Exchange | None = None
     drive: Trace | None = None
+    linear: Exchange | None = None
     second: Put | None = None
+    now_s: float | None = None
     renamed: bool | None = None
     cancelled: tuple[Cancelled, ...] = ()
     cancels: tuple[Exchange, ...] = ()

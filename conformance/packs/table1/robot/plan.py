@@ -23,6 +23,12 @@ EXACT: Final = 1e-6
 _BESIDE: Final = 0.3
 # How far from the robot, or from the given start, a path may begin: a planner's grid is not finer, m.
 START_OFF: Final = 0.25
+# Notations of a number beside the shortest: with an exponent, with a sign, with other digits before the dot.
+NOTATIONS: Final[tuple[Callable[[float], str], ...]] = (
+    lambda value: f"{value:.17e}",
+    lambda value: f"{value:+.20e}",
+    lambda value: f"{value:+.17f}".replace("0.", ".", 1) if abs(value) < 1 else f"00{value:.17f}".replace("00-", "-00"),
+)
 # Plans and readings that have to say together that paths begin elsewhere.
 _STARTS: Final = 3
 

@@ -45,7 +45,7 @@ class PlansFromRobot:
 
 @dataclass(frozen=True)
 class DefaultPlan:
-    """A plan whose request leaves out all optional parameters.
+    """A plan whose request says the same as another one: it leaves out the defaults, or writes numbers otherwise.
 
     Attributes:
         goal: where the plan must end.
@@ -69,10 +69,12 @@ class PlansFromStart:
     Attributes:
         reads: requests with a heading.
         defaults: requests without heading, frame and tolerance.
+        written: requests with the defaults, whose numbers are written in another notation.
     """
 
     reads: tuple[PlanRead, ...] = ()
     defaults: tuple[DefaultPlan, ...] = ()
+    written: tuple[DefaultPlan, ...] = ()
 
 
 @dataclass(frozen=True)

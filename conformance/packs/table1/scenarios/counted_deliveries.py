@@ -7,8 +7,11 @@ from typing import Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.callable_services import SoapServices
-from conformance.api.soap.calls import call
-from conformance.api.soap.service import SoapService
+from conformance.api.soap.calls import SoapResponse, call, read_exchange, send
+from conformance.api.soap.envelope import envelope
+from conformance.api.soap.service import MEDIA_TYPE, SoapService
+from conformance.documents.xml_names import ENVELOPE, clark
+from conformance.documents.xml_node import Node
 from conformance.packs.table1.delivery import COFFEE, COURIER
 from conformance.packs.table1.robot.deliveries_seen import DeliveryObserver, NoObserverError, observer_of
 from conformance.packs.table1.robot.delivery import Delivery, path_of, put_delivery
@@ -20,6 +23,8 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange
 
 CORRECT: Final = ("3", "1.5", "2.5", "3.5", "4.5", "5.5", "6.5")
+NO_CREDENTIALS: Final = "no credentials"
+_FAULTS: Final = frozenset({"Client", "MustUnderstand", "VersionMismatch"})
 _OTHER_METHODS: Final = ("GET", "HEAD", "OPTIONS", "POST", "DELETE", "PATCH")
 _BAD_PARTS: Final = (
     *((0, text) for text in ("0", "5", "abc", "", "3.5", "2147483648")),
@@ -36,6 +41,10 @@ _NO_FORMAT: Final = _of(3, 21)
 _LAST: Final = _of(3, 11)
 _TWICE: Final = _of(COURIER, 70)
 _APART: Final = _of(COURIER, 80)
+_OLD_VERSION: Final = _of(COURIER, 120)
+_MANDATORY: Final = _of(COURIER, 130)
+_STRANGER: Final = _of(COURIER, 140)
+_STRANGE: Final = "http://example.com/unknown"
 # The requests after refused ones, over either interface.
 _AFTER_REST: Final = _of(3, 90)
 _AFTER_SOAP: Final = _of(COURIER, 100)
@@ -49,6 +58,31 @@ class ByMethod:
     method: str
     delivery: Delivery
     exchange: Exchange
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """A delivery with valid values that a robot rejects for another reason.
+
+    Attributes:
+        what: that reason, as a noun phrase.
+        delivery: its values.
+        exchange: request and response.
+        accepted: whether the robot accepted it all the same.
+        is_rejected: whether the response says so: by 4xx, or by a fault that the contract names.
+    """
+
+    what: str
+    delivery: Delivery
+    exchange: Exchange
+    accepted: bool
+    is_rejected: bool
+
+    @classmethod
+    def of(cls, what: str, delivery: Delivery, answer: SoapResponse) -> "Rejected":
+        """Return the record of what a service answered."""
+        rejected = 400 <= answer.status < 500 or answer.code in _FAULTS  # noqa: PLR2004 - RFC 9110 15.5
+        return cls(what, delivery, answer.exchange, answer.accepted, rejected)
 
 
 @dataclass(frozen=True)
@@ -76,6 +110,7 @@ class CountedDeliveries:
     Attributes:
         invalid: exchanges of invalid deliveries, over REST and SOAP.
         by_method: valid paths with other methods.
+        rejected: SOAP messages with valid values that the robot should reject.
         no_format: the valid delivery whose Accept header excludes all formats.
         answer: its exchange, or None if no observer shows arrivals.
         last: a valid delivery after them, which must arrive.
@@ -87,6 +122,7 @@ class CountedDeliveries:
 
     invalid: tuple[Exchange, ...]
     by_method: tuple[ByMethod, ...]
+    rejected: tuple[Rejected, ...] = ()
     no_format: Delivery = _NO_FORMAT
     answer: Exchange | None = None
     last: Delivery = _LAST
@@ -99,6 +135,7 @@ class CountedDeliveries:
     def known(self) -> set[Delivery]:
         """Return the valid deliveries among them."""
         own = {self.last, self.no_format, _TWICE, _APART}
+        own |= {one.delivery for one in self.rejected}
         return own | {one.delivery for one in self.by_method} | {delivery for delivery, _ in self.after}
 
     @property
@@ -134,6 +171,7 @@ def counted_deliveries(api: RestInterface, soap: SoapServices, probe: RosProbe) 
         1
         + sum(exchange.response.ok for _, exchange in trace.after)
         + answer.response.ok
+        + sum(one.accepted for one in trace.rejected)
         + keyed.twice[0].response.ok
         + keyed.accepted_apart
     )
@@ -158,18 +196,46 @@ def _invalid(api: RestInterface, soap: SoapServices) -> CountedDeliveries:
     for number, method in enumerate(api.run.effort.alternatives(_OTHER_METHODS, 3)):
         delivery = _of(3, 200 + 10 * number)
         by_method.append(ByMethod(method, delivery, rest.send(method, delivery.rest_path, fresh=True)))
+    rejected: list[Rejected] = []
     if soap.publishers is not None:
+        rejected = _rejected_soap(soap.publishers)
         invalid += _invalid_soap(soap.publishers)
         after.append((_AFTER_SOAP_COFFEE, send_delivery(soap.publishers, _AFTER_SOAP_COFFEE, coffee=True)))
         invalid.append(send_delivery(soap.publishers, Delivery(0, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5)))
         after.append((_AFTER_SOAP, send_delivery(soap.publishers, _AFTER_SOAP)))
-    return CountedDeliveries(tuple(invalid), tuple(by_method), after=tuple(after))
+    return CountedDeliveries(tuple(invalid), tuple(by_method), tuple(rejected), after=tuple(after))
 
 
 def _put(api: RestInterface, delivery: Delivery, keys: Sequence[str]) -> tuple[Exchange, ...]:
     """PUT a delivery once with each key, each on a new connection so that the client does not retry."""
     fields = [(("Idempotency-Key", f'"{key}"'),) for key in keys]
     return tuple(put_delivery(api, delivery.rest_path, headers=field, fresh=True) for field in fields)
+
+
+def _rejected_soap(publishers: SoapService) -> list[Rejected]:
+    """Send valid deliveries of another SOAP version, with a mandatory header, and without credentials if there are."""
+    mandatory = Node(clark(_STRANGE, "Transaction"), "5", (), ((clark(ENVELOPE, "mustUnderstand"), "1"),))
+    old = envelope([_message(_OLD_VERSION)], space=_STRANGE)
+    sent = [
+        Rejected.of("an Envelope of another SOAP version", _OLD_VERSION, send(publishers, old, fresh=True)),
+        Rejected.of(
+            "an unknown mandatory header block",
+            _MANDATORY,
+            call(publishers, _message(_MANDATORY), headers=(mandatory,), fresh=True),
+        ),
+    ]
+    if publishers.client.connection.credentials:
+        message = envelope([_message(_STRANGER)]).written()
+        fields = (("Content-Type", MEDIA_TYPE), ("SOAPAction", '""'))
+        exchange = publishers.client.send(
+            "POST", publishers.path, headers=fields, body=message, authorized=False, fresh=True
+        )
+        sent.append(Rejected.of(NO_CREDENTIALS, _STRANGER, read_exchange(exchange)))
+    return sent
+
+
+def _message(delivery: Delivery) -> Node:
+    return request("ExecuteDeliveryRequest", **delivery._asdict())
 
 
 def _invalid_soap(publishers: SoapService) -> list[Exchange]:
@@ -186,6 +252,7 @@ def _invalid_soap(publishers: SoapService) -> list[Exchange]:
     exchanges = [send_delivery(publishers, Delivery(0, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5))]
     for change in changes:
         given = {**values, **change}
-        message = request("ExecuteDeliveryRequest", **{name: text for name, text in given.items() if text is not None})
-        exchanges.append(call(publishers, message, fresh=True).exchange)
+        parts = {name: text for name, text in given.items() if text is not None}
+        names = ["ExecuteDeliveryRequest", *["ExecuteCoffeeRequest"] * ("source_y" in change)]
+        exchanges += (call(publishers, request(name, **parts), fresh=True).exchange for name in names)
     return exchanges

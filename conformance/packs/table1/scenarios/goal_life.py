@@ -20,7 +20,7 @@ from conformance.packs.table1.robot.goal import (
 )
 from conformance.packs.table1.robot.goal_trace import Cancelled, GoalLife, NoGoal, Put
 from conformance.packs.table1.robot.goals import choose_goals, meanwhile
-from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
+from conformance.packs.table1.robot.robot import LINEAR, STILL, Robot, Velocity
 from conformance.packs.table1.robot.standstill import Standstill, watch_rest
 from conformance.packs.table1.robot.standstill_trace import Rest
 from conformance.scenarios.scenario import PartialTraceError, scenario
@@ -75,6 +75,8 @@ class _Player:
         self.life = replace(self.life, stamps=stamps)
         if not self._repeat(first, there):
             meanwhile(robot, ID, lambda body, pose, _: self._repeat(body, pose))
+        if not self._put_back(there):
+            meanwhile(robot, ID, lambda _, pose, __: self._put_back(pose))
         if not self._contradict(first, goal_body(back, frame, ID), there):
             meanwhile(robot, ID, lambda body, pose, other: self._contradict(body, other, pose))
         self._velocity_meanwhile()
@@ -116,6 +118,17 @@ class _Player:
             self.life = replace(self.life, repeated=(*self.life.repeated, put))
         return True
 
+    def _put_back(self, there: Pose) -> bool:
+        """PUT the active goal as GET shows it; return whether it was still active."""
+        shown, _ = self.robot.goal()
+        if shown is None:
+            return False
+        put, none = self._put_beside(shown, shown)
+        if none and arrived(self.robot, there):
+            return False
+        self.life = replace(self.life, put_back=(*self.life.put_back, put))
+        return True
+
     def _contradict(self, body: dict[str, Any], other: dict[str, Any], there: Pose) -> bool:
         """PUT another pose under the active goal's id; return whether the goal was still active: it may have ended."""
         put, none = self._put_beside(other, body)
@@ -132,17 +145,20 @@ class _Player:
         if exchange.response.ok and drive.look_s < _LOOK_S:
             drive.commanded(slow, sent, exchange)
             drive.reach(slow, "rest-resources/velocity-goal")
-        self.life = replace(self.life, velocity=exchange, drive=drive.trace)
+        linear = robot.put(LINEAR, STILL.linear)
+        self.life = replace(self.life, velocity=exchange, drive=drive.trace, linear=linear)
 
     def _displace(self, body: dict[str, Any], pose: Pose) -> None:
         """PUT another goal, without an id, while one is active."""
         second = put_new(self.robot, body, pose)
+        odometry = self.robot.odometry()
         renamed = None
         if second.exchange.response.status not in NEW | REPEATED:
             # Is it the missing id that is refused, or another goal?
             named = put_goal(self.robot, body | {"goal_id": {"id": "another"}})
             renamed = named.response.status in NEW | REPEATED
-        self.life = replace(self.life, second=second, renamed=renamed)
+        now_s = None if odometry is None else odometry.stamp
+        self.life = replace(self.life, second=second, renamed=renamed, now_s=now_s)
 
     def _cancel(self, pose: Pose) -> bool:
         """Cancel the active goal; return whether there was one, as it may have ended at its ``pose``.

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from http import HTTPStatus
 from typing import Any
 
 from conformance.api.rest.calls import JSON
@@ -84,8 +85,20 @@ def _send_during(robot: Robot, bodies: list[_Body], pose: Pose, sent: list[Inval
         sent.append(InvalidGoal(what, during=True, exchange=exchange, differs=differs))
         if differs:
             break
+    _refused_cancel(robot, active, sent)
     robot.delete_goal()
     await_none(robot)
+
+
+def _refused_cancel(robot: Robot, active: dict[str, Any], sent: list[InvalidGoal]) -> None:
+    """Cancel the goal with an Accept header that excludes all formats: a robot that refuses that keeps the goal."""
+    if robot.goal()[0] is None:
+        return
+    exchange = robot.delete_goal(("Accept", "image/png"))
+    if exchange.response.status == HTTPStatus.NOT_ACCEPTABLE:
+        goal, _ = robot.goal()
+        differs = "none" if goal is None else difference(goal, active)
+        sent.append(InvalidGoal("Accept: image/png", during=True, exchange=exchange, differs=differs))
 
 
 def _ends(robot: Robot, active: dict[str, Any], act: Callable[[], object]) -> bool:

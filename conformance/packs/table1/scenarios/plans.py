@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, read_as
-from conformance.packs.table1.robot.plan import ask, plan_of, query, reachable, start_of
+from conformance.packs.table1.robot.plan import NOTATIONS, ask, plan_of, query, reachable, start_of
 from conformance.packs.table1.robot.plan_trace import DefaultPlan, FramePlan, PlanRead, PlansFromRobot, PlansFromStart
 from conformance.packs.table1.robot.robot import POSE, Robot
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
@@ -79,7 +79,8 @@ def plans_from_start(robot: Robot, explore: Explorer) -> PlansFromStart:
     explore(st.tuples(st.integers(0, 2), st.integers(0, 2), st.floats(-math.pi, math.pi)), request, cases=12)
     pairs = ((start, goal._replace(yaw=0.0)) for start, goal in itertools.pairwise(starts))
     defaults = (_by_default(robot, start, goal) for start, goal in pairs)
-    return PlansFromStart(tuple(reads), tuple(one for one in defaults if one is not None))
+    written = _otherwise_written(robot, starts[0], starts[1]._replace(yaw=-0.5))
+    return PlansFromStart(tuple(reads), tuple(one for one in defaults if one is not None), written)
 
 
 def _by_default(robot: Robot, start: Pose, goal: Pose) -> DefaultPlan | None:
@@ -91,6 +92,23 @@ def _by_default(robot: Robot, start: Pose, goal: Pose) -> DefaultPlan | None:
     if explicit is None:
         return None  # there may be no plan in that frame
     return DefaultPlan(goal, exchange, problem, None if problem else plan_of(message), plan_of(explicit))
+
+
+def _otherwise_written(robot: Robot, start: Pose, goal: Pose) -> tuple[DefaultPlan, ...]:
+    """Request one plan with its numbers in each notation that the contract allows (contract.md#numbers)."""
+    given = {"x": goal.x, "y": goal.y, "yaw": goal.yaw, "start_x": start.x, "start_y": start.y, "tolerance": 0.1}
+    frame = {"frame_id": robot.statement.motion.frame}
+    explicit, _ = robot.read(query(**given, **frame), GET_PLAN)
+    if explicit is None:
+        return ()
+    exchanges = [
+        robot.get(query(**{name: write(value) for name, value in given.items()}, **frame)) for write in NOTATIONS
+    ]
+    read = [(exchange, *read_as(exchange.response, GET_PLAN)) for exchange in exchanges]
+    return tuple(
+        DefaultPlan(goal, exchange, problem, None if problem else plan_of(message), plan_of(explicit))
+        for exchange, message, problem in read
+    )
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.RESTING)

@@ -74,8 +74,9 @@ def _watch_s(robot: Robot) -> float:
 
 
 def _vanish(robot: Robot, part: _Part) -> None:
-    """Begin a request that would move the robot, and close the connection before it ends."""
-    fast = robot.share_of_limits(0.3, 0.5)
+    """Begin a request that would move the robot, ahead or back, and close the connection before it ends."""
+    sign = 1 if part.reset else -1
+    fast = robot.share_of_limits(0.3 * sign, 0.5 * sign)
     body = body_of(fast.twist if part.path == VELOCITY else fast.linear)
     sent = body[: int(part.share * len(body))]
     promised = None if part.lacking is None else len(body) + part.lacking

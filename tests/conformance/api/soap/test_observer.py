@@ -47,6 +47,8 @@ FAULTS = [
     (r"(faultcode>)s:", r"\1", "faultcode-qualified"),
     (r"(faultcode>)s:", r"\1nowhere:", "faultcode-qualified"),
     (":Client<", ":Sender<", "R1004"),
+    (":Client<", ":Sender<", "fault-code"),
+    ("<faultcode>s:", '<faultcode xmlns:o="urn:own">o:', "fault-code"),
     ("<faultstring>.*?</faultstring>", "", "fault-complete"),
     ("<faultcode>.*?</faultcode>", "", "fault-complete"),
     ("(</faultstring>)", r"\1<time>1</time>", "R1000"),

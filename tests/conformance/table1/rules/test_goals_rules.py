@@ -2,19 +2,32 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
-from toy_messages import exchange
+from toy_messages import exchange, goal
 
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import SUCCEEDED, outcome_fault
-from conformance.packs.table1.robot.goal_trace import FarGoal, GoalReached, GoalStep, Put, RefusedGoals, SpecialGoal
+from conformance.packs.table1.robot.goal_trace import (
+    FarGoal,
+    GoalLife,
+    GoalReached,
+    GoalStep,
+    Put,
+    RefusedGoals,
+    SpecialGoal,
+)
 from conformance.packs.table1.rules.rest_resources import test_goal_drives as drives
 from conformance.packs.table1.rules.rest_resources import test_goal_ids as ids
+from conformance.packs.table1.rules.rest_resources import test_goal_life as life
 from conformance.packs.table1.rules.rest_resources import test_goal_refused as rules
 from conformance.packs.table1.rules.rest_resources import test_goal_walk as walk
 from conformance.packs.table1.rules.strict_input import test_refused_state as refused
 from conformance.packs.table1.scenarios.invalid_goals import InvalidGoal
+from conformance.packs.table1.statement import Statement
+
+_RUN = {"run": SimpleNamespace(statement=Statement())}
 
 
 def _last(id_, code):
@@ -49,6 +62,29 @@ def test_a_goal_outside_every_map_is_refused_or_ends(status, read, holds, observ
     far = FarGoal(exchange(status), None if read is None else exchange(read), 60.0)
     (case,) = rules.goal_unreachable.outcomes(RefusedGoals(far=(far,)), {}.__getitem__)
     assert (case.holds, case.observed) == (holds, observed)
+
+
+@pytest.mark.parametrize(
+    ("status", "differs", "holds"),
+    [(200, "", True), (422, "", True), (201, "", False), (500, "", False), (204, "status 404", False)],
+)
+def test_a_goal_is_put_back_without_effect(status, differs, holds):
+    put = Put(exchange(status), {}, None, exchange(200), differs, ended=False)
+    assert _holds(life.goal_put_back, GoalLife(put_back=(put,))) == [holds]
+
+
+@pytest.mark.parametrize(("at_s", "holds"), [(98.0, [True, True]), (0.0, [True, False]), (None, [True])])
+def test_the_robot_fills_in_its_present_time(at_s, holds):
+    shown = goal("of its own", at_s=99.0, shown_s=at_s)
+    trace = GoalLife(second=Put(exchange(201), {}, shown, exchange(), "", ended=False))
+    trace = replace(trace, now_s=None if at_s is None else 100.0)
+    assert [one.holds for one in life.goal_fills_in.outcomes(trace, _RUN.__getitem__)] == holds
+
+
+@pytest.mark.parametrize(("status", "holds"), [(204, True), (409, True), (423, False)])
+def test_a_linear_velocity_is_driven_or_refused_while_a_goal_is_active(status, holds):
+    trace = GoalLife(linear=exchange(status))
+    assert [one.holds for one in life.velocity_goal.outcomes(trace, _RUN.__getitem__)] == [holds]
 
 
 @pytest.mark.parametrize(
@@ -119,12 +155,12 @@ def test_how_a_goal_ended_is_told_with_its_id(last, fault):
 @pytest.mark.parametrize(
     ("during", "differs", "expected"),
     [
-        (False, "this goal as the active one", "no goal after PUT of one with an empty id"),
-        (True, "", "the goal that was active before PUT of one with an empty id"),
+        (False, "this goal as the active one", "no goal after PUT with an empty id"),
+        (True, "", "the goal that was active before PUT with an empty id"),
     ],
 )
 def test_an_invalid_goal_changes_nothing(during, differs, expected):
-    trace = (InvalidGoal("an empty id", during, exchange(400), differs),)
+    trace = (InvalidGoal("an empty id", during, exchange(400, method="PUT"), differs),)
     (case,) = refused.goal_refused.outcomes(trace, {}.__getitem__)
     assert (case.holds, case.expected) == (not differs, expected)
 

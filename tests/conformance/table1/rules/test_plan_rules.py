@@ -1,12 +1,13 @@
 """Rules on plans, by traces made by hand."""
 
+import re
 from types import SimpleNamespace
 
 import pytest
 from toy_messages import exchange
 
 from conformance.packs.table1.robot.geometry import Pose
-from conformance.packs.table1.robot.plan import Plan, Start
+from conformance.packs.table1.robot.plan import NOTATIONS, Plan, Start
 from conformance.packs.table1.robot.plan_trace import DefaultPlan, FramePlan, PlanRead, PlansFromRobot, PlansFromStart
 from conformance.packs.table1.rules.rest_resources import test_plan as rules
 from conformance.packs.table1.statement import Statement
@@ -72,9 +73,18 @@ def test_a_plan_begins_at_the_start_in_the_request(plan, holds):
         (None, False),
     ],
 )
-def test_what_a_request_leaves_out_has_its_default(plan, holds):
+def test_what_a_request_leaves_out_or_writes_otherwise_gives_the_same_plan(plan, holds):
     default = DefaultPlan(_THERE, exchange(), "" if plan else "status 500", plan, _plan())
     assert _holds(rules.plan_defaults, PlansFromStart(defaults=(default,))) == [holds]
+    assert _holds(rules.plan_numbers, PlansFromStart(written=(default,))) == [holds]
+
+
+@pytest.mark.parametrize("value", [0.0, -0.0, 0.1, -0.75, 12.5, -41.35, 1e-9])
+def test_each_notation_is_allowed_and_gives_the_same_number(value):
+    for write in NOTATIONS:
+        written = write(value)
+        assert re.fullmatch(r"[+-]?(\d+(\.\d+)?|\.\d+)(e[+-]\d+)?", written, re.ASCII), written
+        assert float(written) == pytest.approx(value, abs=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -96,6 +106,6 @@ def test_a_plan_is_in_the_frame_in_the_request_or_refused(status, plan, moved_m,
     assert _holds(rules.plan_starts_in_its_frame, trace) + _holds(rules.plan_ends_in_its_frame, trace) == places
 
 
-@pytest.mark.parametrize(("status", "holds"), [(422, True), (404, True), (200, False), (500, False)])
+@pytest.mark.parametrize(("status", "holds"), [(422, True), (404, False), (200, False), (500, False)])
 def test_there_is_no_plan_outside_every_map(status, holds):
     assert _holds(rules.plan_none, (exchange(status),)) == [holds]

@@ -114,7 +114,8 @@ def test_plan(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effo
         few: dict[str, float | str] = {"x": goal.x, "y": goal.y}
         if frame != "map":
             few["frame_id"] = frame
-        full: dict[str, float | str] = {"x": goal.x, "y": goal.y, "yaw": 0.1 * index, "frame_id": frame}
+        yaw = 0.1 * index * (-1) ** index
+        full: dict[str, float | str] = {"x": goal.x, "y": goal.y, "yaw": yaw, "frame_id": frame}
         full |= {"tolerance": 0.2, "start_x": start.x, "start_y": start.y, "start_yaw": start.yaw}
         there = pose_of(odometry["pose"]["pose"]).ahead(_AHEAD)
         other: dict[str, float | str] = {"x": there.x, "y": there.y, "frame_id": odometry["header"]["frame_id"]}

@@ -88,7 +88,12 @@ def test_a_body_is_ignored(api: RestInterface, rest: HttpClient, judge: Judge, e
         )
 
 
-@pytest.mark.requirement("rest-delivery/refuses-text", "rest-delivery/refuses-non-finite", "rest-delivery/refuses-code")
+@pytest.mark.requirement(
+    "rest-delivery/refuses-text",
+    "rest-delivery/refuses-non-finite",
+    "rest-delivery/refuses-code",
+    "rest-formats/problem-xml",
+)
 def test_what_is_no_delivery(rest: HttpClient, judge: Judge, explore: Explorer, effort: Effort) -> None:
     """PUT invalid deliveries: text or nothing for a number, numbers beyond a double's range, other codes."""
 
@@ -109,6 +114,8 @@ def test_what_is_no_delivery(rest: HttpClient, judge: Judge, explore: Explorer, 
 
     for place, text in effort.alternatives([(place, text) for text in _TEXTS for place in range(7)], 8):
         refused("refuses-text", place, text)
+    # The observers judge the format of the refusal.
+    rest.send("PUT", path_of("abc", *_VALID[1:]), headers=(("Accept", "application/xml"),))
     for place, text in effort.alternatives([(place, text) for text in _NON_FINITE for place in range(1, 7)], 8):
         refused("refuses-non-finite", place, text)
     for code in effort.alternatives(_CODES, 8):

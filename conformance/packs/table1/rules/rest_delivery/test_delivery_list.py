@@ -1,36 +1,40 @@
 """The list of deliveries, an optional resource."""
 
+import itertools
+from collections.abc import Iterator
+from typing import Any, Final, NamedTuple
+
 import pytest
 
 from conformance.api.rest.interface import RestInterface
+from conformance.observe.polling import poll_for
 from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliveries
 from conformance.packs.table1.robot.delivery import Delivery, put_delivery
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
 from conformance.packs.table1.robot.message_shapes import read_as
-from conformance.packs.table1.robot.robot import ACCEPT_JSON, DELIVERIES
+from conformance.packs.table1.robot.robot import ACCEPT_JSON, DELIVERIES, Robot
 from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
 # What the list holds at least.
-_LEAST = 50
+_LEAST: Final = 50
+# A robot that writes its list after it has answered has done so by then, s.
+_STEP_S, _SOON_S = 0.05, 1.0
 
 
-def _read(rest: HttpClient, judge: Judge) -> list[Delivery] | None:
-    """Return the deliveries in the list, newest first; None where the robot has no list or it is invalid."""
+def _read(rest: HttpClient) -> tuple[list[dict[str, Any]], str, Exchange]:
+    """Return the entries of the list, newest first, what is wrong with the response, and the exchange.
+
+    A robot that refuses the request has no list, which it may leave out: the check is then skipped.
+    """
     exchange = rest.send("GET", DELIVERIES, headers=ACCEPT_JSON)
-    if exchange.response.status == 404:
+    if 400 <= exchange.response.status < 500:
         pytest.skip("the robot has no list of deliveries, which it may leave out")
-    value, problem = read_as(exchange.response, LIST)
-    judge.check(
-        "rest-delivery/list",
-        not problem,
-        exchange,
-        "status 200 with a list of {request, state, accepted, interface}, or 404",
-        found=problem,
-    )
-    return None if problem else [Delivery.of(entry["request"]) for entry in value]
+    entries, problem = read_as(exchange.response, LIST)
+    return entries or [], problem, exchange
 
 
 @pytest.mark.phase("acting")
@@ -38,45 +42,33 @@ def _read(rest: HttpClient, judge: Judge) -> list[Delivery] | None:
 def test_list(rest: HttpClient, judge: Judge, effort: Effort) -> None:
     """Check each reading of the list by its schema."""
     for _ in range(effort.cases(30)):
-        _read(rest, judge)
+        _, problem, exchange = _read(rest)
+        expected = "status 200 with a list of {request, state, accepted, interface}, or 404"
+        judge.check("rest-delivery/list", not problem, exchange, expected, found=problem)
 
 
 @pytest.mark.phase("acting")
 @pytest.mark.motion
 @pytest.mark.requirement("rest-delivery/list-newest-first", "rest-delivery/list-values")
-def test_list_of_many(api: RestInterface, rest: HttpClient, judge: Judge, effort: Effort) -> None:
+def test_list_of_many(api: RestInterface, rest: HttpClient, robot: Robot, judge: Judge, effort: Effort) -> None:
     """Send more deliveries than the list must hold, and check that it has the newest first with their values."""
-    if _read(rest, judge) is None:
+    before, problem, _ = _read(rest)
+    if problem:
         pytest.skip("the robot's list of deliveries cannot be read")
     # A robot that takes its time is asked for fewer.
     many = 5 if effort.slow else _LEAST + 5
     sent = [Delivery(3 + index % 2, 0.5, index + 0.25, -1.0, 1e300, 1e-300, index / 3) for index in range(many)]
-    for delivery in sent:
-        put_delivery(api, delivery.rest_path, fresh=True)
-    exchange = rest.send("GET", DELIVERIES, headers=ACCEPT_JSON)
-    value, problem = read_as(exchange.response, LIST)
-    if problem:
-        judge.check("rest-delivery/list-values", False, exchange, "a list of deliveries", found=problem)
-        return
-    listed = [Delivery.of(entry["request"]) for entry in value]
-    wanted = sent[: -_LEAST - 1 : -1]
-    newest = listed[: len(wanted)]
-    judge.check(
-        "rest-delivery/list-newest-first",
-        newest == wanted,
-        exchange,
-        f"the last {len(wanted)} deliveries, newest first",
-        found=f"{len(listed)} deliveries, first {listed[0] if listed else 'none'} for {wanted[0]}",
-    )
-    missing = next((one for one in wanted if one not in listed), None)
-    other = next((entry["interface"] for entry in value[: len(wanted)] if entry["interface"] != "rest"), "")
-    judge.check(
-        "rest-delivery/list-values",
-        missing is None and not other,
-        exchange,
-        "each delivery with its values, by rest",
-        found=f"a list without {missing}" if missing else f"a delivery by {other}",
-    )
+    taken = [one for one in sent if put_delivery(api, one.rest_path, fresh=True).response.ok]
+    for _ in poll_for(robot.clock, _STEP_S, _SOON_S):
+        entries, problem, exchange = _read(rest)
+        listed = Listed(entries, taken, [_request(entry) for entry in before])
+        if not problem and not listed.out_of_order and not listed.without:
+            break
+    expected = f"the last {_LEAST} deliveries, newest first"
+    out_of_order = problem or listed.out_of_order
+    judge.check("rest-delivery/list-newest-first", not out_of_order, exchange, expected, found=out_of_order)
+    without = problem or listed.without
+    judge.check("rest-delivery/list-values", not without, exchange, "each with its values, by rest", found=without)
 
 
 @pytest.mark.phase("last")
@@ -85,3 +77,46 @@ def test_list_of_many(api: RestInterface, rest: HttpClient, judge: Judge, effort
 def test_every_accepted_delivery_is_listed(accepted: AcceptedDeliveries) -> None:
     """Look for the last deliveries that the robot has accepted in the run, as after each check for those before."""
     accepted.read(to_the_last=True)
+
+
+class Listed(NamedTuple):
+    """The list after deliveries of which the robot took some; those of other clients may stand between them.
+
+    Attributes:
+        entries: of the list, newest first.
+        taken: the deliveries that the robot took, in their order.
+        before: the deliveries that the list had before.
+    """
+
+    entries: list[dict[str, Any]]
+    taken: list[Delivery]
+    before: list[Delivery]
+
+    @property
+    def _known(self) -> list[dict[str, Any]]:
+        return [entry for entry in self.entries if _request(entry) in [*self.taken, *self.before]]
+
+    @property
+    def _pairs(self) -> Iterator[tuple[Delivery, dict[str, Any] | None]]:
+        """Yield each of the last deliveries that the list has to hold, and the entry in its place."""
+        others = len(self.entries) - len(self._known)
+        wanted = self.taken[::-1][: max(0, _LEAST - others)]
+        return itertools.zip_longest(wanted, self._known[: len(wanted)])
+
+    @property
+    def out_of_order(self) -> str:
+        """What is in the place of another delivery; empty if nothing."""
+        wrong = ((entry, wanted) for wanted, entry in self._pairs if entry is None or _request(entry) != wanted)
+        return next((f"{entry and _request(entry)} in the place of {wanted}" for entry, wanted in wrong), "")
+
+    @property
+    def without(self) -> str:
+        """Which delivery is missing, or told to be of another interface; empty if none."""
+        listed = {_request(entry) for entry in self._known}
+        missing = next((f"a list without {wanted}" for wanted, _ in self._pairs if wanted not in listed), "")
+        names = (entry["interface"] for wanted, entry in self._pairs if entry and _request(entry) == wanted)
+        return missing or next((f"a delivery by {name}" for name in names if name != "rest"), "")
+
+
+def _request(entry: dict[str, Any]) -> Delivery:
+    return Delivery.of(entry["request"])

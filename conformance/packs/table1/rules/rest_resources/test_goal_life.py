@@ -10,6 +10,9 @@ from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import Case, Outcome, rule
 from conformance.verdict.run import Run
 
+# How far the stamp of a goal may be from the odometry's, s; as far as the odometry's from Date (contract.md#poses).
+_NOW_S = 5.0
+
 
 def _puts(life: GoalLife) -> Iterator[Put]:
     """Yield the PUTs of new goals."""
@@ -91,6 +94,20 @@ def goal_repeat(trace: GoalLife) -> Iterator[Outcome]:
         )
 
 
+@rule("rest-resources/goal-put-back", on=(goal_life,))
+def goal_put_back(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge that the active goal may be put back as GET shows it: the robot ignores its status, or refuses it."""
+    for one in trace.put_back:
+        status = one.exchange.response.status
+        answered = status in REPEATED or 400 <= status < 500
+        yield Case(
+            answered and not one.differs,
+            one.read if answered else one.exchange,
+            "200, 202, 204 or 4xx for the active goal as GET shows it, which stays as it is",
+            one.differs if answered else one.exchange.came,
+        )
+
+
 @rule("rest-resources/goal-conflict", on=(goal_life,))
 def goal_conflict(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that the robot rejects another pose under the active goal's id."""
@@ -113,7 +130,7 @@ def goal_preempt(trace: GoalLife) -> Iterator[Outcome]:
 
 
 @rule("rest-resources/goal-fills-in", on=(goal_life,))
-def goal_fills_in(trace: GoalLife) -> Iterator[Outcome]:
+def goal_fills_in(trace: GoalLife, run: Run) -> Iterator[Outcome]:
     """Judge that the robot fills in optional members that the goal leaves out."""
     second = trace.second
     if second is None:
@@ -126,6 +143,12 @@ def goal_fills_in(trace: GoalLife) -> Iterator[Outcome]:
         found = "no active goal" if id_ is None else f"goal_id.id {id_!r}"
         expected = "the active goal with a header and a goal_id of the robot's own"
         yield Case(id_ not in {None, "", ID}, second.read, expected, found)
+        if second.shown is not None and trace.now_s is not None:
+            stamp = second.shown["header"]["stamp"]
+            ahead_s = stamp["sec"] + stamp["nanosec"] * 1e-9 - trace.now_s
+            holds = abs(ahead_s) <= _NOW_S * max(1.0, said_of(run).limits.time_scale)
+            expected = "the robot's present time as header.stamp of a goal that was sent without a header"
+            yield Case(holds, second.read, expected, f"a stamp {ahead_s:.1f} s ahead of the odometry's")
 
 
 @rule("rest-resources/velocity-goal", on=(goal_life,))
@@ -134,6 +157,9 @@ def velocity_goal(trace: GoalLife, run: Run) -> Iterator[Outcome]:
     answer = trace.velocity
     if answer is not None:
         yield Case(answer.response.status in {200, 204, 409}, answer, "200, 204 or 409 while a goal is active")
+    if trace.linear is not None:
+        expected = "200, 204 or 409 for a linear velocity while a goal is active"
+        yield Case(trace.linear.response.status in {200, 204, 409}, trace.linear, expected)
     if trace.drive is not None:
         yield from outcomes("rest-resources/velocity-goal", trace.drive, said_of(run).limits)
 

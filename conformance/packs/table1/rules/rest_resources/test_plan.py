@@ -1,6 +1,7 @@
 """Rules on plans: where a path begins and ends, how long its steps are, and in which frame it is."""
 
 from collections.abc import Iterator
+from http import HTTPStatus
 
 from conformance.packs.table1.robot.geometry import Pose, wrapped
 from conformance.packs.table1.robot.plan import START_OFF, Plan
@@ -108,6 +109,14 @@ def plan_defaults(trace: PlansFromStart) -> Iterator[Outcome]:
         yield Case(not problem, one.exchange, "the plan that yaw=0, frame_id=map and tolerance=0.1 give", problem)
 
 
+@rule("rest-resources/plan-numbers", on=(plans_from_start,))
+def plan_numbers(trace: PlansFromStart) -> Iterator[Outcome]:
+    """Judge that numbers in a query mean the same in every notation."""
+    for one in trace.written:
+        problem = one.problem if one.plan is None else _other_plan(one, one.plan)
+        yield Case(not problem, one.exchange, "the plan for the same numbers in their shortest notation", problem)
+
+
 def _other_plan(one: DefaultPlan, plan: Plan) -> str:
     """Return where a plan differs from the one with the defaults written out; empty if nowhere."""
     last, wanted = plan.poses[-1], one.explicit.poses[-1]
@@ -158,9 +167,9 @@ def _at(pose: Pose, wanted: Pose, off_m: float, exchange: Exchange) -> Case:
 
 @rule("rest-resources/plan-none", on=(plans_outside,))
 def plan_none(trace: tuple[Exchange, ...]) -> Iterator[Outcome]:
-    """Judge that the robot responds without a plan to a goal outside every map."""
+    """Judge that the robot responds 422 to a request for a plan to a goal outside every map."""
     for exchange in trace:
-        yield Case(is_refused(exchange), exchange, "422 (another 4xx conforms) where there is no plan")
+        yield Case(exchange.response.status == HTTPStatus.UNPROCESSABLE_ENTITY, exchange, "422 where there is no plan")
 
 
 def _place(pose: Pose) -> str:

@@ -1,10 +1,16 @@
 """Rules on deliveries that the robot must reject: none of them may reach ROS."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from http import HTTPStatus
 
 from conformance.packs.table1.robot.delivery import Delivery
-from conformance.packs.table1.scenarios.counted_deliveries import CORRECT, CountedDeliveries, counted_deliveries
+from conformance.packs.table1.scenarios.counted_deliveries import (
+    CORRECT,
+    NO_CREDENTIALS,
+    CountedDeliveries,
+    Rejected,
+    counted_deliveries,
+)
 from conformance.scenarios.rule import Case, Note, Outcome, rule
 from conformance.transport.exchange import SAFE_METHODS
 
@@ -24,12 +30,28 @@ def delivery_refused(trace: CountedDeliveries) -> Iterator[Outcome]:
         accepted = one.exchange.response.ok and one.method not in SAFE_METHODS
         expected = f"no DeliveryRequestMsg on ROS after {one.method}: only PUT starts a delivery"
         yield Case(one.delivery not in seen or accepted, one.exchange, expected, cause=one.method)
+    yield from _without_effect(trace, lambda _: True)
     unknown = [one for one in seen if one not in trace.known]
     # The robot may have other clients: a single delivery that resembles none of the suite's may be theirs.
     found = [one for one in unknown if _resembles(one)] or (unknown if len(unknown) > 1 else [])
     accepted_first = next((one for one in trace.invalid if one.response.ok), trace.invalid[-1])
     observed = f"{len(found)} messages, among them {found[0]}" if found else ""
     yield Case(not found, accepted_first, "no message for an invalid delivery", observed)
+
+
+@rule("soap-basic-profile/authentication", on=(counted_deliveries,))
+def unauthorized_delivery(trace: CountedDeliveries) -> Iterator[Outcome]:
+    """Judge that a SOAP delivery without credentials makes no message."""
+    return _without_effect(trace, lambda one: one.what == NO_CREDENTIALS)
+
+
+def _without_effect(trace: CountedDeliveries, which: Callable[[Rejected], bool]) -> Iterator[Outcome]:
+    """Judge that messages with valid values that the robot rejected for another reason are not published."""
+    for one in trace.rejected if _shown(trace) else ():
+        if which(one) and one.is_rejected:
+            arrived = one.delivery in (trace.seen or ())
+            expected = f"no DeliveryRequestMsg for a rejected SOAP message with {one.what}"
+            yield Case(not arrived, one.exchange, expected, "a message", one.what)
 
 
 @rule("http/not-acceptable-undone", on=(counted_deliveries,))

@@ -29,5 +29,5 @@ def goal_refused(trace: tuple[InvalidGoal, ...]) -> Iterator[Outcome]:
     """Judge that the robot follows no invalid goal, and keeps the goal that it has."""
     for one in trace:
         kept = "the goal that was active before" if one.during else "no goal after"
-        expected = f"{kept} PUT of one with {one.what}"
+        expected = f"{kept} {one.exchange.request.method} with {one.what}"
         yield Case(not one.differs, one.exchange, expected, one.differs, cause=one.what)
