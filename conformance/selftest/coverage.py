@@ -18,7 +18,7 @@ from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.mutation.mutant import Mutant
 from conformance.mutation.self_test import self_test_of
 from conformance.selftest.generated.report import page_part
-from conformance.selftest.ways import tables
+from conformance.selftest.ways import tables, unargued
 from conformance.statement.statement import empty_statement
 from conformance.verdict.run import Run
 
@@ -119,7 +119,7 @@ def disagreements(contract: Contract) -> list[str]:
     for id_, checks in checks_by_requirement(contract).items():
         if id_ not in known and id_ not in generic_ledger():
             problems.append(f"{checks[0]} judges {id_!r}, which the ledger does not have")
-    return list(dict.fromkeys([*problems, *_misnamed(mutants, known)]))
+    return list(dict.fromkeys([*problems, *_misnamed(mutants, known), *unargued(contract)]))
 
 
 def _misnamed(mutants: Iterable[Mutant], known: Iterable[str]) -> Iterable[str]:

@@ -9,6 +9,7 @@ import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from string import ascii_lowercase
 from typing import Any, Final
 
 from conformance.api.rest.request_context import RequestContext
@@ -18,6 +19,8 @@ from conformance.engine.certification import certify
 from conformance.selftest.certifying import job_at, robot_of
 from conformance.selftest.generated.places import exchanges
 from conformance.selftest.robots import Robot
+from conformance.selftest.ways_argued import FILE as REASONS
+from conformance.selftest.ways_argued import Argument, Arguments, arguments_in
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Judge
 from conformance.verdict.run import Run
@@ -103,31 +106,64 @@ def of_pack(contract: Contract) -> Ways:
 
 
 def tables(contract: Contract) -> list[str]:
-    """Return lines of Markdown: a table of each clause of the contract, its requirements and the ways into it."""
-    ways = of_pack(contract)
+    """Return lines of Markdown: a table of each clause of the contract, its requirements and the ways into it.
+
+    Raises:
+        WaysFileError: the pack's arguments cannot be used.
+    """
+    ways, arguments = of_pack(contract), arguments_in(contract.directory) or Arguments()
     if not ways:
         return []
     lines = ["", "## Ways in", "", *_ABOUT]
+    for clause, names, judged in _clauses(contract, ways):
+        titles = " | ".join(f"`{name}`" if name not in TRAITS else name for name in names)
+        lines += ["", f"### {clause}", "", f"| requirement | {titles} |", f"|---|{'---|' * len(names)}"]
+        notes: dict[str, str] = {}
+        for item in judged:
+            cells = (_cell(ways[item.id].get(name), arguments.of(item.id, name), notes) for name in names)
+            lines.append(f"| `{item.id}` | {' | '.join(cells)} |")
+        lines += [""] * bool(notes) + [f"- ({letter}) {why}" for why, letter in notes.items()]
+    return lines
+
+
+def _cell(cases: int | None, reason: Argument | str, notes: dict[str, str]) -> str:
+    """Return the text of a cell; the letter of a new argument is added to ``notes``."""
+    if cases is not None:
+        return str(cases)
+    return reason if isinstance(reason, str) else f"({notes.setdefault(reason.why, ascii_lowercase[len(notes)])})"
+
+
+def unargued(contract: Contract) -> Iterator[str]:
+    """Yield a sentence for each cell without a case that the pack does not argue, and for each argument of no cell.
+
+    Raises:
+        WaysFileError: the pack's arguments cannot be used.
+    """
+    ways, arguments = of_pack(contract), arguments_in(contract.directory)
+    if arguments is None:
+        return
+    cells = [(item.id, name) for _, names, judged in _clauses(contract, ways) for item in judged for name in names]
+    for id_, way in cells:
+        if way not in ways[id_] and not arguments.of(id_, way):
+            yield f"{id_} is not judged by {way}, and {REASONS} does not say why"
+    yield from arguments.unused(cells)
+
+
+def _clauses(contract: Contract, ways: Ways) -> Iterator[tuple[str, dict[str, None], list[Requirement]]]:
+    """Yield each clause with all ways by which any of its requirements is judged, and these requirements."""
     for clause, own in _by_clause(contract).items():
         there = sorted({way for item in own for way in ways.get(item.id, {}) if way not in TRAITS})
         judged = [item for item in own if item.id in ways]
-        if not there or not judged:
-            continue
-        names = [*there, *TRAITS]
-        titles = " | ".join([*(f"`{name}`" for name in there), *TRAITS])
-        lines += ["", f"### {clause}", "", f"| requirement | {titles} |", f"|---|{'---|' * len(names)}"]
-        for item in judged:
-            cells = (str(ways[item.id].get(name, "")) for name in names)
-            lines.append(f"| `{item.id}` | {' | '.join(cells)} |")
-    return lines
+        if there and judged:
+            yield clause, dict.fromkeys([*there, *TRAITS]), judged
 
 
 _ABOUT: Final = (
     "Each number says how many cases of a requirement were judged by requests for an operation, in JSON unless the",
     "column names another format, in a run at standard effort on the first good device (`roaas contract ways` records",
-    "them). Columns are all ways by which any requirement of the clause was judged. An empty cell is a way by which a",
-    "requirement was not judged: because it is about something else (a rule on GET says nothing of PUT), or because",
-    "nobody has looked.",
+    "them). Columns are all ways by which any requirement of the clause was judged. A dot is an operation or a format",
+    "that the requirement does not speak of: a rule on GET says nothing of PUT. A letter is a way by which it could be",
+    "judged and was not, for the reason below the table. Both come from the pack's `ways.toml`.",
 )
 
 
