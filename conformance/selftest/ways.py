@@ -20,15 +20,13 @@ from conformance.selftest.certifying import job_at, robot_of
 from conformance.selftest.generated.places import exchanges
 from conformance.selftest.robots import Robot
 from conformance.selftest.ways_argued import FILE as REASONS
-from conformance.selftest.ways_argued import Argument, Arguments, arguments_in
+from conformance.selftest.ways_argued import TRAITS, Argument, Arguments, arguments_in
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Judge
 from conformance.verdict.run import Run
 
 #: Beside a pack's ledger: the number of judged cases by requirement and way in.
 FILE: Final = "ways.json"
-#: Properties of a request that are ways in of their own.
-TRAITS: Final = ("a negative number", "a request that was sent before")
 _NEGATIVE: Final = re.compile(rb"(?<![\w.])-\d")
 _CLAUSE: Final = re.compile(r"contract\.md#([\w-]+)")
 _SOAP_BODY: Final = re.compile(rb"<(?:[\w.-]+:)?Body[^>]*>\s*<(?:[\w.-]+:)?([\w.-]+)")

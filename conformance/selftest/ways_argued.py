@@ -15,6 +15,8 @@ from conformance.contract.toml_file import Text, TomlFileError, read_toml
 
 #: Beside a pack's ``ways.json``.
 FILE: Final = "ways.toml"
+#: Properties of a request that are ways in of their own; every requirement speaks of them.
+TRAITS: Final = ("a negative number", "a request that was sent before")
 #: What a cell shows by which a requirement says nothing.
 SILENT: Final = "·"
 
@@ -54,7 +56,7 @@ class Arguments(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if argument is not None:
             return argument
         ways = next((ways for id_, ways in self.about.items() if fnmatchcase(requirement, id_)), None)
-        return "" if ways is None or _matches(way, ways) else SILENT
+        return "" if ways is None or way in TRAITS or _matches(way, ways) else SILENT
 
     def unused(self, cells: list[tuple[str, str]]) -> Iterator[str]:
         """Yield a sentence for each part of the file that fits none of the given cells: requirement and way."""

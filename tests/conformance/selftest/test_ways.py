@@ -12,7 +12,7 @@ from conformance.selftest.ways_argued import SILENT, Argument, Arguments, WaysFi
 CONTRACT = Contract.load()
 _PUT, _TYPE = "rest-resources/velocity-put", "rest-resources/velocity-type"
 _WAYS = {_PUT: {"putVelocity": 3, ways.TRAITS[1]: 2}, _TYPE: {"getVelocity": 5, ways.TRAITS[1]: 4}}
-_ABOUT = '[about]\n"rest-resources/velocity-*" = ["*Velocity", "a *"]\n'
+_ABOUT = '[about]\n"rest-resources/velocity-*" = ["*Velocity"]\n'
 _SIGN = '[[argued]]\nwhy = "It has no sign."\nrequirements = ["rest-resources/*"]\nways = ["a negative number"]\n'
 _OTHER = '[[argued]]\nwhy = "The other one."\nrequirements = ["*-put", "*-type"]\nways = ["*Velocity"]\n'
 
@@ -47,7 +47,7 @@ def test_a_cell_without_reason_is_told(pack):
 
 
 def test_what_a_requirement_does_not_speak_of_needs_no_reason(pack):
-    about = '[about]\n"*-put" = ["put*", "a *"]\n"*-type" = ["get*", "a *"]\n'
+    about = '[about]\n"*-put" = ["put*"]\n"*-type" = ["get*"]\n'
     contract = pack(about + _SIGN)
     assert list(ways.unargued(contract)) == []
     lines = ways.tables(contract)
@@ -57,7 +57,7 @@ def test_what_a_requirement_does_not_speak_of_needs_no_reason(pack):
 
 def test_a_reason_for_nothing_is_told(pack):
     spare = '[[argued]]\nwhy = "Spare."\nrequirements = ["*"]\nways = ["SOAP *"]\n'
-    about = '[about]\n"rest-resources/velocity-*" = ["*Velocity", "a *"]\n"http/*" = ["a *"]\n'
+    about = '[about]\n"rest-resources/velocity-*" = ["*Velocity"]\n"http/*" = ["get*"]\n'
     assert list(ways.unargued(pack(about + _SIGN + _OTHER + spare))) == [
         "ways.toml: about 'http/*' fits no requirement",
         "ways.toml: no cell has to do with the argument 'Spare.'",
