@@ -91,7 +91,8 @@ class GoalLife:
         drive: commands and readings of that velocity, where the robot accepted it.
         linear: the response to a PUT of a linear velocity after it; None: none was sent.
         second: the PUT of another goal without an id.
-        now_s: the stamp of the robot's odometry just after that, s; None: it could not be read.
+        now_s: the stamp of the robot's odometry after that, s; None: it could not be read.
+        took_s: the time from the PUT to that reading, s.
         renamed: whether the robot accepted the second goal only with an id; None: it accepted it without one.
         cancelled: DELETEs of the active goal; empty: the goal had ended before.
         cancels: all DELETEs that were sent while a goal was active, also where the goal had ended when they arrived.
@@ -108,6 +109,7 @@ class GoalLife:
     linear: Exchange | None = None
     second: Put | None = None
     now_s: float | None = None
+    took_s: float = 0.0
     renamed: bool | None = None
     cancelled: tuple[Cancelled, ...] = ()
     cancels: tuple[Exchange, ...] = ()

@@ -150,15 +150,17 @@ class _Player:
 
     def _displace(self, body: dict[str, Any], pose: Pose) -> None:
         """PUT another goal, without an id, while one is active."""
+        began = self.robot.clock.now()
         second = put_new(self.robot, body, pose)
         odometry = self.robot.odometry()
+        took_s = self.robot.clock.now() - began
         renamed = None
         if second.exchange.response.status not in NEW | REPEATED:
             # Is it the missing id that is refused, or another goal?
             named = put_goal(self.robot, body | {"goal_id": {"id": "another"}})
             renamed = named.response.status in NEW | REPEATED
         now_s = None if odometry is None else odometry.stamp
-        self.life = replace(self.life, second=second, renamed=renamed, now_s=now_s)
+        self.life = replace(self.life, second=second, renamed=renamed, now_s=now_s, took_s=took_s)
 
     def _cancel(self, pose: Pose) -> bool:
         """Cancel the active goal; return whether there was one, as it may have ended at its ``pose``.

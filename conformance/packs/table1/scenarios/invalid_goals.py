@@ -85,18 +85,21 @@ def _send_during(robot: Robot, bodies: list[_Body], pose: Pose, sent: list[Inval
         sent.append(InvalidGoal(what, during=True, exchange=exchange, differs=differs))
         if differs:
             break
-    _refused_cancel(robot, active, sent)
+    _refused_cancel(robot, active, pose, sent)
     robot.delete_goal()
     await_none(robot)
 
 
-def _refused_cancel(robot: Robot, active: dict[str, Any], sent: list[InvalidGoal]) -> None:
+def _refused_cancel(robot: Robot, active: dict[str, Any], pose: Pose, sent: list[InvalidGoal]) -> None:
     """Cancel the goal with an Accept header that excludes all formats: a robot that refuses that keeps the goal."""
     if robot.goal()[0] is None:
         return
-    exchange = robot.delete_goal(("Accept", "image/png"))
+    cancel = partial(robot.delete_goal, ("Accept", "image/png"))
+    exchange = cancel()
     if exchange.response.status == HTTPStatus.NOT_ACCEPTABLE:
         goal, _ = robot.goal()
+        if goal is None and (arrived(robot, pose) or not _ends(robot, active, cancel)):
+            return  # as for an invalid goal
         differs = "none" if goal is None else difference(goal, active)
         sent.append(InvalidGoal("Accept: image/png", during=True, exchange=exchange, differs=differs))
 

@@ -73,11 +73,21 @@ def test_a_goal_is_put_back_without_effect(status, differs, holds):
     assert _holds(life.goal_put_back, GoalLife(put_back=(put,))) == [holds]
 
 
-@pytest.mark.parametrize(("at_s", "holds"), [(98.0, [True, True]), (0.0, [True, False]), (None, [True])])
-def test_the_robot_fills_in_its_present_time(at_s, holds):
+@pytest.mark.parametrize(
+    ("at_s", "took_s", "holds"),
+    [
+        (98.0, 0.1, [True, True]),
+        (0.0, 0.1, [True, False]),
+        (92.0, 1.0, [True, False]),
+        (92.0, 9.0, [True, True]),
+        (106.0, 9.0, [True, False]),
+        (None, 0.1, [True]),
+    ],
+)
+def test_the_robot_fills_in_its_present_time(at_s, took_s, holds):
     shown = goal("of its own", at_s=99.0, shown_s=at_s)
     trace = GoalLife(second=Put(exchange(201), {}, shown, exchange(), "", ended=False))
-    trace = replace(trace, now_s=None if at_s is None else 100.0)
+    trace = replace(trace, now_s=None if at_s is None else 100.0, took_s=took_s)
     assert [one.holds for one in life.goal_fills_in.outcomes(trace, _RUN.__getitem__)] == holds
 
 

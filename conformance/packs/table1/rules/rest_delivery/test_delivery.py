@@ -88,12 +88,7 @@ def test_a_body_is_ignored(api: RestInterface, rest: HttpClient, judge: Judge, e
         )
 
 
-@pytest.mark.requirement(
-    "rest-delivery/refuses-text",
-    "rest-delivery/refuses-non-finite",
-    "rest-delivery/refuses-code",
-    "rest-formats/problem-xml",
-)
+@pytest.mark.requirement("rest-delivery/refuses-text", "rest-delivery/refuses-non-finite", "rest-delivery/refuses-code")
 def test_what_is_no_delivery(rest: HttpClient, judge: Judge, explore: Explorer, effort: Effort) -> None:
     """PUT invalid deliveries: text or nothing for a number, numbers beyond a double's range, other codes."""
 

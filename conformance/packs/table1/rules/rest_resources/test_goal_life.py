@@ -146,7 +146,8 @@ def goal_fills_in(trace: GoalLife, run: Run) -> Iterator[Outcome]:
         if second.shown is not None and trace.now_s is not None:
             stamp = second.shown["header"]["stamp"]
             ahead_s = stamp["sec"] + stamp["nanosec"] * 1e-9 - trace.now_s
-            holds = abs(ahead_s) <= _NOW_S * max(1.0, said_of(run).limits.time_scale)
+            scale = max(1.0, said_of(run).limits.time_scale)
+            holds = -(_NOW_S + trace.took_s) * scale <= ahead_s <= _NOW_S * scale
             expected = "the robot's present time as header.stamp of a goal that was sent without a header"
             yield Case(holds, second.read, expected, f"a stamp {ahead_s:.1f} s ahead of the odometry's")
 
