@@ -18,7 +18,7 @@ import click
 _COMMANDS = {
     "robot": ("reference_robot.cli", "Run the reference robot."),
     "certify": ("conformance.cli.certify", "Judge a robot by its contract."),
-    "load": ("loadtests.cli", "Measure SOAP against REST."),
+    "load": ("loadtests.cli", "Measure how fast a robot responds."),
     "replay": ("conformance.cli.replay", "Send a finding's requests again, and report whether it persists."),
     "report": ("reports.cli.pages", "Write the pages from the result files again."),
     "compare": ("reports.cli.pages", "Show whether a robot got slower between two load tests."),

@@ -14,18 +14,23 @@ from typing import Any, Self
 
 import click
 
+from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.contract.toml_file import TomlFileError
 from conformance.packs.table1.statement import Statement, load_robot_statement
 from conformance.packs.table1.thresholds import load_thresholds
 from conformance.statement.endpoints import Endpoints
+from loadtests.clients.failures import CallError
+from loadtests.described.device import Named
+from loadtests.described.run import DESCRIBED_ONLY, Described
 from loadtests.measuring.command_line import without_folders
 from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest, store
-from loadtests.schedule.plan import CLIENTS, INTERFACES, OPERATIONS
+from loadtests.schedule.plan import CLIENTS, INTERFACES
 from loadtests.settings.cli_options import KNEE_SEARCHES, CliOptions
+from loadtests.settings.errors import SettingsError
 from loadtests.settings.settings import STEP_S, Settings
-from loadtests.settings.settle import DEFAULT_DURATION_S, DEFAULT_RATE, DEFAULT_WARMUP_S, SettingsError, settle
+from loadtests.settings.settle import DEFAULT_DURATION_S, DEFAULT_RATE, DEFAULT_WARMUP_S, settle
 
 DEFAULT_OUT = "out"  # as `roaas certify` does
 #: Threads of NumPy's linear algebra wait for one another by spinning, ten times as long on a busy machine.
@@ -104,15 +109,20 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
 
 
 @click.command(cls=ResultCommand)
-@click.argument("statement", required=False, type=_FILE)
+@click.argument("targets", nargs=-1, metavar="[STATEMENT] [DESCRIPTION]")
 @click.option("--rest", metavar="URL", help="Base URL of the REST interface.")
+@description_options
 @click.option("--publishers-wsdl", metavar="URL|FILE", help="WSDL of the publishers service, which takes deliveries.")
 @click.option("--subscribers-wsdl", metavar="URL|FILE", help="WSDL of the subscribers service, which returns the pose.")
 @click.option("--publishers-endpoint", metavar="URL", help="Address of that service, when its WSDL does not say.")
 @click.option("--subscribers-endpoint", metavar="URL", help="Address of that service, when its WSDL does not say.")
 @click.option("--rosbridge", metavar="URL", help="Measure this rosbridge to the robot as well.")
 @click.option(
-    "--operation", "operations", multiple=True, type=click.Choice(OPERATIONS), help="Call this operation; repeatable."
+    "--operation",
+    "operations",
+    multiple=True,
+    metavar="NAME[=WEIGHT]",
+    help="Call this operation: 'GET /state' of a description, or delivery, coffee or pose; repeatable.",
 )
 @click.option("--interface", "interfaces", multiple=True, type=click.Choice(INTERFACES), help="Only this interface.")
 @click.option("--client", "clients", multiple=True, type=click.Choice(CLIENTS), help="Only this client.")
@@ -160,6 +170,7 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
 @click.option("--thresholds", type=_FILE, help="TOML file of [[threshold]] tables.")
 @click.option("--token-file", metavar="FILE", help="File with the robot's bearer token.")
 @click.option("--ca-file", metavar="FILE", help="Certificate authorities to trust.")
+@credential_options
 @click.option("--against", metavar="URL|STATEMENT", help="Compare with another robot or version; the two take turns.")
 @click.option("--against-publishers-wsdl", metavar="URL|FILE", help="WSDL of the other robot's publishers service.")
 @click.option("--against-subscribers-wsdl", metavar="URL|FILE", help="WSDL of its subscribers service.")
@@ -171,28 +182,63 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
 @click.option("--baseline", metavar="NAME", help="Compare with the latest result stored under this name.")
 @click.option("--baselines", type=_FILE, metavar="DIR", default=FOLDER, help="Folder of baselines.")
 @click.option("--out", metavar="DIR", default=DEFAULT_OUT, help="Folder for the results.")
-def load(statement: Path | None, **options: Any) -> CommandResult:
+def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     """Measure how fast a robot responds, and compare SOAP with REST.
+
+    DESCRIPTION is the URL or file of an OpenAPI or Swagger description: the operations that --operation names are
+    measured. Only those that read are called, unless --call allows more.
 
     With --against, two robots take turns, and the result says whether this one is slower than the other.
 
-    Exit codes: 0 thresholds met and not slower; 1 threshold missed or slower; 2 usage error; 3 robot not reachable;
-    4 measurement not valid or inconclusive; 130 interrupted.
+    Exit codes: 0 thresholds and service levels kept, and not slower; 1 one of them missed, or slower; 2 usage error; 3
+    robot not reachable; 4 measurement not valid or inconclusive; 130 interrupted.
     """
+    device = None
     try:
-        said = load_robot_statement(statement) if statement is not None else Statement()
+        named = Named.of(targets, options)
         kept = _Baselines.of(options.pop("baselines"), options.pop("save"), options.pop("baseline"))
-        file = options.pop("thresholds")
-        limits = load_thresholds(file) if file else ()
-        other, tolerance = _other_robot(options, said), options["tolerance"]
-        settings = settle(CliOptions.of(**options, against=other, thresholds=limits, command=_command_line()), said)
+        tolerance = options["tolerance"]
+        if named.source is None:
+            settings = _papers_robot(named.statement, options)
+        else:
+            device = Described.of(named, options)
+            settings = device.settings(_command_line())
         _make_folder(Path(settings.output.folder))
+        with TemporaryDirectory(prefix="roaas-load-") as folder:
+            result = _run_load(settings, Path(folder, "written"))
     except (TomlFileError, SettingsError, BaselineError) as error:
         click.echo(f"roaas load: {error}", err=True)
         return CommandResult(ExitCode.USAGE)
-    with TemporaryDirectory(prefix="roaas-load-") as folder:
-        result = _run_load(settings, Path(folder, "written"))
+    except CallError as error:
+        click.echo(f"roaas load: the robot cannot be reached: {error}", err=True)
+        return CommandResult(ExitCode.UNREACHABLE)
+    except KeyboardInterrupt:
+        return CommandResult(ExitCode.INTERRUPTED)
+    finally:
+        if device is not None:
+            device.stop()
     return kept.after(result, tolerance, click.get_current_context().obj)
+
+
+def _papers_robot(statement: Path | None, options: dict[str, Any]) -> Settings:
+    """Return the settings of a run on the paper's robot.
+
+    Raises:
+        TomlFileError: a file cannot be used.
+        SettingsError: the options do not make a run.
+    """
+    given = [name for name in DESCRIBED_ONLY if options.pop(name)]
+    if given:
+        option = given[0].removesuffix("s" if given[0] == "overlays" else "").replace("_", "-")
+        raise SettingsError(
+            f"--{'call' if option == 'allow' else option} is for a device with a description: name that as well, as in "
+            "roaas load http://robot:8000/openapi.json"
+        )
+    said = load_robot_statement(statement) if statement is not None else Statement()
+    file = options.pop("thresholds")
+    limits = load_thresholds(file) if file else ()
+    other = _other_robot(options, said)
+    return settle(CliOptions.of(**options, against=other, thresholds=limits, command=_command_line()), said)
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,9 @@ from loadtests.clients.payloads import CATALOGUE, VARIANTS
 from loadtests.clients.wire import now_ns
 from loadtests.clients.wsdl import WsdlError, with_addresses
 from loadtests.settings.cli_options import CliOptions
+from loadtests.settings.errors import SettingsError
 from loadtests.settings.settings import Settings
-from loadtests.settings.settle import SettingsError, settle
+from loadtests.settings.settle import settle
 
 OPERATIONS = tuple(CATALOGUE)
 _TEXTS = ("rest", "publishers-wsdl", "subscribers-wsdl", "publishers-endpoint", "subscribers-endpoint")

@@ -11,6 +11,8 @@ import time
 from pathlib import Path
 
 from loadtests.cli import DEFAULT_OUT, load
+from loadtests.described.device import CREDENTIALS, secrets_of
+from loadtests.settings.errors import SettingsError
 
 PORT = 5557
 LINGER_S = 600.0
@@ -36,12 +38,14 @@ def _work(words: list[str]) -> None:
     host = _value(words, "--master-host")
     if host is None:
         sys.exit("--worker needs --master-host")
-    token_file = _value(words, "--token-file")
-    token = Path(token_file).read_text("utf-8").strip() if token_file else None
+    try:
+        secrets = secrets_of({name: _value(words, f"--{name.replace('_', '-')}") for name in CREDENTIALS})
+    except SettingsError as error:
+        sys.exit(f"roaas-load-node: {error}")
     from loadtests.measuring.worker import serve  # noqa: PLC0415 -- imports Locust, which patches the process
 
-    tokens = [token, token]  # one for both robots of --against
-    serve(host, int(_value(words, "--master-port") or PORT), tokens, Path(_value(words, "--out") or DEFAULT_OUT))
+    both = [secrets, secrets]  # the same for both robots of --against
+    serve(host, int(_value(words, "--master-port") or PORT), both, Path(_value(words, "--out") or DEFAULT_OUT))
 
 
 def _value(words: list[str], option: str) -> str | None:

@@ -14,6 +14,7 @@ from reports.certificate.seal import Seal
 from reports.errors import ReportError, ResultMissingError
 from reports.fleet.page import fleet_html, fleet_markdown
 from reports.formats.catalogue import FORMATS
+from reports.latency.junit import latency_junit
 from reports.pages.page import write_pages
 from reports.reading import FLEET_NAME, LATENCY_NAME, RESULT_NAME, read_fleet, read_latency, read_result
 
@@ -22,8 +23,9 @@ def render(directory: Path, notary: Notary | None = None) -> list[Path]:
     """Write the pages for each result file in a directory, and return their paths.
 
     `result.json` becomes certificate.html, certificate.md and junit.xml; if it is signed, certificate-print.html as
-    well, and with a notary the signed certificate.intoto.json. `latency.json` becomes latency.html and latency.md,
-    `fleet.json` fleet.html and fleet.md. If one result is broken, the pages of the others are written first.
+    well, and with a notary the signed certificate.intoto.json. `latency.json` becomes latency.html, latency.md and
+    latency-junit.xml, `fleet.json` fleet.html and fleet.md. If one result is broken, the pages of the others come
+    first.
 
     Raises:
         ResultMissingError: the directory does not exist, or holds no result file.
@@ -104,4 +106,8 @@ def _latency(path: Path) -> dict[str, str]:
     from reports.latency.page import latency_html, latency_markdown  # noqa: PLC0415 - see above
 
     document = read_latency(path)
-    return {"latency.html": latency_html(document, str(path)), "latency.md": latency_markdown(document, str(path))}
+    return {
+        "latency.html": latency_html(document, str(path)),
+        "latency.md": latency_markdown(document, str(path)),
+        "latency-junit.xml": latency_junit(document),
+    }

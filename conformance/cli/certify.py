@@ -16,6 +16,7 @@ from conformance.api.call_rules import CallRules, told
 from conformance.cli.certify_init import init, init_described
 from conformance.cli.certify_target import told_apart, what_is_judged
 from conformance.cli.summary import print_summary
+from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, FrontDoor, ResultCommand
 from conformance.contract.locating import ContractError
@@ -43,22 +44,7 @@ _OBJECTS = 20_000
 @click.argument("targets", nargs=-1, metavar="[STATEMENT] [DESCRIPTION]")
 @click.option("--init", is_flag=True, help="Write a commented STATEMENT from the device's descriptions; test nothing.")
 @click.option("--rest", metavar="URL", help="Base URL of the REST interface.")
-@click.option(
-    "--openapi", metavar="URL|FILE", help="The device's own OpenAPI or Swagger description: judge it by that."
-)
-@click.option("--wsdl", metavar="URL|FILE", help="The device's own WSDL: judge it by that.")
-@click.option(
-    "--overlay", "overlays", multiple=True, metavar="FILE", help="OpenAPI Overlay to apply to it; repeatable."
-)
-@click.option("--base-url", metavar="URL", help="Where the operations of the description are.")
-@click.option(
-    "--call",
-    "allow",
-    multiple=True,
-    metavar="PATTERN",
-    help="Also call operations that may change something: 'POST /api/move/*', an operationId or a tag; repeatable.",
-)
-@click.option("--never", multiple=True, metavar="PATTERN", help="Never call these operations; repeatable.")
+@description_options
 @click.option("--publishers-wsdl", metavar="URL", help="WSDL of the publishers service, URL or file.")
 @click.option("--subscribers-wsdl", metavar="URL", help="WSDL of the subscribers service, URL or file.")
 @click.option("--publishers-endpoint", metavar="URL", help="Address of that service, if its WSDL has another.")
@@ -101,18 +87,10 @@ _OBJECTS = 20_000
     "--baseline", type=click.Path(path_type=Path), help="Accepted failures, each with reason and expiry date (TOML)."
 )
 @click.option("--token-file", type=_FILE, help="File with the bearer token to send.")
-@click.option("--basic-file", type=_FILE, help="File with user:password for basic authentication.")
-@click.option("--digest-file", type=_FILE, help="File with user:password for digest authentication (RFC 7616).")
 @click.option(
     "--username-token-file", type=_FILE, help="File with user:password for WS-Security's UsernameToken (SOAP)."
 )
-@click.option(
-    "--api-key", metavar="'PLACE NAME'", help="Where the API key goes: header, query or cookie, and its name."
-)
-@click.option("--api-key-file", type=_FILE, help="File with the API key.")
-@click.option("--headers-file", type=_FILE, help="File with headers to send, 'Name: value' in each line.")
-@click.option("--client-cert-file", type=_FILE, help="Client certificate (PEM) for HTTPS.")
-@click.option("--client-key-file", type=_FILE, help="Its key, if it is not in the same file.")
+@credential_options
 @click.option(
     "--out", type=click.Path(file_okay=False, path_type=Path), default=Path("out"), help="Folder for the results."
 )

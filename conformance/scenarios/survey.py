@@ -126,7 +126,7 @@ class Survey:
 
 
 @dataclass
-class _Surveyor:
+class Surveyor:
     """Sends the requests of a survey and records them."""
 
     api: RestInterface
@@ -275,7 +275,7 @@ def survey(api: RestInterface, values: Values) -> Survey:
     operations = [item for item in operations_of(run.contract) if allowed(api, item)]
     if not operations:
         raise NotPossibleError("no operation of the description may be called")
-    surveyor = _Surveyor(api, values)
+    surveyor = Surveyor(api, values)
     api.values = values
     for operation in sorted(operations, key=order_of):
         surveyor.begin(operation)
@@ -289,7 +289,7 @@ def survey(api: RestInterface, values: Values) -> Survey:
     return _repeated(surveyor, operations)
 
 
-def _repeated(surveyor: _Surveyor, operations: list[Operation]) -> Survey:
+def _repeated(surveyor: Surveyor, operations: list[Operation]) -> Survey:
     """Send the quickest usual request many times, and return the finished survey."""
     quickest = [
         (probe.exchange.response.elapsed_ms, probe.operation)
@@ -321,7 +321,7 @@ def generated_requests(api: RestInterface, values: Values, explore: Explorer) ->
     operations = {
         item.label: item for item in operations_of(run.contract) if allowed(api, item) and item.label not in api.streams
     }
-    surveyor = _Surveyor(api, values)
+    surveyor = Surveyor(api, values)
 
     for target in targets(run.contract):
         operation = operations.get(target.label)
@@ -345,7 +345,7 @@ def generated_requests(api: RestInterface, values: Values, explore: Explorer) ->
     return Survey(tuple(surveyor.probes))
 
 
-def _send_case(surveyor: _Surveyor, operation: Operation, case: Any) -> None:
+def _send_case(surveyor: Surveyor, operation: Operation, case: Any) -> None:
     """Send a case of Schemathesis, and record it with what Schemathesis's checks say of the response."""
     from conformance.api.rest.generated import as_request, own_headers  # noqa: PLC0415 - see generated_requests()
     from conformance.api.rest.opinions import opinions  # noqa: PLC0415 - as above

@@ -7,25 +7,14 @@ import msgspec
 
 from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
-from conformance.contract.toml_file import Positive, Text, TomlFileError, fit, read_toml
+from conformance.contract.toml_file import Text, TomlFileError, fit, read_toml
 from conformance.statement.endpoints import Auth, Endpoints, beside
+from conformance.statement.load import Load, ServiceLevel
 from conformance.statement.motion_map import MotionMap
 
 
 class StatementError(TomlFileError):
     """Raised for an invalid statement; the message names the file, the key and the offending value."""
-
-
-class Load(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a load test may do to the device.
-
-    Attributes:
-        max_rate: maximum requests per second.
-        max_duration_s: maximum duration of a measurement, s.
-    """
-
-    max_rate: Positive | None = None
-    max_duration_s: Positive | None = None
 
 
 class Calls(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -65,6 +54,7 @@ class Statement(msgspec.Struct, frozen=True):
         values: values to use in requests, by the name of a parameter or member.
         calls: what may be called.
         motion_map: how a device moves of which only its description is known, or None.
+        slo: service levels by operation, which a load test judges.
     """
 
     robot: dict[str, str] = {}
@@ -74,6 +64,7 @@ class Statement(msgspec.Struct, frozen=True):
     values: dict[str, tuple[Any, ...]] = {}
     calls: Calls = Calls()
     motion_map: MotionMap | None = None
+    slo: dict[str, ServiceLevel] = {}
 
     @property
     def figures(self) -> dict[str, dict[str, float]]:
@@ -162,6 +153,7 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     api: Api = Api()
     auth: Auth | None = None
     motion: Any = None
+    slo: dict[str, ServiceLevel] = {}
 
     def read(self, contract: Contract, path: Path) -> Statement:
         """Return the statement.
@@ -188,6 +180,7 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             "load": self.load,
             "values": self.values,
             "calls": self.calls,
+            "slo": self.slo,
         }
 
 

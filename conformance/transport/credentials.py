@@ -22,7 +22,7 @@ _VARIABLE: Final = re.compile(r"\$ROAAS_[A-Z0-9_]+")
 # The head of a request, and in it what answers a challenge (RFC 7616 3.4).
 _REQUEST_LINE: Final = re.compile(rb"(\S+) (\S+) HTTP/")
 _ANSWER: Final = re.compile(r"(Authorization: Digest )[^\r\n]*")
-_SHOWN_ANSWER: Final = re.compile(rb"Authorization: Digest \$ROAAS_DIGEST")
+_SHOWN_ANSWER: Final = re.compile(rb"Authorization: Digest \$ROAAS_DIGEST\r\n")
 _WRONG: Final = "roaas-not-this-one"
 
 
@@ -165,10 +165,12 @@ class Credentials:
 
     def revealed(self, octets: bytes) -> bytes:
         """Return bytes with the secrets in place of variables, to send a recorded request again."""
-        for item in self.items:
+        # The longest first: one variable may be the beginning of another.
+        for item in sorted(self.items, key=lambda item: -len(item.variable)):
             if item.kind is Kind.DIGEST and (line := _REQUEST_LINE.match(octets)):
                 answer = item.digest.answer(line[1].decode("latin-1"), line[2].decode("latin-1"))
-                octets = _SHOWN_ANSWER.sub(b"Authorization: " + answer.encode("latin-1"), octets)
+                field = f"Authorization: {answer}\r\n".encode("latin-1") if answer else b""
+                octets = _SHOWN_ANSWER.sub(lambda _, field=field: field, octets)  # type: ignore[misc] # a default
             octets = octets.replace(item.variable.encode(), item.sent.encode("latin-1"))
         return octets
 

@@ -8,7 +8,7 @@ import gevent
 from conformance.packs.table1.thresholds import ApiStyle
 from loadtests.clients.failures import CallError
 from loadtests.clients.library import LibraryRest, LibrarySoap, Sent
-from loadtests.clients.payloads import Values, variants
+from loadtests.clients.payloads import Values
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import Bridge
 from loadtests.clients.wire import Connection, Request, now_ns
@@ -45,7 +45,7 @@ class Workload:
         self.robot = robot
         self.operations = operations
         self.documents = documents
-        self.values: list[list[Values]] = [variants(name, seed) for name in operations]
+        self.values: list[list[Values]] = [robot.values(name, seed) for name in operations]
         self.requests: dict[str, list[list[Request]]] = {
             str(interface): [robot.requests(interface, name, seed) for name in operations] for interface in ApiStyle
         }

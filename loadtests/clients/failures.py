@@ -3,6 +3,8 @@
 import re
 import socket
 import ssl
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from http import HTTPStatus
 
 
@@ -70,6 +72,43 @@ def _error(status: int, location: str | None, body: bytes, expects: bytes) -> Ca
         return CallError("fault", f"status {status}, SOAP fault: {reason}")
     hint = " (does it need a --token-file?)" if status in {401, 403} else ""
     return CallError("status", f"status {status}{hint}: {shown(body)}")
+
+
+@dataclass(frozen=True)
+class Declared:
+    """The good responses of an operation by its description. An error status is never one, declared or not.
+
+    Attributes:
+        responses: status and media types of each; without media types, any will do.
+    """
+
+    responses: tuple[tuple[int, tuple[str, ...]], ...]
+    _seen: set[tuple[int, bytes | None]] = field(default_factory=set, compare=False, repr=False)
+
+    def require(self, status: int, location: str | None, content_type: bytes | None, body: bytes) -> None:
+        """Raise an error unless a response is declared.
+
+        Raises:
+            CallError: the status is not declared as a success, or its body has another media type.
+        """
+        if (status, content_type) in self._seen and (body or content_type is None):
+            return  # what was good once need not be read again: this is done for every request
+        media_types = next((types for one, types in self.responses if one == status), None)
+        if media_types is None:
+            raise self._undeclared(status, location, body)
+        name = (content_type or b"").decode("latin-1").partition(";")[0].strip().lower()
+        if body and media_types and not any(fnmatchcase(name, one) for one in media_types):
+            raise CallError(
+                "content", f"status {status} with {name or 'no media type'}, declared is {' or '.join(media_types)}"
+            )
+        if body:
+            self._seen.add((status, content_type))
+
+    def _undeclared(self, status: int, location: str | None, body: bytes) -> CallError:
+        if not _OK <= status < _MULTIPLE_CHOICES:
+            return _error(status, location, body, b"")
+        named = ", ".join(str(one) for one, _ in self.responses)
+        return CallError("status", f"status {status}, declared is {named}: {shown(body)}")
 
 
 def shown(body: bytes) -> str:

@@ -1,15 +1,30 @@
 """The robot under load: addresses, credentials, deadline."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from conformance.packs.table1.statement import Ros
+from conformance.transport.credentials import Credential, Credentials, Kind
+from loadtests.clients.described import VARIABLE, Described
 from loadtests.clients.endpoint import Endpoint, tls_context
-from loadtests.clients.payloads import BUILDERS, CATALOGUE, variants
+from loadtests.clients.payloads import BUILDERS, CATALOGUE, VARIANTS, Values, variants
 from loadtests.clients.rosbridge import Bridge, bridge_requests
 from loadtests.clients.wire import Connection, Request
+
+
+@dataclass(frozen=True)
+class Secrets:
+    """What a robot's requests prove who sends them with: the bearer token, and other credentials."""
+
+    token: str | None = None
+    credentials: tuple[Credential, ...] = ()
+
+    @classmethod
+    def of(cls, robot: "Robot") -> Self:
+        """Return the secrets of a robot."""
+        return cls(robot.token, robot.credentials)
 
 
 @dataclass(frozen=True)
@@ -22,6 +37,9 @@ class Robot:
         token: bearer token.
         rosbridge: the address of a rosbridge to the robot's ROS graph (ws or wss).
         delivery_topic: where deliveries are published on that graph.
+        described: the operations to measure, of a device that is called by its own description.
+        credentials: what the requests of these operations carry.
+        certificate: client certificate and its key for TLS, as files.
     """
 
     rest: str | None
@@ -34,6 +52,9 @@ class Robot:
     timeout_s: float = 10.0
     rosbridge: str | None = None
     delivery_topic: str = Ros().delivery_topic
+    described: tuple[Described, ...] = ()
+    credentials: tuple[Credential, ...] = ()
+    certificate: tuple[str, str | None] | None = None
 
     @cached_property
     def tls(self) -> Any:
@@ -41,10 +62,37 @@ class Robot:
         addresses = (self.rest, self.publishers, self.subscribers, self.rosbridge)
         if not any(address and address.startswith(("https:", "wss:")) for address in addresses):
             return None
-        return tls_context(Path(self.ca_file) if self.ca_file else None)
+        context = tls_context(Path(self.ca_file) if self.ca_file else None)
+        if self.certificate is not None:
+            context.load_cert_chain(*self.certificate)
+        return context
+
+    @cached_property
+    def _secrets(self) -> Credentials:
+        return Credentials(self.credentials)
+
+    @property
+    def digest(self) -> Credentials | None:
+        """Return what answers the robot's challenges, or None without digest authentication."""
+        return self._secrets if any(item.kind is Kind.DIGEST for item in self.credentials) else None
+
+    def _described(self, operation: str) -> Described | None:
+        return next((each for each in self.described if each.name == operation), None)
+
+    def method(self, operation: str) -> str:
+        """Return an operation's HTTP method over REST."""
+        found = self._described(operation)
+        return found.method if found else CATALOGUE[operation].method
+
+    def values(self, operation: str, seed: int) -> list[Values]:
+        """Return the values of each variant, for the library clients; empty for a described operation."""
+        return [] if self._described(operation) else variants(operation, seed)
 
     def address(self, interface: str, operation: str) -> str | None:
         """Return the address of an operation over an interface; None if the interface lacks the operation."""
+        described = self._described(operation)
+        if described is not None:
+            return described.base_url if interface == "rest" else None
         if interface == "rest":
             return self.rest
         if interface == "rosbridge":
@@ -59,13 +107,14 @@ class Robot:
         """Return whether a client can call an operation over an interface; zeep needs the WSDL as well."""
         if self.address(interface, operation) is None:
             return False
-        if interface == "rosbridge":
+        if interface == "rosbridge" or self._described(operation):
             return client == "wire"
         return interface == "rest" or client == "wire" or self.wsdl(operation) is not None
 
     def http(self, interface: str, operation: str) -> Connection:
         """Return a new connection for an operation over REST or SOAP; it opens at the first call."""
-        return Connection(Endpoint.parse(self.address(interface, operation) or ""), self.timeout_s, self.tls)
+        endpoint = Endpoint.parse(self.address(interface, operation) or "")
+        return Connection(endpoint, self.timeout_s, self.tls, self.digest)
 
     def bridge(self) -> Bridge:
         """Return a new connection to the rosbridge; it opens at the first call."""
@@ -76,7 +125,23 @@ class Robot:
         address = self.address(interface, operation)
         if address is None:
             return []
+        described = self._described(operation)
+        if described is not None:
+            return described.requests(self._secrets, VARIANTS)
         if interface == "rosbridge":  # its own values: it must not take another interface's delivery for its echo
             return [*bridge_requests(variants(operation, seed + 1), self.delivery_topic)]
         endpoint = Endpoint.parse(address)
         return [BUILDERS[interface](endpoint, operation, values, self.token) for values in variants(operation, seed)]
+
+
+def with_secrets(robot: Robot, secrets: Secrets | None) -> Robot:
+    """Return a robot that came without its secrets with those of this machine.
+
+    Raises:
+        ValueError: its requests need a credential that this machine does not have.
+    """
+    found = replace(robot, token=secrets.token, credentials=secrets.credentials) if secrets else robot
+    revealed = Credentials(found.credentials).revealed
+    if any(VARIABLE in revealed(octets) for each in found.described for octets in each.octets):
+        raise ValueError("the requests need credentials that this worker lacks: start it with the master's options")
+    return found

@@ -19,13 +19,15 @@ import gevent.socket
 import httptools
 from gevent.hub import Waiter, get_hub
 
+from conformance.transport.credentials import Credentials
 from loadtests.clients.endpoint import Endpoint
-from loadtests.clients.failures import CallError, connect_error, require_good
+from loadtests.clients.failures import CallError, Declared, connect_error, require_good
 
 _READ = 1  # libev's EV_READ
 _CHUNK = 65_536
 _IDLE_NS = 500_000_000  # servers close idle connections after seconds: look before sending into one
 _FINAL = int(HTTPStatus.OK)  # RFC 9110 section 15.2: what is below is interim
+_CHALLENGE = int(HTTPStatus.UNAUTHORIZED)
 _MAX_ANSWER = 16 * 1024 * 1024  # an endless response must not fill the generator's memory
 
 now_ns = time.monotonic_ns  # CLOCK_MONOTONIC, the clock of timerfd
@@ -33,10 +35,10 @@ now_ns = time.monotonic_ns  # CLOCK_MONOTONIC, the clock of timerfd
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request as bytes, and the bytes that the body of a good response contains."""
+    """A request as bytes, and its good responses: the bytes that their bodies contain, or what is declared."""
 
     octets: bytes
-    expects: bytes = b""
+    expects: bytes | Declared = b""
 
 
 @dataclass(slots=True)
@@ -54,14 +56,18 @@ class Answer:
     received_ns: int
     octets: int
 
-    def require_good(self, expects: bytes) -> None:
-        """Accept a 2xx response whose body contains `expects`.
+    def require_good(self, expects: bytes | Declared) -> None:
+        """Accept a 2xx response whose body contains `expects`, or a response that is declared.
 
         Raises:
             CallError: any other response.
         """
-        location = self.headers.get(b"location")
-        require_good(self.status, location.decode("latin-1") if location else None, self.body, expects)
+        found = self.headers.get(b"location")
+        location = found.decode("latin-1") if found else None
+        if isinstance(expects, bytes):
+            require_good(self.status, location, self.body, expects)
+        else:
+            expects.require(self.status, location, self.headers.get(b"content-type"), self.body)
 
 
 class Connection:
@@ -71,12 +77,16 @@ class Connection:
         endpoint: the server.
         timeout_s: deadline of a whole request, including the connection.
         tls: the context for https endpoints.
+        digest: what answers the challenges of digest authentication; the connections of a process share it.
     """
 
-    def __init__(self, endpoint: Endpoint, timeout_s: float, tls: ssl.SSLContext | None = None) -> None:
+    def __init__(
+        self, endpoint: Endpoint, timeout_s: float, tls: ssl.SSLContext | None = None, digest: Credentials | None = None
+    ) -> None:
         self.endpoint = endpoint
         self.timeout_s = timeout_s
         self.tls = tls
+        self.digest = digest
         self.connects = 0
         self._socket: Any = None
         self._watcher: Any = None
@@ -97,11 +107,11 @@ class Connection:
         """Send a request and wait for the complete response.
 
         Raises:
-            CallError: of any kind; the request was sent at most once.
+            CallError: of any kind; the request was sent at most once, with digest authentication twice.
         """
         deadline = gevent.Timeout.start_new(self.timeout_s)
         try:
-            return self._call(request.octets)
+            return self._call(request.octets) if self.digest is None else self._answering(request.octets, self.digest)
         except gevent.Timeout as timer:
             connected = self._socket is not None
             self.close()
@@ -115,6 +125,14 @@ class Connection:
             raise
         finally:
             deadline.close()
+
+    def _answering(self, octets: bytes, digest: Credentials) -> Answer:
+        """Send a request with an answer to the robot's challenge, and again if it has a new challenge."""
+        answer = self._call(digest.revealed(octets))
+        challenge = answer.headers.get(b"www-authenticate", b"").decode("latin-1")
+        if answer.status == _CHALLENGE and digest.learn([("www-authenticate", challenge)]):
+            return self._call(digest.revealed(octets))
+        return answer
 
     def _call(self, octets: bytes) -> Answer:
         if self._socket is not None and now_ns() - self._received > _IDLE_NS and self._is_closed():
@@ -228,6 +246,8 @@ class Connection:
     def on_header(self, name: bytes, value: bytes) -> None:
         """Keep a header field; names are case-insensitive (RFC 9110 section 5.1)."""
         name = name.lower()
+        if name == b"www-authenticate" and name in self._headers:  # several challenges make one list
+            value = self._headers[name] + b", " + value
         self._headers[name] = value
         if name in {b"content-length", b"transfer-encoding"}:
             self._framed = True

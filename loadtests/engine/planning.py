@@ -62,6 +62,7 @@ def duel_plan(settings: Settings, *robots: Robot) -> tuple[Plan, list[str]]:
         connections=users(settings, workers),
         offers=offers,
         robots=len(robots),
+        weights=wanted.weights,
     )
     notes = sorted(missing)
     if ROSBRIDGE in interfaces:

@@ -60,6 +60,11 @@ class Run:
         self._told = 0.0
         self._parent = os.getppid()
 
+    @property
+    def _promise(self) -> str:
+        """Return what says how the robot responds."""
+        return "the contract" if self.settings.description is None else "its description"
+
     def interrupt(self) -> None:
         """End the run on Ctrl-C and keep what was measured; a second Ctrl-C ends the process at once."""
         if self.outcome.interrupted:
@@ -104,7 +109,7 @@ class Run:
             if findings.unreachable:
                 raise RunAborted(ExitCode.UNREACHABLE, f"{whose} cannot be reached: {told}")
             if findings.failures:
-                raise RunAborted(ExitCode.INCONCLUSIVE, f"{whose} does not respond as the contract says: {told}")
+                raise RunAborted(ExitCode.INCONCLUSIVE, f"{whose} does not respond as {self._promise} says: {told}")
             self.outcome.invalid += [
                 f"the interfaces' payloads are not equivalent: {reason}" for reason in findings.unequal
             ]

@@ -1,19 +1,19 @@
 """An executor of worker processes, on this machine or on others, led by a Locust master."""
 
-import json
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import gevent
+import msgspec
 from locust.exception import RPCError
 from locust.runners import STATE_MISSING, STATE_RUNNING, MasterRunner
 
 from loadtests.clients.library import LIBRARY
-from loadtests.clients.robot import Robot
+from loadtests.clients.robot import Robot, Secrets
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import Clocks, WorkerClock, clock_id
 from loadtests.measuring.errors import GeneratorError
@@ -98,8 +98,8 @@ class DistributedExecutor:
             )
             self._children[child.pid] = child
             if child.stdin is not None:
-                told = {"tokens": [robot.token for robot in robots], "folder": self._folder}
-                child.stdin.write(json.dumps(told).encode() + b"\n")
+                told = {"secrets": [Secrets.of(robot) for robot in robots], "folder": self._folder}
+                child.stdin.write(msgspec.json.encode(told) + b"\n")
                 child.stdin.close()
         if self._expected > self._processes:
             self.tell(
@@ -107,8 +107,8 @@ class DistributedExecutor:
             )
         self._wait(lambda: sum(map(self._is_there, self._listening)) >= self._expected, "workers connected")
         job = {
-            # A token does not travel: each worker has its own.
-            "robots": [asdict(replace(robot, token=None)) for robot in robots],
+            # Secrets do not travel: each worker has its own.
+            "robots": [msgspec.to_builtins(replace(robot, token=None, credentials=())) for robot in robots],
             "operations": list(plan.operations),
             "seed": plan.load.seed,
             "library": LIBRARY in plan.clients,

@@ -6,26 +6,32 @@ listeners expect them.
 """
 
 import time
+from collections.abc import Mapping
 from typing import Any
 
 from loadtests.clients.failures import CallError
-from loadtests.clients.payloads import CATALOGUE
 from loadtests.schedule.plan import SERIES
 from loadtests.statistics.histogram import Histogram, edges_us
 
 
 class LocustFeed:
-    """Adds our requests to the statistics of a Locust environment."""
+    """Adds our requests to the statistics of a Locust environment.
 
-    def __init__(self, environment: Any, operations: tuple[str, ...]) -> None:
+    Args:
+        environment: Locust's.
+        methods: the HTTP method over REST of each operation, in the plan's order.
+    """
+
+    def __init__(self, environment: Any, methods: Mapping[str, str]) -> None:
         self._environment = environment
-        self._operations = operations
+        self._methods = methods
+        self._operations = tuple(methods)
 
     def _entry(self, series: int, operation: int) -> tuple[str, str]:
         """Return the method and the name under which Locust shows a series."""
         _, interface, client = SERIES[series]
         name = self._operations[operation]
-        method = CATALOGUE[name].method if interface == "rest" else interface.upper()
+        method = self._methods[name] if interface == "rest" else interface.upper()
         return method, f"{name} {interface} {client}"
 
     def succeeded(self, series: int, operation: int, response: Histogram) -> None:

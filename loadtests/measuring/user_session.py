@@ -60,7 +60,7 @@ class Session:
         self._timeout_s = max(robot.timeout_s for robot in robots)
         self.series_of: dict[int, int] = {}
         self.segments: dict[int, Segment] = {}
-        self.feed = LocustFeed(environment, operations)
+        self.feed = LocustFeed(environment, {name: robots[0].method(name) for name in operations})
         self.recorder = Recorder(self.series_of, self.feed.succeeded)
         self.origin_ns = self.offset_ns = 0
         self.cpu_share: float | None = None

@@ -1,10 +1,9 @@
 """A worker process: `python -m loadtests.measuring.worker HOST PORT`, with a JSON object on its standard input.
 
-The object contains the robots' bearer tokens, which are not sent over the network, and the folder for the worker's
-records when its master dies: `{"tokens": […], "folder": "…"}`.
+The object contains the robots' credentials, which are not sent over the network, and the folder for the worker's
+records when its master dies: `{"secrets": […], "folder": "…"}`.
 """
 
-import json
 import logging
 import os
 import platform
@@ -18,10 +17,11 @@ from typing import Any, NoReturn
 
 import gevent
 import locust.runners
+import msgspec
 from gevent.event import Event
 
 from conformance.commandline.exit_codes import ExitCode
-from loadtests.clients.robot import Robot
+from loadtests.clients.robot import Robot, Secrets, with_secrets
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import answer_clock, clock_id
 from loadtests.measuring.executor import REPORT_S, new_environment
@@ -32,6 +32,13 @@ from loadtests.schedule.plan import Plan
 #: The master answers a heartbeat each second. If it is silent for this long, it is dead, or the network to it is.
 MASTER_SILENT_S = 20.0
 _LOOK_S = 0.5
+
+
+class _Told(msgspec.Struct, frozen=True):
+    """What a master on this machine writes to the standard input of its workers."""
+
+    secrets: tuple[Secrets, ...] = ()
+    folder: str = "."
 
 
 def _say(message: str) -> None:
@@ -48,10 +55,10 @@ def _leave(code: int, message: str) -> NoReturn:
 class Worker:
     """A Locust worker that carries out the plans of its master."""
 
-    def __init__(self, environment: Any, host: str, port: int, tokens: Sequence[str | None], folder: Path) -> None:
+    def __init__(self, environment: Any, host: str, port: int, secrets: Sequence[Secrets], folder: Path) -> None:
         locust.runners.WORKER_REPORT_INTERVAL = REPORT_S
         self.environment = environment
-        self.tokens = tokens
+        self.secrets = secrets
         self.session: Session | None = None
         self.master = f"{host}:{port}"
         self.left = LeftBehind(folder)
@@ -78,8 +85,8 @@ class Worker:
         error = ""
         try:
             robots = [
-                Robot(**robot | {"token": token})
-                for robot, token in zip_longest(job["robots"], self.tokens[: len(job["robots"])])
+                with_secrets(msgspec.convert(robot, Robot), secrets)
+                for robot, secrets in zip_longest(job["robots"], self.secrets[: len(job["robots"])])
             ]
             self.session = Session(environment, robots, tuple(job["operations"]), job["seed"], library=job["library"])
             self.session.after_segment = self._pack
@@ -161,19 +168,19 @@ class Worker:
             self._reported = time.monotonic()
 
 
-def serve(host: str, port: int, tokens: Sequence[str | None], folder: Path, parent: int | None = None) -> None:
+def serve(host: str, port: int, secrets: Sequence[Secrets], folder: Path, parent: int | None = None) -> None:
     """Run a worker until the master quits or is gone.
 
     Args:
         host: where the master listens.
         port: its port.
-        tokens: one for each robot.
+        secrets: those of each robot.
         folder: for what was recorded if the master dies.
         parent: the master's process id, if it started this process.
     """
     logging.getLogger("locust").setLevel(logging.ERROR)
     try:
-        worker = Worker(new_environment(), host, port, tokens, folder)
+        worker = Worker(new_environment(), host, port, secrets, folder)
     except ConnectionError:
         _leave(
             ExitCode.UNREACHABLE,
@@ -186,9 +193,9 @@ def serve(host: str, port: int, tokens: Sequence[str | None], folder: Path, pare
 def main() -> None:
     """Run a worker of a master on this machine."""
     parent = os.getppid()
-    told = json.loads(sys.stdin.readline() or "{}")
+    told = msgspec.json.decode(sys.stdin.readline() or "{}", type=_Told)
     gevent.signal_handler(signal.SIGINT, lambda: None)  # the master says when to stop
-    serve(sys.argv[1], int(sys.argv[2]), told.get("tokens", []), Path(told.get("folder", ".")), parent)
+    serve(sys.argv[1], int(sys.argv[2]), told.secrets, Path(told.folder), parent)
 
 
 if __name__ == "__main__":

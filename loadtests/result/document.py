@@ -21,7 +21,7 @@ from loadtests.result.processes import process_figures
 from loadtests.schedule.arrivals import arrivals_due
 from loadtests.schedule.plan import GAP_S, Plan, step_operation
 from loadtests.settings.settings import Settings
-from loadtests.statistics import end_to_end, figures, modes, over_time, steps, threshold, verdict
+from loadtests.statistics import end_to_end, figures, modes, over_time, service_levels, steps, threshold, verdict
 from loadtests.statistics.against import EXIT_CODES, Against, against
 from loadtests.statistics.between_runs import between_runs
 from loadtests.statistics.comparisons import AaControl, aa_controls, further_interfaces, soap_over_rest
@@ -55,26 +55,38 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     comparisons = soap_over_rest(measured, deviation)
     reasons, notes = ([str(aborted)], []) if aborted else verdict.invalid_because(generator, plan, pacing, spoilt)
     reasons = _endings(outcome, plan) + reasons + outcome.invalid
-    undecided = [] if aborted or reasons else verdict.failures(generator) + verdict.says_nothing(comparisons)
+    undecided = [] if aborted or reasons else _undecided(settings, generator) + verdict.says_nothing(comparisons)
     workers, losses = process_figures(executor.members if executor else [])
     judged = [] if aborted else threshold.judge(measured, settings.thresholds)
     controls = aa_controls(measured)
     compared = _against(outcome, measured, controls)
+    levels = [] if aborted else service_levels.levels(measured, settings.slo)
     outcomes = [entry["outcome"] for entry in judged]
-    code = _code(outcome, aborted, Reasons(reasons, undecided), outcomes, compared)
+    kept = [level.outcome for level in levels]
+    code = _code(outcome, aborted, Reasons(reasons, undecided), [*outcomes, *kept], compared)
     series = figures.series(measured, outcome.findings.sizes)
     for entry in series:
         entry.after_pause = _after_pause(outcome.paused.get(entry.name))
         entry.modes = modes.modes(measured.total("duel", entry.name).service)
     found = Found(
-        measured.plan, settings.limits.max_rate, series, comparisons, controls, compared, outcomes, reasons, undecided
+        measured.plan,
+        settings.limits.max_rate,
+        series,
+        comparisons,
+        controls,
+        compared,
+        outcomes,
+        reasons,
+        undecided,
+        kept,
     )
     document = {
         "format": FORMAT,
         "headline": headline(found),
         "valid": not reasons and not undecided,
+        "trustworthy": not reasons,
         "invalid_because": reasons + undecided,
-        "notes": outcome.notes + notes + spoilt + losses,
+        "notes": [*settings.notes, *outcome.notes, *notes, *spoilt, *losses],
         "interrupted": outcome.interrupted or outcome.dead_at is not None,
         "exit_code": code,
         "started": _stamp(outcome.started),
@@ -99,9 +111,17 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "over_connections": outcome.over_connections,
         "errors": over_time.errors(recorder, plan.operations) + _early_errors(outcome.findings),
         "thresholds": judged,
+        "slo": levels,
     }
     builtins: dict[str, Any] = msgspec.to_builtins(document)
     return code, builtins
+
+
+def _undecided(settings: Settings, generator: verdict.GeneratorFigures) -> list[str]:
+    """Return why failed requests leave nothing to compare, unless a service level judges those of each operation."""
+    levels = [settings.slo.get(name) for name in settings.selection.operations]
+    judged = all(level is not None and level.error_rate is not None for level in levels)
+    return [] if judged else verdict.failures(generator)
 
 
 def _generator(outcome: Outcome, measured: Measured) -> verdict.GeneratorFigures:
@@ -186,9 +206,10 @@ def _code(
     if reasons.worthless:
         return ExitCode.INCONCLUSIVE
     following = ExitCode.PASSED if compared is None else EXIT_CODES[compared.verdict]
-    if "missed" in outcomes or following == ExitCode.FAILED:
+    if {"missed", service_levels.BROKEN}.intersection(outcomes) or following == ExitCode.FAILED:
         return ExitCode.FAILED
-    return ExitCode.INCONCLUSIVE if reasons.undecided or "inconclusive" in outcomes else following
+    unknown = {"inconclusive", service_levels.NOT_KNOWN}.intersection(outcomes)
+    return ExitCode.INCONCLUSIVE if reasons.undecided or unknown else following
 
 
 def _early_errors(findings: Findings) -> list[dict[str, Any]]:
@@ -229,7 +250,9 @@ def _plan_words(settings: Settings, plan: Plan, pacing: str) -> dict[str, Any]:
         "zeep_rate": load.rate if plan.open_model and LIBRARY in plan.clients else None,
         "repeats": settings.repeats.number,
         "restart_command": without_folders(settings.repeats.restart_command or "") or None,
-        "methods": {name: CATALOGUE[name].element for name in plan.operations},
+        "methods": {name: CATALOGUE[name].element for name in plan.operations if name in CATALOGUE},
+        "weights": dict(zip(plan.operations, plan.weights, strict=True)) if plan.weights else {},
+        "description": settings.description and without_folders(settings.description),
         "processes": plan.workers,
         "connections": plan.connections,
         "pacing": pacing,

@@ -2,6 +2,8 @@
 
 import io
 import json
+import re
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ from hdrh.histogram import HdrHistogram
 from conformance.commandline.atomic_write import write_atomically
 
 FORMAT = "roaas-latency/1"
+_NO_NAME = re.compile(r"[^A-Za-z0-9.-]+")
 _TICKS = 5  # percentiles reported for each halving of the distance to 100 %
 _US_PER_MS = 1000.0
 
@@ -17,8 +20,12 @@ _US_PER_MS = 1000.0
 def write(folder: Path, result: dict[str, Any]) -> Path:
     """Write everything into a folder, which is made if need be; returns latency.json's path."""
     folder.mkdir(parents=True, exist_ok=True)
+    taken: Counter[str] = Counter()
     for series in result["series"]:
-        stem = f"{series['operation']}-{series['interface']}-{series['client']}"
+        name = _NO_NAME.sub("_", series["operation"]).strip("_")  # GET /axes/{id} is no name of a file
+        stem = f"{name}-{series['interface']}-{series['client']}"
+        taken[stem] += 1
+        stem += f"-{taken[stem]}" if taken[stem] > 1 else ""
         for time, key in (("service", "histogram"), ("response", "response_histogram")):
             write_atomically(folder / f"{stem}-{time}.hgrm", percentile_distribution(series[key]))
     return write_atomically(folder / "latency.json", json.dumps(result, indent=1, allow_nan=False) + "\n")

@@ -23,11 +23,14 @@ def _times(entry: dict[str, Any]) -> str:
 
 def summary(document: dict[str, Any]) -> str:
     """Return a table of the series, the comparisons of medians, the thresholds, and the headline as the last line."""
-    lines = ["operation  interface  client     count  errors  service p50      p90      p99  response p99   (ms)"]
+    wide = max([9, *(len(entry["operation"]) for entry in document["series"])])
+    lines = [
+        f"{'operation':{wide}}  interface  client     count  errors  service p50      p90      p99  response p99   (ms)"
+    ]
     for entry in document["series"]:
         service, response = entry["service_ms"], entry["response_ms"]
         lines.append(
-            f"{entry['operation']:10} {entry['interface']:10} {entry['client']:6} {entry['count']:9} "
+            f"{entry['operation']:{wide}}  {entry['interface']:10} {entry['client']:6} {entry['count']:9} "
             f"{entry['errors']:7}     {_ms(service['p50'])} {_ms(service['p90'])} {_ms(service['p99'])}      "
             f"{_ms(response['p99'])}"
         )
@@ -38,6 +41,11 @@ def summary(document: dict[str, Any]) -> str:
     for entry in document["thresholds"]:
         reason = f": {entry['reason']}" if entry["reason"] else ""
         lines.append(f"threshold {entry['outcome']}: {entry['name']}{reason}")
+    lines += [
+        f"service level {entry['outcome']}: {entry['operation']} over {entry['interface']}, {entry['limit']} at most "
+        f"{entry['most']:g}: {entry['reason']}"
+        for entry in document["slo"]
+    ]
     lines += [f"{entry['count']} errors ({entry['kind']}): {entry['message']}" for entry in document["errors"][:5]]
     lines += [f"note: {note}" for note in document["notes"]]
     words, sentence = document["headline"]["words"], document["headline"]["sentence"]

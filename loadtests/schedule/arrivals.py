@@ -10,6 +10,7 @@ import numpy as np
 
 from loadtests.clients.payloads import VARIANTS
 from loadtests.schedule.plan import Plan
+from loadtests.schedule.rotation import rotation
 
 _NS = 1_000_000_000
 
@@ -25,6 +26,10 @@ class Schedule:
         self.workers = workers
         self._counts = self._counted()
         self._before = self._counted_before()
+        self._turns = {
+            (segment.interface, segment.client): rotation(plan.offered(segment.interface, segment.client), plan.weights)
+            for segment in plan.segments
+        }
 
     def _counted(self) -> list[int]:
         """Return the arrivals of each segment over all workers: the rate times the time that the segment is open.
@@ -69,9 +74,9 @@ class Schedule:
         return len(self.plan.segments)
 
     def operations(self, segment: int) -> tuple[int, ...]:
-        """Return the numbers of the operations that a segment's interface and client offer."""
+        """Return the numbers of the operations of a segment's interface and client, by turns."""
         found = self.plan.segments[segment]
-        return self.plan.offered(found.interface, found.client)
+        return self._turns[found.interface, found.client]
 
     def users(self) -> int:
         """Return how many users of the closed model are this worker's."""

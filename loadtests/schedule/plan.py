@@ -1,13 +1,11 @@
 """What a run does when: segments of one client on one interface, a schedule that the seed fixes.
 
-A fair comparison: REST and SOAP take turns in short blocks, in quartets REST-SOAP-SOAP-REST or the reverse at random
-(ABBA).
+A fair comparison: REST and SOAP take turns in short blocks, in quartets REST-SOAP-SOAP-REST or the reverse at random.
 The machine's speed drifts within a second: the sooner one follows the other, the more they share of it. But a block has
 to be long beside a response, because requests under way at its end overlap with the other interface. In two quartets of
 five, one interface meets itself under two names (the A/A control): the difference that this shows is noise. It gets as
 much time as the comparison, so that it is known as exactly as the effect. The library clients have quartets of their
-own,
-because their CPU time would delay the wire client's starts.
+own, because their CPU time would delay the wire client's starts.
 
 Three interfaces take turns in the same way, in sextets; two robots over one interface in each quartet.
 """
@@ -22,6 +20,7 @@ import msgspec
 import numpy as np
 
 from conformance.packs.table1.thresholds import ApiStyle, Client, Operation
+from loadtests.schedule.rotation import turns_of_all
 
 INTERFACES = tuple(map(str, ApiStyle))
 #: REST and SOAP at once, in steps of the load: every other request goes over the other.
@@ -112,6 +111,7 @@ class Plan:
         repeat: which repeat of the comparison this is; repeats after the first begin with new connections.
         offset_s: when it starts, in seconds of load since the first one's start.
         least_block_s: BLOCK_S, or SHORT_BLOCK_S where the robot is known to be quick.
+        weights: how often each operation is called; empty: all equally often.
     """
 
     operations: tuple[str, ...]
@@ -129,6 +129,7 @@ class Plan:
     repeat: int = 0
     offset_s: float = 0.0
     least_block_s: float = BLOCK_S
+    weights: tuple[int, ...] = ()
 
     def as_message(self) -> dict[str, Any]:
         """Return the plan in a form that msgpack carries."""
@@ -167,7 +168,7 @@ class Plan:
     @cached_property
     def _rounds(self) -> list[Segment]:
         """Return the comparison's blocks in order, without their times."""
-        arrivals = _ARRIVALS_PER_BLOCK * len(self.operations)
+        arrivals = _ARRIVALS_PER_BLOCK * turns_of_all(self.weights, len(self.operations))
         least = max(self.least_block_s, self.load.duration_s / _MAX_BLOCKS, arrivals / (self.load.rate or math.inf))
         most = int(self.load.duration_s / least + 1e-9)
         rng = np.random.default_rng([self.load.seed, 1, self.repeat])

@@ -1,11 +1,12 @@
 """The settings of a run, in frozen groups: each group goes to the code that needs it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Self
 
 import msgspec
 
 from conformance.packs.table1.thresholds import Threshold
+from conformance.statement.load import ServiceLevel
 from loadtests.clients.robot import Robot
 from loadtests.schedule.plan import Load
 
@@ -14,11 +15,15 @@ STEP_S = 3.0
 
 @dataclass(frozen=True)
 class Selection:
-    """What to measure; in the options, an empty field means everything."""
+    """What to measure; in the options, an empty field means everything.
+
+    `weights` say how often each operation is called beside the others; empty where all are called equally often.
+    """
 
     operations: tuple[str, ...] = ()
     interfaces: tuple[str, ...] = ()
     clients: tuple[str, ...] = ()
+    weights: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -124,6 +129,9 @@ class Settings:
         load: its rate is None in the closed model.
         against: None where no other robot takes part.
         end_to_end: None where it is not wanted.
+        slo: the service levels of the operations that are measured.
+        description: URL or name of the description that the operations come from; None for the paper's robot.
+        notes: what the result should say of the choice of operations.
     """
 
     robot: Robot
@@ -137,6 +145,9 @@ class Settings:
     thresholds: tuple[Threshold, ...]
     against: Against | None = None
     end_to_end: EndToEnd | None = None
+    slo: dict[str, ServiceLevel] = field(default_factory=dict)
+    description: str | None = None
+    notes: tuple[str, ...] = ()
 
     def to_json(self) -> str:
         """Return the settings for the process that measures."""

@@ -10,8 +10,9 @@ from loadtests.schedule.plan import Plan
 from loadtests.statistics.against import DECIDING, NOT_SLOWER, SLOWER, UNCLEAR, Against, Change
 from loadtests.statistics.comparisons import AaControl, SoapOverRest
 from loadtests.statistics.figures import Series
+from loadtests.statistics.service_levels import BROKEN, NOT_KNOWN
 
-_ORDER = {"delivery": 0, "pose": 1, "coffee": 2}
+_ORDER = {"delivery": 0, "pose": 1, "coffee": 2}  # described operations: as they were named
 _TAIL = "p99"
 _TENTHS_MS = 10
 _AGAINST = {
@@ -34,6 +35,7 @@ class Found:
         outcomes: of the thresholds.
         worthless: why the figures say nothing about the robot.
         undecided: why the run has nothing to compare; thresholds are judged all the same.
+        levels: outcomes of the service levels.
     """
 
     plan: Plan
@@ -45,13 +47,14 @@ class Found:
     outcomes: Sequence[str] = ()
     worthless: Sequence[str] = field(default=())
     undecided: Sequence[str] = field(default=())
+    levels: Sequence[str] = ()
 
 
 def headline(found: Found) -> dict[str, str]:
     """Return the `headline` of latency.json: a few `words`, and a `sentence` that stands alone."""
     if found.worthless:
         return {"words": _WORTHLESS, "sentence": f"{_WORTHLESS}, because {'; '.join(found.worthless)}."}
-    judged = _thresholds(found.outcomes)
+    judged = "; ".join(filter(None, (_levels(found.levels), _thresholds(found.outcomes))))
     if found.undecided:
         return {"words": judged or _UNDECIDED, "sentence": f"{_UNDECIDED}, because {'; '.join(found.undecided)}."}
     words, sentence = _measured(found)
@@ -67,6 +70,17 @@ def _thresholds(outcomes: Sequence[str]) -> str | None:
     if not outcomes:
         return None
     return "The threshold is met" if len(outcomes) == 1 else f"All {number} are met"
+
+
+def _levels(outcomes: Sequence[str]) -> str | None:
+    """Return a text on the limits of service levels that were broken and kept; None if there are none."""
+    number = f"{len(outcomes)} service level{'' if len(outcomes) == 1 else 's'}"
+    for outcome in (BROKEN, NOT_KNOWN):
+        if outcome in outcomes:
+            return f"{outcomes.count(outcome)} of {number} {outcome}"
+    if not outcomes:
+        return None
+    return "The service level is kept" if len(outcomes) == 1 else f"All {number} are kept"
 
 
 def _measured(found: Found) -> tuple[str, str]:
@@ -88,7 +102,7 @@ def _measured(found: Found) -> tuple[str, str]:
 
 
 def _rank(entry: SoapOverRest | Series) -> tuple[bool, int]:
-    return entry.client != "wire", _ORDER[entry.operation]
+    return entry.client != "wire", _ORDER.get(entry.operation, 0)
 
 
 def _how(entry: SoapOverRest | Series | Change, found: Found) -> str:

@@ -41,11 +41,11 @@ def verdict(result: Mapping[str, Any], series: AllSeries) -> Verdict:
 
 
 def _tone(result: Mapping[str, Any], series: AllSeries) -> tuple[str, str]:
-    outcomes = {threshold["outcome"] for threshold in result.get("thresholds", [])}
+    outcomes = {entry["outcome"] for key in ("thresholds", "slo") for entry in result.get(key, [])}
     following = (result.get("against") or {}).get("verdict")
-    if not result["valid"] or "missed" in outcomes:
+    if not result["valid"] or outcomes & {"missed", "broken"}:
         return "bad", "✗"
-    if "inconclusive" in outcomes or not any(one.data["count"] for one in series.values()):
+    if outcomes & {"inconclusive", "not known"} or not any(one.data["count"] for one in series.values()):
         return "warning", "?"
     if following is not None:
         return against.TAGS[following]

@@ -1,4 +1,4 @@
-"""Write the latency report: a measurement of SOAP and REST as an HTML page and as Markdown."""
+"""Write the latency report: a measurement as an HTML page and as Markdown."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,6 +14,7 @@ from reports.latency.figures.spans import SPANS, means, spans
 from reports.latency.figures.spectrum import spectrum
 from reports.latency.figures.timeline import timeline
 from reports.latency.findings import PAPER, remarks, verdict
+from reports.latency.noticed import noticed
 from reports.latency.numbers import NONE, interval, ms, rate, ratio, share
 from reports.pages.page import html_page, markdown_page
 
@@ -72,6 +73,7 @@ def _values(result: Mapping[str, Any], series: AllSeries) -> dict[str, Any]:
         "result": result,
         "series": list(series.values()),
         "verdict": verdict(result, series),
+        "noticed": noticed(result),
         "remarks": remarks(result, series),
         "paper": paper_rows(result, series),
         "reasons": _missing(series),

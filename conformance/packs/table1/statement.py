@@ -11,6 +11,7 @@ from conformance.contract.pack import Contract
 from conformance.contract.toml_file import Finite, NotNegative, Text
 from conformance.packs.table1.limits import DeclaredLimits, Limits
 from conformance.packs.table1.thresholds import Threshold
+from conformance.statement import load
 from conformance.statement import statement as generic
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ class Ros(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     cmd_vel_topic: Text = "/cmd_vel"
 
 
-class Load(generic.Load, frozen=True, forbid_unknown_fields=True):
+class Load(load.Load, frozen=True, forbid_unknown_fields=True):
     """What a load test may ask of the robot, and the latency thresholds that it is to keep."""
 
     thresholds: tuple[Threshold, ...] = ()

@@ -37,6 +37,7 @@ _WIDTH, _HEIGHT, _DPI = 4.8, 3.4, 100
 _STYLE: Any = {
     "svg.fonttype": "none",  # text stays text: it can be searched, copied and read aloud
     "svg.hashsalt": "roaas",
+    "text.parse_math": False,  # a $ in the path of an operation is no formula
     "font.family": "sans-serif",
     "font.size": 9.75,  # 13 px at 4.8 inches for 480 px
     "axes.titlesize": 10.5,

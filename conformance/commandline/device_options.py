@@ -1,0 +1,51 @@
+"""The click options on a device with a description that several commands share: where, what may be called, who asks."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+_FILE = click.Path(exists=True, dir_okay=False)
+
+_DESCRIPTION = (
+    click.option("--openapi", metavar="URL|FILE", help="The device's own OpenAPI or Swagger description: go by that."),
+    click.option("--wsdl", metavar="URL|FILE", help="The device's own WSDL: go by that."),
+    click.option("--overlay", "overlays", multiple=True, metavar="FILE", help="OpenAPI Overlay to apply; repeatable."),
+    click.option("--base-url", metavar="URL", help="Where the operations of the description are."),
+    click.option(
+        "--call",
+        "allow",
+        multiple=True,
+        metavar="PATTERN",
+        help="Also call operations that may change something: 'POST /api/move/*', an operationId or a tag; repeatable.",
+    ),
+    click.option("--never", multiple=True, metavar="PATTERN", help="Never call these operations; repeatable."),
+)
+_CREDENTIALS = (
+    click.option("--basic-file", type=_FILE, help="File with user:password for basic authentication."),
+    click.option("--digest-file", type=_FILE, help="File with user:password for digest authentication (RFC 7616)."),
+    click.option(
+        "--api-key", metavar="'PLACE NAME'", help="Where the API key goes: header, query or cookie, and its name."
+    ),
+    click.option("--api-key-file", type=_FILE, help="File with the API key."),
+    click.option("--headers-file", type=_FILE, help="File with headers to send, 'Name: value' in each line."),
+    click.option("--client-cert-file", type=_FILE, help="Client certificate (PEM) for HTTPS."),
+    click.option("--client-key-file", type=_FILE, help="Its key, if it is not in the same file."),
+)
+
+
+def description_options(command: _Command) -> _Command:
+    """Add the options on a device's description and on what may be called."""
+    return _with(command, _DESCRIPTION)
+
+
+def credential_options(command: _Command) -> _Command:
+    """Add the options on credentials other than the bearer token."""
+    return _with(command, _CREDENTIALS)
+
+
+def _with(command: _Command, options: tuple[Callable[[_Command], _Command], ...]) -> _Command:
+    for option in reversed(options):
+        command = option(command)
+    return command

@@ -1,0 +1,57 @@
+"""What a vendor says of a device's load tests: the limits of a test, the operations to measure, and service levels."""
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from conformance.contract.toml_file import Positive
+
+Weight = Annotated[int, Meta(ge=1, le=1000)]
+
+
+class Load(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a load test may do to the device.
+
+    Attributes:
+        max_rate: maximum requests per second.
+        max_duration_s: maximum duration of a measurement, s.
+        operations: what to measure of a device with a description: weight by operation, as in `"GET /state" = 3`.
+    """
+
+    max_rate: Positive | None = None
+    max_duration_s: Positive | None = None
+    operations: dict[str, Weight] = {}
+
+
+class ServiceLevel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What an operation has to keep to.
+
+    Attributes:
+        p50_ms, p90_ms, p95_ms, p99_ms, p999_ms: limits on quantiles of the response time, ms.
+        error_rate: highest share of requests that may fail, 0 to 1.
+        at_rate: requests per second of this operation at which the level holds; None: at any rate.
+    """
+
+    p50_ms: Positive | None = None
+    p90_ms: Positive | None = None
+    p95_ms: Positive | None = None
+    p99_ms: Positive | None = None
+    p999_ms: Positive | None = None
+    error_rate: Annotated[float, Meta(ge=0, lt=1)] | None = None
+    at_rate: Positive | None = None
+
+    def __post_init__(self) -> None:
+        """Check that there is a limit.
+
+        Raises:
+            ValueError: there is none.
+        """
+        if not self.limits:
+            raise ValueError("a service level needs a limit, such as p99_ms = 50 or error_rate = 0.001")
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """The limits that are set, by name."""
+        given = msgspec.structs.asdict(self)
+        return {name: value for name, value in given.items() if name != "at_rate" and value is not None}

@@ -1,0 +1,34 @@
+"""An operation of a device with a description: its requests as bytes, built before the measurement."""
+
+from dataclasses import dataclass
+
+from conformance.transport.credentials import Credentials
+from loadtests.clients.failures import Declared
+from loadtests.clients.wire import Request
+
+VARIABLE = b"$ROAAS_"
+
+
+@dataclass(frozen=True)
+class Described:
+    """One operation to measure.
+
+    Attributes:
+        name: method and path, as in the description.
+        method: HTTP method.
+        base_url: where it is.
+        octets: one request for each set of values; shell variables stand where credentials go (`Credentials`).
+        responses: status and media types of each good response.
+    """
+
+    name: str
+    method: str
+    base_url: str
+    octets: tuple[bytes, ...]
+    responses: tuple[tuple[int, tuple[str, ...]], ...]
+
+    def requests(self, credentials: Credentials, number: int) -> list[Request]:
+        """Return `number` requests with credentials, the sets of values in rotation."""
+        good = Declared(self.responses)
+        made = [Request(credentials.revealed(each), good) for each in self.octets]
+        return [made[place % len(made)] for place in range(number)]

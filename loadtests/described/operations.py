@@ -1,0 +1,123 @@
+"""Which operations of a description to measure: by name, with weights, as far as they may be called."""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from conformance.api.call_rules import is_literal, matches
+from conformance.documents.openapi import Operation, operations_of
+from conformance.statement.load import ServiceLevel
+from loadtests.described.device import Device
+from loadtests.settings.errors import SettingsError
+
+_WEIGHTED = re.compile(r"(?P<name>.*?)(?:=(?P<weight>[1-9]\d{0,2}|1000))?", re.DOTALL)
+#: The recorder numbers operations with four bits.
+MOST = 16
+_SHOWN = 12
+_LONGEST = 300
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The operations to measure.
+
+    Attributes:
+        weights: how often each is called, beside the others.
+        notes: which of those named are not called, and why.
+    """
+
+    weights: dict[Operation, int]
+    notes: tuple[str, ...]
+
+
+def chosen(device: Device, named: Iterable[str]) -> Chosen:
+    """Return the operations that the options name, or else the statement's [load], or else its [slo].
+
+    Args:
+        device: with the description.
+        named: `GET /state`, an operationId, a tag or a pattern; each may end with a weight, as in `GET /state=3`.
+
+    Raises:
+        SettingsError: a name means no operation, an operation may not be called, or nothing is named.
+    """
+    statement, known = device.statement, operations_of(device.contract)
+    wanted = _read(named) or statement.load.operations or _by_rates(statement.slo)
+    if not wanted:
+        listed = ", ".join(f"'{each.label}'" for each in known[:_SHOWN])
+        more = f" and {len(known) - _SHOWN} more" if len(known) > _SHOWN else ""
+        raise SettingsError(f"name the operations to measure with --operation; the description has {listed}{more}")
+    weights: dict[Operation, int] = {}
+    notes = []
+    for name, weight in wanted.items():
+        for operation in _meant(name, known):
+            refused = _refused(device, operation)
+            if refused and is_literal(name, operation):
+                raise SettingsError(f"{operation.label} is not called: {refused}")
+            if refused:
+                notes.append(f"{operation.label} is not called: {refused}")
+            else:
+                weights[operation] = weight
+    if not weights:
+        raise SettingsError(f"nothing is left to measure: {'; '.join(notes)}")
+    if len(weights) > MOST:
+        raise SettingsError(f"{len(weights)} operations are too many for one run: at most {MOST}")
+    return Chosen(weights, tuple(notes))
+
+
+def named_alike(name: str, device: Device) -> str:
+    """Return the label of the operation that a name in the statement's [slo] means.
+
+    Raises:
+        SettingsError: it means none, or several.
+    """
+    found = _meant(name, operations_of(device.contract))
+    if len(found) > 1:
+        raise SettingsError(f"[slo] {name!r} means {len(found)} operations: name one, as in 'GET /state'")
+    return found[0].label
+
+
+def _read(named: Iterable[str]) -> dict[str, int]:
+    found = {}
+    for text in named:
+        parts = _WEIGHTED.fullmatch(text.strip())
+        if parts is not None:
+            found[parts["name"]] = int(parts["weight"] or 1)
+    return found
+
+
+def _by_rates(levels: Mapping[str, ServiceLevel]) -> dict[str, int]:
+    """Return operations with service levels, weighted by the rates at which the levels hold if all have one."""
+    rates = {name: level.at_rate for name, level in levels.items()}
+    known = [rate for rate in rates.values() if rate is not None]
+    if len(known) < len(rates):
+        return dict.fromkeys(rates, 1)
+    return {name: min(1000, round((rate or 1.0) / min(known))) for name, rate in rates.items()}
+
+
+def _meant(name: str, known: tuple[Operation, ...]) -> list[Operation]:
+    """Return the operations that a name means.
+
+    Raises:
+        SettingsError: it means none; the message has the nearest names.
+    """
+    literal = [each for each in known if is_literal(name, each)]
+    found = literal or [each for each in known if matches(name, each)]
+    if found:
+        return found
+    labels = [each.label for each in known]
+    near = get_close_matches(name, [*labels, *(each.id for each in known)], 3, 0.4) or labels[:_SHOWN]
+    hint = f"did you mean {' or '.join(repr(each) for each in dict.fromkeys(near))}?" if near else "it has none"
+    raise SettingsError(f"the description has no operation {name!r}: {hint}")
+
+
+def _refused(device: Device, operation: Operation) -> str:
+    """Return why an operation is not measured; empty if it is."""
+    reason = device.api.call_rules.decide(operation)
+    if not reason.may:
+        return str(reason)
+    if operation.method in {"HEAD", "TRACE"}:
+        return f"{operation.method} is not measured, because its response has no content"
+    if not operation.label.isprintable() or len(operation.label) > _LONGEST:
+        return "its path is too long, or is not printable"
+    return ""

@@ -1,0 +1,95 @@
+"""Say in plain words what a user of the robot will notice of the measured latency.
+
+The bounds are Nielsen's (Usability Engineering, 1993, section 5.5, after Miller 1968): a response within 0.1 s seems
+immediate, within 1 s the delay is noticed but does not interrupt a train of thought, and beyond that people wait.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from reports.latency.numbers import ms, rate
+from reports.pages.untrusted import excerpt
+
+_AT_ONCE_MS, _FLOW_MS = 100.0, 1000.0
+#: Quantiles by how far they look into the tail, with the share of requests within them.
+_TAILS = {"p99": "99 of 100", "p95": "95 of 100", "p90": "9 of 10"}
+_BEYOND = {"p99": "1 of 100", "p95": "1 of 20", "p90": "1 of 10"}
+_MOST = 6
+
+
+def noticed(result: Mapping[str, Any]) -> list[str]:
+    """Return sentences for each series of the leading client, the slowest first, and what else limits them."""
+    own = [one for one in result["series"] if one["client"] == "wire"] or result["series"]
+    told = [one for one in own if one["count"] and one["response_ms"]["p50"] is not None]
+    if not told or not result.get("trustworthy", result["valid"]):
+        return ["This run does not show what a user of the robot will notice; the reasons are below."]
+    told.sort(key=lambda one: -_tail(one)[1])
+    lines = [sentence for one in told[:_MOST] for sentence in _of_series(one, result)]
+    if len(told) > _MOST:
+        lines.append(f"The other {len(told) - _MOST} are faster than these.")
+    return [*lines, *_limits(result, any(one["errors"] for one in told))]
+
+
+def _tail(one: Mapping[str, Any]) -> tuple[str, float]:
+    """Return the quantile farthest in the tail up to p99 that the series has, and its value."""
+    times = one["response_ms"]
+    name = next((name for name in _TAILS if times[name] is not None), "p50")
+    return name, times[name]
+
+
+def _of_series(one: Mapping[str, Any], result: Mapping[str, Any]) -> Iterator[str]:
+    several = len({each["interface"] for each in result["series"]}) > 1
+    name = excerpt(one["operation"], 100) + (f" over {one['interface'].upper()}" if several else "")
+    half, (quantile, slow) = one["response_ms"]["p50"], _tail(one)
+    if quantile == "p50":
+        yield f"{name}: half of the responses take {ms(half)} ms or less; there are too few to say more."
+    elif slow < _AT_ONCE_MS:
+        yield (
+            f"{name}: a person notices no delay. {_TAILS[quantile]} responses come within {ms(slow)} ms, and a delay "
+            "below about 100 ms seems immediate."
+        )
+    elif half < _AT_ONCE_MS:
+        delay = "a short delay" if slow < _FLOW_MS else "a wait"
+        yield (
+            f"{name}: a person usually notices no delay (half of the responses come within {ms(half)} ms), but "
+            f"{_BEYOND[quantile]} takes {ms(slow)} ms or more, which is noticed as {delay}."
+        )
+    else:
+        delay = "a short delay" if half < _FLOW_MS else "a wait"
+        yield (
+            f"{name}: a person notices {delay} each time. Half of the responses take {ms(half)} ms or more, and "
+            f"{_BEYOND[quantile]} takes {ms(slow)} ms or more."
+        )
+    if slow > 0 and quantile != "p50":
+        yield (
+            f"A program that waits for each response of {name} can repeat that about {rate(_round(1000 / slow))} times "
+            f"a second and is late in {_BEYOND[quantile]} cases."
+        )
+    failed = one["errors"] + one.get("dropped", 0)
+    if failed:
+        total = one["count"] + failed
+        yield f"{name}: {failed:,} of {total:,} requests failed{_how_often(failed / total, result, one)}."
+
+
+def _round(value: float) -> float:
+    """Return a number with two significant digits."""
+    return float(f"{value:.2g}")
+
+
+def _how_often(share: float, result: Mapping[str, Any], one: Mapping[str, Any]) -> str:
+    """Return how often that is at the rate of the run."""
+    plan = result["plan"]
+    weights = plan.get("weights") or dict.fromkeys(plan["operations"], 1)
+    whole = plan.get("rate")
+    if not whole or one["operation"] not in weights:
+        return ""
+    every = 1 / (share * whole * weights[one["operation"]] / sum(weights.values()))
+    return f": at this load, one every {every:.2g} s"
+
+
+def _limits(result: Mapping[str, Any], failed: bool) -> Iterator[str]:  # noqa: FBT001 -- whether any request failed
+    plan = result["plan"]
+    load = f"{rate(plan['rate'])} requests/s" if plan.get("rate") else f"{plan.get('users')} users"
+    near = (result["environment"].get("robot") or {}).get("same_machine")
+    network = " on the robot's own machine: a network adds its delay" if near else ""
+    yield f"{'' if failed else 'No request failed. '}Measured at {load} for {plan['duration_s']:g} s{network}."
