@@ -76,6 +76,8 @@ def basic_string(text: str) -> str:
 def _explained(table: dict[str, Any], shape: type, said: str) -> str:
     """Return what is invalid, in words for the author of the file."""
     place = _PLACE.search(said)
+    if place and "[...]" in place["path"]:  # in a table whose keys are the user's: msgspec does not say under which
+        return f"[{place['path'].strip('.').partition('[')[0]}] {_PLACE.sub('', said)}"
     value: Any = table
     kind = inspect.type_info(shape)
     heading, dotted, keys = "", "", ""

@@ -7,7 +7,7 @@ from msgspec import Meta
 
 from conformance.contract.toml_file import Positive
 
-Weight = Annotated[int, Meta(ge=1, le=1000)]
+_MOST_WEIGHT = 1000
 
 
 class Load(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -21,7 +21,17 @@ class Load(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     max_rate: Positive | None = None
     max_duration_s: Positive | None = None
-    operations: dict[str, Weight] = {}
+    operations: dict[str, int] = {}
+
+    def __post_init__(self) -> None:
+        """Check the weights.
+
+        Raises:
+            ValueError: one is out of range.
+        """
+        for name, weight in self.operations.items():
+            if not 1 <= weight <= _MOST_WEIGHT:
+                raise ValueError(f"operations: {name!r} = {weight} must be a whole number from 1 to {_MOST_WEIGHT}")
 
 
 class ServiceLevel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -153,7 +153,7 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     api: Api = Api()
     auth: Auth | None = None
     motion: Any = None
-    slo: dict[str, ServiceLevel] = {}
+    slo: dict[str, Any] = {}
 
     def read(self, contract: Contract, path: Path) -> Statement:
         """Return the statement.
@@ -180,8 +180,14 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             "load": self.load,
             "values": self.values,
             "calls": self.calls,
-            "slo": self.slo,
+            "slo": {name: self._level(name, path) for name in self.slo},
         }
+
+    def _level(self, name: str, path: Path) -> ServiceLevel:
+        where = f"{path}: [slo] {name!r}"
+        if not isinstance(self.slo[name], dict):
+            raise StatementError(f"{where} = {self.slo[name]!r} must be a table such as {{ p99_ms = 50 }}")
+        return fit(self.slo[name], ServiceLevel, where, StatementError)
 
 
 def load_statement(path: Path, contract: Contract) -> Statement:

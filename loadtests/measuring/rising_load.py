@@ -38,7 +38,8 @@ class RisingLoad:
     def __post_init__(self) -> None:
         self._next_segment = self.first.first_segment + len(self.first.segments)
         self._operation = step_operation(self.first.operations)
-        self._criterion = Criterion.of(self.settings.thresholds, self.first.operations[self._operation])
+        name = self.first.operations[self._operation]
+        self._criterion = Criterion.of(self.settings.thresholds, name, self.settings.slo.get(name))
         self._interfaces = [n for n in self.first.interfaces if self._operation in self.first.offered(n, "wire")]
 
     def _run(self, interfaces: Sequence[str], *, rate: float | None = None, users: int | None = None) -> list[Step]:

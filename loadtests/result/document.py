@@ -226,7 +226,8 @@ def _knee(outcome: Outcome, plan: Plan) -> list[dict[str, Any]]:
     if not outcome.steps:
         return []
     operation = plan.operations[step_operation(plan.operations)]
-    criterion = steps.Criterion.of(outcome.settings.thresholds, operation)
+    settings = outcome.settings
+    criterion = steps.Criterion.of(settings.thresholds, operation, settings.slo.get(operation))
     return steps.knee(outcome.steps, plan.interfaces, criterion)
 
 

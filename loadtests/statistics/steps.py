@@ -7,6 +7,7 @@ from typing import Any, Self
 import msgspec
 
 from conformance.packs.table1.thresholds import Threshold
+from conformance.statement.load import ServiceLevel
 from loadtests.schedule.arrivals import arrivals_due
 from loadtests.schedule.plan import Plan
 from loadtests.statistics.figures import rounded
@@ -27,23 +28,27 @@ class Criterion:
 
     Attributes:
         limits: (time, quantile, below ms) for each interface.
+        usual: the same for an interface without limits of its own.
     """
 
     limits: dict[str, list[tuple[str, str, float]]]
+    usual: tuple[tuple[str, str, float], ...] = (("response", "p99", _MOST_P99_MS),)
 
     @classmethod
-    def of(cls, thresholds: Iterable[Threshold], operation: str) -> Self:
-        """Return the criterion by the thresholds on an operation's wire series."""
+    def of(cls, thresholds: Iterable[Threshold], operation: str, level: ServiceLevel | None = None) -> Self:
+        """Return the criterion by the thresholds on an operation's wire series, or by its service level."""
         limits: dict[str, list[tuple[str, str, float]]] = {}
         for threshold in thresholds:
             if threshold.operation == operation and threshold.client == "wire":
                 kept = limits.setdefault(threshold.interface, [])
                 kept.append((threshold.time, threshold.quantile, threshold.below_ms))
-        return cls(limits)
+        most = level.limits.items() if level else ()
+        usual = tuple(("response", name.removesuffix("_ms"), ms) for name, ms in most if name.endswith("_ms"))
+        return cls(limits, usual or cls.usual)
 
     def of_interface(self, interface: str) -> list[tuple[str, str, float]]:
-        """Return the limits for an interface, or a default if no threshold is on that interface."""
-        return self.limits.get(interface) or [("response", "p99", _MOST_P99_MS)]
+        """Return the limits for an interface, or the usual ones if no threshold is on that interface."""
+        return self.limits.get(interface) or list(self.usual)
 
     def words(self, interface: str) -> str:
         """Return the criterion as a sentence."""

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shlex
 import socket
 import subprocess
 import sys
@@ -111,7 +112,8 @@ COMMAND = [sys.executable, "-c", "from loadtests.cli import load; load(prog_name
 
 @pytest.fixture
 def load(tmp_path):
-    """Run `roaas load`; `begin` gives the process and a function that waits for it. A string may hold several words.
+    """Run `roaas load`; `begin` gives the process and a function that waits for it. A string may hold several words, as
+    in a shell.
 
     `on` are words before the command.
     """
@@ -121,7 +123,7 @@ def load(tmp_path):
 
     def begin(*options, on=()):
         folder = tmp_path / "out"
-        words = [word for option in options for word in (option.split() if isinstance(option, str) else [option])]
+        words = [word for option in options for word in (shlex.split(option) if isinstance(option, str) else [option])]
         process = subprocess.Popen(
             [*on, *COMMAND, *words, "--out", folder], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )

@@ -28,7 +28,7 @@ def test_report_writes_what_belongs_to_both_results(tmp_path, result, latency):
     put(tmp_path, "latency.json", latency)
     done = run(report, tmp_path)
     assert done.exit_code == 0
-    names = ["certificate.html", "certificate.md", "junit.xml", "latency.html", "latency.md"]
+    names = ["certificate.html", "certificate.md", "junit.xml", "latency.html", "latency.md", "latency-junit.xml"]
     assert done.stdout.split() == [str(tmp_path / name) for name in names]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*names, "result.json", "latency.json"])
 

@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import wraps
+from textwrap import fill
 from typing import Any, ParamSpec
 
 import matplotlib as mpl
@@ -30,6 +31,8 @@ SPAN_HATCH = {"build": "", "wire": "//", "server": "", "parse": "\\\\"}
 PAPER_COLOUR = "#7a4d8f"
 _WHOLE_MS = 10
 """Milliseconds from which a tick label is a whole number."""
+_TITLE, LABEL = 48, 26
+"""Characters of a title, and of the label of a row, that fit on one line: names of operations may be longer."""
 _DECADES_WITH_STEPS = 2
 """Up to this many decades there are ticks at 1, 2 and 5; on a longer axis their labels would touch."""
 
@@ -90,7 +93,7 @@ class Panel:
         self._figure = Figure(figsize=(_WIDTH, height), dpi=_DPI, layout="constrained")
         self._alt = alt
         self.axes: Axes = self._figure.add_subplot()
-        self.axes.set_title(title)
+        self.axes.set_title(fill(title, _TITLE))
 
     def legend(self, columns: int = 2) -> None:
         """Put the legend below the axes, where it covers nothing."""

@@ -2,10 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from textwrap import fill
 
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from reports.latency.figures.canvas import INK, PAPER_COLOUR, SOFT, Panel, Picture, picture
+from reports.latency.figures.canvas import INK, LABEL, PAPER_COLOUR, SOFT, Panel, Picture, picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +55,7 @@ def _panel(title: str, rows: Sequence[Ratio], mark: tuple[float, str] | None) ->
             va="center",
             color=SOFT,
         )
-    axes.set_yticks(range(len(rows)), [row.label for row in rows])
+    axes.set_yticks(range(len(rows)), [fill(row.label, LABEL) for row in rows])
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.set_xscale("log")
     low, high = axes.get_xlim()

@@ -1,9 +1,10 @@
 """Draw the time that requests spend in each span (build, wire, server, parse), stacked, for each client."""
 
 from collections.abc import Iterator, Mapping
+from textwrap import fill
 
 from reports.latency.distributions import AllSeries, Series
-from reports.latency.figures.canvas import INK, SPAN_COLOUR, SPAN_HATCH, Panel, milliseconds, picture
+from reports.latency.figures.canvas import INK, LABEL, SPAN_COLOUR, SPAN_HATCH, Panel, milliseconds, picture
 
 SPANS = ("build", "wire", "server", "parse")
 
@@ -42,7 +43,7 @@ def _panel(client: str, bars: Mapping[str, Mapping[str, float]]) -> Panel:
         width = [parts.get(span, 0.0) for parts in bars.values()]
         if any(width):
             panel.axes.barh(
-                list(bars),
+                [fill(name, LABEL) for name in bars],
                 width,
                 left=left,
                 height=0.62,

@@ -1,0 +1,114 @@
+"""`roaas load` on devices with a description, as people start it."""
+
+import json
+import urllib.request
+
+import pytest
+from lxml import etree
+
+from reports.latency.junit import latency_junit
+from reports.latency.noticed import noticed
+from reports.latency.page import latency_html
+
+SHORT = "--rate 200 --duration 1 --warmup 0.1"
+
+
+@pytest.fixture
+def device(started):
+    """Start a toy device; returns the URL of its description."""
+
+    def start(*options):
+        return f"http://127.0.0.1:{started('toy_api.py', *options)[1]}"
+
+    return start
+
+
+def calls(url):
+    with urllib.request.urlopen(f"{url}/calls", timeout=5) as answer:  # noqa: S310 -- http
+        return json.load(answer)
+
+
+def test_operations_with_weights_values_and_service_levels(device, load, tmp_path):
+    url, statement = device("--fail-every", "20"), tmp_path / "robot.toml"
+    statement.write_text(
+        f'[robot]\nname = "toy"\n[api]\nopenapi = "{url}/openapi.json"\n'
+        '[load]\noperations = { "GET /state" = 3, "GET /items/{item_id}" = 1 }\n'
+        '[slo]\n"GET /state" = { p90_ms = 9000, error_rate = 0.001, at_rate = 150 }\n'
+        '"GET /items/{item_id}" = { p50_ms = 9000, p999_ms = 9000 }\n"GET /text" = { p50_ms = 1 }\n'
+    )
+    run = load(str(statement), "--duration 2 --warmup 0.2")
+    result = run.result
+    assert run.code == (1 if result["trustworthy"] else 4), run.out + run.err
+    levels = {(each["operation"], each["limit"]): each for each in result["slo"]}
+    outcomes = {key: each["outcome"] for key, each in levels.items()}
+    assert outcomes == {
+        ("GET /state", "p90_ms"): "kept",
+        ("GET /state", "error_rate"): "broken",
+        ("GET /items/{item_id}", "p50_ms"): "kept",
+        ("GET /items/{item_id}", "p999_ms"): "not known",
+    }
+    state = levels["GET /state", "error_rate"]
+    assert (state["rate"], state["requests"]) == (150, pytest.approx(270, abs=25))
+    assert state["measured"] == pytest.approx(0.05, abs=0.01)
+    assert {each["operation"]: each["count"] > 0 for each in result["series"]} == {
+        "GET /state": True,
+        "GET /items/{item_id}": True,
+    }
+    assert result["plan"]["weights"] == {"GET /state": 3, "GET /items/{item_id}": 1}
+    assert (result["plan"]["rate"], result["plan"]["clients"].keys()) == (200, {"wire"})
+    assert "not measured, so not judged: [slo] GET /text" in result["notes"]
+    assert {(each["kind"], each["operation"]) for each in result["errors"]} == {("status", "GET /state")}
+    done = calls(url)
+    assert done["GET /items/left"] > 20
+    assert done["GET /items/right"] > 20, "both values are used"
+    assert "POST /drive" not in done
+    assert (run.folder / "GET_items_item_id-rest-wire-service.hgrm").is_file()
+    assert not result["trustworthy"] or "1 of 4 service levels broken" in latency_html(result)
+    suite = etree.fromstring(latency_junit(result).encode())
+    assert (suite.get("tests"), suite.get("failures")) == ("5", "1")
+    told = noticed(result | {"trustworthy": True})
+    assert any("requests failed: at this load, one every" in line for line in told)
+
+
+def test_workers_call_what_changes_something_by_leave_and_it_is_stopped_at_the_end(device, load, tmp_path):
+    key = tmp_path / "key"
+    key.write_text("t0ken-of-robot")
+    url = device("--auth", "header")
+    run = load(
+        f"{url}/openapi.json",
+        SHORT,
+        "--processes 2 --call 'POST /drive' --operation 'POST /drive' --operation 'GET /items'",
+        "--api-key 'header X-Robot-Key' --api-key-file",
+        key,
+    )
+    assert {each["operation"]: each["errors"] for each in run.result["series"]} == {"POST /drive": 0, "GET /items": 0}
+    done = calls(url)
+    assert done["POST /drive"] > 50
+    assert done["POST /halt"] == 1
+    assert run.result["plan"]["limits"]["max_rate"] == 500
+    assert "t0ken" not in run.out + run.err + json.dumps(run.result)
+
+
+def test_what_the_description_does_not_declare_fails(device, load):
+    run = load(f"{device()}/openapi.json", SHORT, "--operation 'GET /text' --operation 'GET /made'")
+    assert run.code == 4
+    assert "GET /text over rest (wire): status 200 with text/plain, declared is application/json" in run.err
+    assert "GET /made over rest (wire): status 201, declared is 200" in run.err
+    assert "does not respond as its description says" in run.err
+
+
+def test_a_slower_device_takes_turns_with_it(device, load):
+    url, other = device(), device("--slow", "0.02")
+    run = load(
+        f"{url}/openapi.json", "--operation", "readState", "--against", other, "--rate 60 --duration 2 --warmup 0.1"
+    )
+    result = run.result
+    assert result["against"]["robot"]["rest"] == other
+    assert (run.code, result["against"]["verdict"]) == (0, "not slower"), run.out + run.err
+    changes = [each for each in result["against"]["changes"] if each["quantile"] == "p50"]
+    assert [each["operation"] for each in changes] == ["GET /state"]
+
+
+def test_nobody_there_is_said_before_the_run(load, free_port):
+    run = load(f"http://127.0.0.1:{free_port}/openapi.json", "--operation x")
+    assert (run.code, "the robot cannot be reached" in run.err) == (3, True), run.err

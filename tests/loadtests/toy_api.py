@@ -1,0 +1,147 @@
+"""A device with an OpenAPI description of its own: `python toy_api.py [--auth KIND] [--fail-every N] [--slow S]`.
+
+Prints `ready PORT`. GET /calls says what was called, and is not in the description.
+"""
+
+import argparse
+import base64
+import hashlib
+import json
+import re
+import sys
+import time
+from collections import Counter
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import ClassVar
+
+OK = {"description": "good", "content": {"application/json": {"schema": {"type": "object"}}}}
+ITEM = {"name": "item_id", "in": "path", "required": True, "schema": {"type": "string"}}
+BODY = {"content": {"application/json": {"schema": {"type": "object", "properties": {"speed": {"type": "number"}}}}}}
+DESCRIPTION = {
+    "openapi": "3.1.0",
+    "info": {"title": "toy", "version": "1"},
+    "paths": {
+        "/state": {"get": {"operationId": "readState", "responses": {"200": OK, "503": OK}}},
+        "/items": {"get": {"responses": {"200": OK}}},
+        "/items/{item_id}": {"get": {"parameters": [ITEM], "responses": {"200": OK, "404": OK}}},
+        "/text": {"get": {"responses": {"200": OK}}},
+        "/made": {"get": {"responses": {"200": OK}}},
+        "/drive": {"post": {"requestBody": BODY, "responses": {"200": OK}}},
+        "/halt": {"post": {"x-roaas-stop": True, "responses": {"200": OK}}},
+        "/reset": {"get": {"responses": {"200": OK}}},
+        "/events": {"get": {"responses": {"200": {"description": "events", "content": {"text/event-stream": {}}}}}},
+    },
+}
+USER, PASSWORD, TOKEN = "robot", "s3same-robot", "t0ken-of-robot"
+
+
+def md5(text):
+    return hashlib.md5(text.encode()).hexdigest()  # noqa: S324 -- RFC 7616 names it
+
+
+class Handler(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True
+    calls: ClassVar = Counter()
+    nonces = 0
+
+    def setup(self):
+        super().setup()
+        self.wfile = self.connection.makefile("wb", 65536)  # one segment for head and body
+
+    def log_message(self, *_):
+        pass
+
+    def send(self, status, value, media_type="application/json", **headers):
+        body = value if isinstance(value, bytes) else json.dumps(value).encode()
+        self.send_response(status)
+        for name, text in {"Content-Type": media_type, "Content-Length": str(len(body)), **headers}.items():
+            self.send_header(name.replace("_", "-"), text)
+        self.end_headers()
+        self.wfile.write(body)
+        self.wfile.flush()
+
+    def refused(self):
+        """Answer a request without the right credential; say whether it was one."""
+        kind, given = self.server.options.auth, self.headers.get("Authorization", "")
+        pair = base64.b64encode(f"{USER}:{PASSWORD}".encode()).decode()
+        good = {
+            None: True,
+            "bearer": given == f"Bearer {TOKEN}",
+            "basic": given == f"Basic {pair}",
+            "query": f"key={TOKEN}" in self.path,
+            "header": self.headers.get("X-Robot-Key") == TOKEN,
+            "digest": kind == "digest" and self.knows_digest(given),
+        }[kind]
+        if not good:
+            Handler.nonces += 1
+            challenge = f'Digest realm="toy", nonce="n{Handler.nonces}", qop="auth"' if kind == "digest" else "Bearer"
+            self.calls["refused"] += 1
+            self.send(401, {}, WWW_Authenticate=challenge)
+        return not good
+
+    def knows_digest(self, given):
+        parts = dict(re.findall(r'(\w+)="?([^",]*)"?', given))
+        if parts.get("nonce") is None:
+            return False
+        first, second = md5(f"{USER}:toy:{PASSWORD}"), md5(f"{self.command}:{parts['uri']}")
+        wanted = md5(f"{first}:{parts['nonce']}:{parts['nc']}:{parts['cnonce']}:auth:{second}")
+        return parts["response"] == wanted and parts["uri"] == self.path
+
+    def do_GET(self):  # noqa: PLR0911 -- one for each resource
+        path = self.path.partition("?")[0]
+        if path == "/openapi.json":
+            return self.send(200, DESCRIPTION)
+        if path == "/calls":
+            return self.send(200, self.calls)
+        length = int(self.headers.get("Content-Length") or 0)
+        self.rfile.read(length)
+        if self.refused():
+            return None
+        self.calls[f"{self.command} {path}"] += 1
+        options = self.server.options
+        if path == "/state":
+            time.sleep(options.slow)
+            failing = options.fail_every and not self.calls["GET /state"] % options.fail_every
+            return self.send(503 if failing else 200, {"stamp": time.time()})
+        if path == "/text":
+            return self.send(200, b"not JSON", "text/plain")
+        if path == "/made":
+            return self.send(201, {})
+        if path == "/events":
+            return self.events(options.events)
+        if path.startswith("/items/"):
+            return self.send(200 if path in {"/items/left", "/items/right"} else 404, {})
+        return self.send(200, [{"id": "left"}, {"id": "right"}] if path == "/items" else {})
+
+    do_POST = do_GET  # noqa: N815 -- http.server's name
+
+    def events(self, rate):
+        self.send_response(200)
+        self.send_header("Content-Type", "text/event-stream")
+        self.send_header("Connection", "close")
+        self.end_headers()
+        number = 0
+        try:
+            while True:
+                number += 1
+                self.wfile.write(f"id: {number}\ndata: {json.dumps({'stamp': time.time(), 'n': number})}\n\n".encode())
+                self.wfile.flush()
+                time.sleep(1 / rate)
+        except OSError:
+            self.close_connection = True
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--auth")
+    parser.add_argument("--fail-every", type=int, default=0)
+    parser.add_argument("--slow", type=float, default=0.0)
+    parser.add_argument("--events", type=float, default=50.0)
+    parser.add_argument("--host")
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    server.daemon_threads = True
+    server.options = parser.parse_args()
+    sys.stdout.write(f"ready {server.server_port}\n")
+    sys.stdout.flush()
+    server.serve_forever()
