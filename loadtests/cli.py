@@ -22,8 +22,7 @@ from conformance.packs.table1.statement import Statement, load_robot_statement
 from conformance.packs.table1.thresholds import load_thresholds
 from conformance.statement.endpoints import Endpoints
 from loadtests.clients.failures import CallError
-from loadtests.described.device import Named
-from loadtests.described.run import DESCRIBED_ONLY, Described
+from loadtests.described.device import DESCRIBED_ONLY, Named
 from loadtests.measuring.command_line import without_folders
 from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest, store
 from loadtests.schedule.plan import CLIENTS, INTERFACES
@@ -201,6 +200,8 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
         if named.source is None:
             settings = _papers_robot(named.statement, options)
         else:
+            from loadtests.described.run import Described  # noqa: PLC0415 -- the paper's robot need not pay 0.3 s for it
+
             device = Described.of(named, options)
             settings = device.settings(_command_line())
         _make_folder(Path(settings.output.folder))

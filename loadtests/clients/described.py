@@ -28,7 +28,12 @@ class Described:
     responses: tuple[tuple[int, tuple[str, ...]], ...]
 
     def requests(self, credentials: Credentials, number: int) -> list[Request]:
-        """Return `number` requests with credentials, the sets of values in rotation."""
+        """Return `number` requests, the sets of values in rotation.
+
+        Args:
+            credentials: those that are the same in each request; answers to challenges are added when it is sent.
+            number: how many.
+        """
         good = Declared(self.responses)
         made = [Request(credentials.revealed(each), good) for each in self.octets]
         return [made[place % len(made)] for place in range(number)]

@@ -68,13 +68,10 @@ class Robot:
         return context
 
     @cached_property
-    def _secrets(self) -> Credentials:
-        return Credentials(self.credentials)
-
-    @property
     def digest(self) -> Credentials | None:
-        """Return what answers the robot's challenges, or None without digest authentication."""
-        return self._secrets if any(item.kind is Kind.DIGEST for item in self.credentials) else None
+        """Return what answers the robot's challenges, for all connections; None without digest authentication."""
+        found = tuple(item for item in self.credentials if item.kind is Kind.DIGEST)
+        return Credentials(found) if found else None
 
     def _described(self, operation: str) -> Described | None:
         return next((each for each in self.described if each.name == operation), None)
@@ -127,7 +124,8 @@ class Robot:
             return []
         described = self._described(operation)
         if described is not None:
-            return described.requests(self._secrets, VARIANTS)
+            fixed = (item for item in self.credentials if item.kind is not Kind.DIGEST)
+            return described.requests(Credentials(tuple(fixed)), VARIANTS)
         if interface == "rosbridge":  # its own values: it must not take another interface's delivery for its echo
             return [*bridge_requests(variants(operation, seed + 1), self.delivery_topic)]
         endpoint = Endpoint.parse(address)

@@ -68,9 +68,9 @@ def _listing(device: Device, operations: Collection[Operation]) -> list[Operatio
 def _described(surveyor: Surveyor, operation: Operation) -> Described:
     """Return an operation with a request for each set of values that the device accepts; with one, if it acts."""
     label = operation.label
-    if label in surveyor.api.streams:
-        raise SettingsError(f"{label} cannot be measured by requests: {_STREAM}")
     probes = [each for each in surveyor.probes if each.operation == label]
+    if any(each.exchange is not None and each.exchange.response.cut for each in probes):
+        raise SettingsError(f"{label} cannot be measured by requests: {_STREAM}")
     if operation.safe:
         tried = surveyor.usual[label]
         others = [each for each in usual_inputs(operation, surveyor.values) if each != tried]

@@ -8,7 +8,7 @@ from typing import Any, Self
 from conformance.api.rest.stops import send_stops
 from conformance.documents.description import is_url
 from conformance.packs.table1.statement import Load, Statement
-from loadtests.described.device import Device, Named
+from loadtests.described.device import DESCRIBED_ONLY, Device, Named
 from loadtests.described.operations import chosen, named_alike
 from loadtests.described.requests import robot_of
 from loadtests.settings.cli_options import CliOptions
@@ -17,11 +17,6 @@ from loadtests.settings.settings import Selection, Settings
 from loadtests.settings.settle import settle
 from loadtests.settings.target import Target
 
-#: Options, by their names in Python, that a device with a description alone has.
-DESCRIBED_ONLY = (
-    "openapi", "wsdl", "overlays", "base_url", "allow", "never", "basic_file", "digest_file", "api_key", "api_key_file",
-    "headers_file", "client_cert_file", "client_key_file",
-)  # fmt: skip
 _PAPERS_ONLY = (
     "publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint", "rosbridge", "end_to_end",
     "ros_domain_id", "thresholds", "against_publishers_wsdl", "against_subscribers_wsdl",
@@ -125,7 +120,10 @@ def _same(other: Device, weights: Mapping[Any, int]) -> dict[Any, int]:
     Raises:
         SettingsError: it lacks one, or does not allow it.
     """
-    return chosen(other, [f"{each.label}={weight}" for each, weight in weights.items()]).weights
+    try:
+        return chosen(other, [f"{each.label}={weight}" for each, weight in weights.items()]).weights
+    except SettingsError as error:
+        raise SettingsError(f"--against: {error}") from None
 
 
 def _statement(device: Device) -> Statement:

@@ -3,10 +3,12 @@
 import json
 import urllib.request
 
+import msgspec
 import pytest
 from toy_api import PASSWORD, TOKEN, USER
 
 from loadtests.clients.endpoint import Endpoint
+from loadtests.clients.robot import Robot
 from loadtests.clients.wire import Connection
 from loadtests.described.device import CREDENTIALS, Device, Named, secrets_of
 from loadtests.described.operations import chosen
@@ -24,6 +26,11 @@ def robot_at(port, options):
     return robot_of(device, list(chosen(device, ["GET /state"]).weights))
 
 
+def as_another_process_has_it(robot):
+    """The process that measures gets the robot as JSON, and no challenge with it."""
+    return msgspec.json.decode(msgspec.json.encode(robot), type=Robot)
+
+
 @pytest.mark.parametrize(
     ("kind", "option", "content"),
     [
@@ -37,7 +44,7 @@ def test_each_credential_is_sent(started, tmp_path, kind, option, content):
     _, port = started("toy_api.py", "--auth", kind)
     file = tmp_path / "secret"
     file.write_text(content)
-    robot = robot_at(port, {option: str(file)})
+    robot = as_another_process_has_it(robot_at(port, {option: str(file)}))
     findings = preflight(robot, NAMES, 1)
     assert findings.failures == {}
     assert content not in repr(robot)
@@ -51,7 +58,7 @@ def test_a_challenge_of_digest_authentication_is_answered_once_for_all_connectio
     _, port = started("toy_api.py", "--auth", "digest")
     file = tmp_path / "secret"
     file.write_text(f"{USER}:{PASSWORD}")
-    robot = robot_at(port, {"digest_file": str(file)})
+    robot = as_another_process_has_it(robot_at(port, {"digest_file": str(file)}))
     (request, *_) = robot.requests("rest", "GET /state", 1)
     before = refusals(port)
     for _ in range(3):
@@ -59,7 +66,7 @@ def test_a_challenge_of_digest_authentication_is_answered_once_for_all_connectio
         answers = [connection.call(request).status for _ in range(2)]
         connection.close()
         assert answers == [200, 200]
-    assert refusals(port) == before, "one challenge serves all connections of a process"
+    assert refusals(port) == before + 1, "one challenge serves all connections of a process"
 
 
 def refusals(port):

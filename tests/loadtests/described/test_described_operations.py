@@ -11,7 +11,7 @@ from loadtests.cli import load
 from loadtests.clients.failures import CallError, Declared
 from loadtests.clients.robot import Secrets, with_secrets
 from loadtests.described import operations, run
-from loadtests.described.device import Device, Named
+from loadtests.described.device import DESCRIBED_ONLY, Device, Named
 from loadtests.described.operations import chosen, named_alike
 from loadtests.described.requests import robot_of
 from loadtests.schedule.rotation import rotation, turns_of_all
@@ -19,7 +19,7 @@ from loadtests.settings.errors import SettingsError
 from loadtests.settings.settings import Selection
 from loadtests.settings.target import Target
 
-NONE = dict.fromkeys([*run.DESCRIBED_ONLY, *run._PAPERS_ONLY, "rest", "timeout_s", "token_file", "ca_file"])  # noqa: SLF001
+NONE = dict.fromkeys([*DESCRIBED_ONLY, *run._PAPERS_ONLY, "rest", "timeout_s", "token_file", "ca_file"])  # noqa: SLF001
 OPTIONS = {**NONE, "overlays": (), "allow": (), "never": (), "allow_motion": False}
 
 
