@@ -164,6 +164,14 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
 @click.option("--knee-searches", type=click.IntRange(1, 50), default=KNEE_SEARCHES, help="How often to search for it.")
 @click.option("--connections", callback=_COUNTS, metavar="N,N,…", help="Then keep this many connections busy.")
 @click.option("--step-duration", "step_s", type=float, default=STEP_S, help="Seconds of each step, for each interface.")
+@click.option(
+    "--stream",
+    "streams",
+    multiple=True,
+    metavar="NAME|URL",
+    help="Also listen to this stream: an operation that sends events, or a WebSocket (ws://…); repeatable.",
+)
+@click.option("--stamp-field", metavar="POINTER", help="Where a message has its time, such as /header/stamp.")
 @click.option("--end-to-end", is_flag=True, help="Also measure the time until the robot's application has a delivery.")
 @click.option("--ros-domain-id", type=click.IntRange(0, 232), help="The robot's ROS domain, for --end-to-end.")
 @click.option("--thresholds", type=_FILE, help="TOML file of [[threshold]] tables.")
@@ -230,7 +238,7 @@ def _papers_robot(statement: Path | None, options: dict[str, Any]) -> Settings:
     """
     given = [name for name in DESCRIBED_ONLY if options.pop(name)]
     if given:
-        option = given[0].removesuffix("s" if given[0] == "overlays" else "").replace("_", "-")
+        option = given[0].removesuffix("s" if given[0] in {"overlays", "streams"} else "").replace("_", "-")
         raise SettingsError(
             f"--{'call' if option == 'allow' else option} is for a device with a description: name that as well, as in "
             "roaas load http://robot:8000/openapi.json"

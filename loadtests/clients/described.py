@@ -37,3 +37,20 @@ class Described:
         good = Declared(self.responses)
         made = [Request(credentials.revealed(each), good) for each in self.octets]
         return [made[place % len(made)] for place in range(number)]
+
+
+@dataclass(frozen=True)
+class Stream:
+    """A stream to listen to.
+
+    Attributes:
+        name: method and path of the operation, or the WebSocket's URL.
+        kind: `sse` or `websocket`.
+        url: where it is.
+        octets: the request, with shell variables for credentials; empty for a WebSocket.
+    """
+
+    name: str
+    kind: str
+    url: str
+    octets: bytes = b""

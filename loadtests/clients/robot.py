@@ -62,6 +62,10 @@ class Robot:
         addresses = (self.rest, self.publishers, self.subscribers, self.rosbridge)
         if not any(address and address.startswith(("https:", "wss:")) for address in addresses):
             return None
+        return self.context()
+
+    def context(self) -> Any:
+        """Return a new TLS context for this robot."""
         context = tls_context(Path(self.ca_file) if self.ca_file else None)
         if self.certificate is not None:
             context.load_cert_chain(*self.certificate)
@@ -72,6 +76,11 @@ class Robot:
         """Return what answers the robot's challenges, for all connections; None without digest authentication."""
         found = tuple(item for item in self.credentials if item.kind is Kind.DIGEST)
         return Credentials(found) if found else None
+
+    @cached_property
+    def fixed(self) -> Credentials:
+        """Return the credentials that are the same in each request."""
+        return Credentials(tuple(item for item in self.credentials if item.kind is not Kind.DIGEST))
 
     def _described(self, operation: str) -> Described | None:
         return next((each for each in self.described if each.name == operation), None)
@@ -124,8 +133,7 @@ class Robot:
             return []
         described = self._described(operation)
         if described is not None:
-            fixed = (item for item in self.credentials if item.kind is not Kind.DIGEST)
-            return described.requests(Credentials(tuple(fixed)), VARIANTS)
+            return described.requests(self.fixed, VARIANTS)
         if interface == "rosbridge":  # its own values: it must not take another interface's delivery for its echo
             return [*bridge_requests(variants(operation, seed + 1), self.delivery_topic)]
         endpoint = Endpoint.parse(address)

@@ -76,7 +76,7 @@ def _described(surveyor: Surveyor, operation: Operation) -> Described:
         others = [each for each in usual_inputs(operation, surveyor.values) if each != tried]
         probes += [surveyor.send(operation, Variation(Kind.USUAL, "", "", each)) for each in others]
     good = [each for each in probes if each.ok] if operation.safe else [each for each in probes if each.ok][:1]
-    octets = dict.fromkeys(_octets(each) for each in good or probes[:1])
+    octets = dict.fromkeys(octets_of(each) for each in good or probes[:1])
     return Described(
         name=label,
         method=operation.method,
@@ -86,7 +86,7 @@ def _described(surveyor: Surveyor, operation: Operation) -> Described:
     )
 
 
-def _octets(probe: Probe) -> bytes:
+def octets_of(probe: Probe) -> bytes:
     """Return the bytes of a request that was sent, with variables in place of credentials."""
     request: Request = probe.attempt.request
     fields = [pair for pair in request.headers if pair[0] != "Connection"]

@@ -11,9 +11,10 @@ from conformance.packs.table1.statement import Load, Statement
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
 from loadtests.described.operations import chosen, named_alike
 from loadtests.described.requests import robot_of
+from loadtests.described.streams import checked_pointer, streams_of
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.errors import SettingsError
-from loadtests.settings.settings import Selection, Settings
+from loadtests.settings.settings import Selection, Settings, Streams
 from loadtests.settings.settle import settle
 from loadtests.settings.target import Target
 
@@ -84,6 +85,7 @@ class Described:
             description=self.source if is_url(self.source) else Path(self.source).name,
             slo={name: level for name, level in levels.items() if name in names},
             notes=(*device.remarks, *operations.notes),
+            streams=Streams(streams_of(device, options["streams"]), checked_pointer(options["stamp_field"])),
         )
         unmeasured = [name for name in levels if name not in names]
         if unmeasured:

@@ -31,6 +31,7 @@ from loadtests.measuring.preflight import preflight
 from loadtests.measuring.restart import start_anew
 from loadtests.measuring.rising_load import RisingLoad
 from loadtests.measuring.robot_process import RobotProcess
+from loadtests.measuring.streams import hear
 from loadtests.result.document import compose
 from loadtests.result.files import write
 from loadtests.result.outcome import Carried, Outcome, RunAborted
@@ -155,6 +156,7 @@ class Run:
                 lambda: self.outcome.interrupted,
             )
             self._follow_deliveries()
+            self.outcome.heard = hear(self.robots[0], settings, lambda: self._over, tell)
             if settings.steps.asked and not self._over:
                 self._load_more(plan, executor)
 

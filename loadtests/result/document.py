@@ -15,13 +15,24 @@ from loadtests.measuring.environment import describe
 from loadtests.measuring.machine import Moment, conditions
 from loadtests.measuring.pauses import PAUSE_S, Paused
 from loadtests.measuring.preflight import Findings
+from loadtests.measuring.robot_process import same_machine
 from loadtests.result.files import FORMAT
 from loadtests.result.outcome import Outcome, RunAborted
 from loadtests.result.processes import process_figures
 from loadtests.schedule.arrivals import arrivals_due
 from loadtests.schedule.plan import GAP_S, Plan, step_operation
 from loadtests.settings.settings import Settings
-from loadtests.statistics import end_to_end, figures, modes, over_time, service_levels, steps, threshold, verdict
+from loadtests.statistics import (
+    end_to_end,
+    figures,
+    modes,
+    over_time,
+    service_levels,
+    steps,
+    streams,
+    threshold,
+    verdict,
+)
 from loadtests.statistics.against import EXIT_CODES, Against, against
 from loadtests.statistics.between_runs import between_runs
 from loadtests.statistics.comparisons import AaControl, aa_controls, further_interfaces, soap_over_rest
@@ -55,7 +66,11 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     comparisons = soap_over_rest(measured, deviation)
     reasons, notes = ([str(aborted)], []) if aborted else verdict.invalid_because(generator, plan, pacing, spoilt)
     reasons = _endings(outcome, plan) + reasons + outcome.invalid
-    undecided = [] if aborted or reasons else _undecided(settings, generator) + verdict.says_nothing(comparisons)
+    undecided = (
+        []
+        if aborted or reasons
+        else [*_undecided(settings, generator), *verdict.says_nothing(comparisons), *_silent(outcome)]
+    )
     workers, losses = process_figures(executor.members if executor else [])
     judged = [] if aborted else threshold.judge(measured, settings.thresholds)
     controls = aa_controls(measured)
@@ -102,6 +117,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "noise_floor": controls,
         "further_interfaces": further_interfaces(measured),
         **_end_to_end(outcome),
+        "streams": _streams(outcome),
         **({"against": compared} if compared else {}),
         "time_series": over_time.time_series(measured),
         "blocks": over_time.blocks(measured),
@@ -182,6 +198,21 @@ def _end_to_end(outcome: Outcome) -> dict[str, Any]:
         int(LOST_S * 1e9),
     )
     return {"end_to_end": {"domain_id": settings.domain_id, "topic": outcome.robots[0].delivery_topic, "ways": ways}}
+
+
+def _streams(outcome: Outcome) -> list[dict[str, Any]]:
+    """Return the `streams`: what came over each stream, and by polling beside them."""
+    clock = "shared" if same_machine(outcome.robots[0]) else "not known"
+    return [
+        {"name": one.name, "kind": one.kind, "clock": clock, "error": one.error}
+        | streams.stream_figures(one.moments_ns, one.ages_ms, one.listened_s)
+        for one in outcome.heard
+    ]
+
+
+def _silent(outcome: Outcome) -> list[str]:
+    """Return which streams could not be listened to for the whole time."""
+    return [f"{one.name} ({one.kind}): {one.error}" for one in outcome.heard if one.error]
 
 
 class Reasons(NamedTuple):

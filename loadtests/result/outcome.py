@@ -11,6 +11,7 @@ from loadtests.measuring.machine import Moment
 from loadtests.measuring.pauses import Paused
 from loadtests.measuring.preflight import Findings
 from loadtests.measuring.robot_process import RobotProcess
+from loadtests.measuring.streams import Heard
 from loadtests.schedule.plan import Plan, SeriesName
 from loadtests.settings.settings import Settings
 from loadtests.statistics.steps import Step
@@ -49,6 +50,7 @@ class Outcome:
         steps: results of the stepped load.
         knee_searches: results of the searches for the knee; over_connections: of more and more connections.
         journeys: deliveries from the request to the application, by way.
+        heard: what came over each stream.
     """
 
     settings: Settings
@@ -69,3 +71,4 @@ class Outcome:
     knee_searches: list[dict[str, Any]] = field(default_factory=list)
     over_connections: list[dict[str, Any]] = field(default_factory=list)
     journeys: dict[str, Journeys] = field(default_factory=dict)
+    heard: list[Heard] = field(default_factory=list)

@@ -41,6 +41,7 @@ def summary(document: dict[str, Any]) -> str:
     for entry in document["thresholds"]:
         reason = f": {entry['reason']}" if entry["reason"] else ""
         lines.append(f"threshold {entry['outcome']}: {entry['name']}{reason}")
+    lines += _streams(document["streams"])
     lines += [
         f"service level {entry['outcome']}: {entry['operation']} over {entry['interface']}, {entry['limit']} at most "
         f"{entry['most']:g}: {entry['reason']}"
@@ -103,6 +104,22 @@ def _against(compared: dict[str, Any] | None) -> list[str]:
             f"{entry['operation']} over {entry['interface']} ({entry['client']}): {_times(entry)} "
             f"as long as the other robot at {entry['quantile']}, {entry['difference_ms']:+.3f} ms: {entry['verdict']}"
         )
+    return lines
+
+
+def _streams(found: list[dict[str, Any]]) -> list[str]:
+    """Return how often each stream had a message, and how old its data was."""
+    lines = []
+    for entry in found:
+        intervals, ages = entry["interval_ms"], entry["age_ms"]
+        often = (
+            f"one every {intervals['p50']:.3f} ms at the median, jitter {entry['jitter_ms']:.3f} ms, "
+            f"{entry['gaps']['count']} gaps, longest interval {intervals['max']:.3f} ms"
+            if intervals
+            else "too few for intervals"
+        )
+        old = f"; data {ages['p50']:.3f} ms old at the median, {ages['max']:.3f} at most" if ages else ""
+        lines.append(f"{entry['name']} ({entry['kind']}): {entry['messages']} messages, {often}{old}")
     return lines
 
 

@@ -7,6 +7,7 @@ import msgspec
 
 from conformance.packs.table1.thresholds import Threshold
 from conformance.statement.load import ServiceLevel
+from loadtests.clients.described import Stream
 from loadtests.clients.robot import Robot
 from loadtests.schedule.plan import Load
 
@@ -113,6 +114,14 @@ class EndToEnd:
 
 
 @dataclass(frozen=True)
+class Streams:
+    """The streams to listen to after the comparison, and the JSON pointer to the stamp in a message (RFC 6901)."""
+
+    listen: tuple[Stream, ...] = ()
+    stamp: str | None = None
+
+
+@dataclass(frozen=True)
 class Against:
     """The robot to compare with, and the share by which the robot under load may be slower."""
 
@@ -132,6 +141,7 @@ class Settings:
         slo: the service levels of the operations that are measured.
         description: URL or name of the description that the operations come from; None for the paper's robot.
         notes: what the result should say of the choice of operations.
+        streams: what to listen to.
     """
 
     robot: Robot
@@ -148,6 +158,7 @@ class Settings:
     slo: dict[str, ServiceLevel] = field(default_factory=dict)
     description: str | None = None
     notes: tuple[str, ...] = ()
+    streams: Streams = field(default_factory=Streams)
 
     def to_json(self) -> str:
         """Return the settings for the process that measures."""

@@ -69,6 +69,7 @@ def settle(options: CliOptions, statement: Statement, target: Target | None = No
         slo=target.slo,
         description=target.description,
         notes=target.notes,
+        streams=target.streams,
     )
     return settings if options.against is None else _compared(settings, options.against, target, options.tolerance)
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from conformance.statement.load import ServiceLevel
 from loadtests.clients.robot import Robot
-from loadtests.settings.settings import Selection
+from loadtests.settings.settings import Selection, Streams
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,7 @@ class Target:
         description: where the description is from; None for the paper's robot.
         slo: the service levels of the operations, by their names.
         notes: what the result should say of the choice.
+        streams: what to listen to.
     """
 
     robot: Robot
@@ -30,6 +31,7 @@ class Target:
     description: str | None = None
     slo: dict[str, ServiceLevel] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    streams: Streams = field(default_factory=Streams)
 
     @property
     def rate_of_levels(self) -> float | None:

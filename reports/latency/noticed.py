@@ -27,7 +27,7 @@ def noticed(result: Mapping[str, Any]) -> list[str]:
     lines = [sentence for one in told[:_MOST] for sentence in _of_series(one, result)]
     if len(told) > _MOST:
         lines.append(f"The other {len(told) - _MOST} are faster than these.")
-    return [*lines, *_limits(result, any(one["errors"] for one in told))]
+    return [*lines, *_of_streams(result), *_limits(result, any(one["errors"] for one in told))]
 
 
 def _tail(one: Mapping[str, Any]) -> tuple[str, float]:
@@ -69,6 +69,19 @@ def _of_series(one: Mapping[str, Any], result: Mapping[str, Any]) -> Iterator[st
     if failed:
         total = one["count"] + failed
         yield f"{name}: {failed:,} of {total:,} requests failed{_how_often(failed / total, result, one)}."
+
+
+def _of_streams(result: Mapping[str, Any]) -> Iterator[str]:
+    """Yield how old the data is that a display shows, for each stream and for polling beside it."""
+    for one in result.get("streams", []):
+        ages, intervals = one["age_ms"], one["interval_ms"]
+        if ages and intervals:
+            how = "polled" if one["kind"] == "polling" else "streamed"
+            yield (
+                f"{excerpt(one['name'], 100)}, {how}: the data is {ms(ages['p50'])} ms old when it comes "
+                f"({ms(ages['max'])} ms at most), and a display that shows it until the next shows data that is up to "
+                f"{ms(ages['max'] + intervals['max'])} ms old."
+            )
 
 
 def _round(value: float) -> float:

@@ -8,7 +8,7 @@ from lxml import etree
 
 from reports.latency.junit import latency_junit
 from reports.latency.noticed import noticed
-from reports.latency.page import latency_html
+from reports.latency.page import latency_html, latency_markdown
 
 SHORT = "--rate 200 --duration 1 --warmup 0.1"
 
@@ -100,13 +100,27 @@ def test_what_the_description_does_not_declare_fails(device, load):
 def test_a_slower_device_takes_turns_with_it(device, load):
     url, other = device(), device("--slow", "0.02")
     run = load(
-        f"{url}/openapi.json", "--operation", "readState", "--against", other, "--rate 60 --duration 2 --warmup 0.1"
+        f"{url}/openapi.json",
+        "--operation readState --rate 60 --duration 2 --warmup 0.1 --against",
+        other,
+        "--stream 'GET /events' --stamp-field /stamp",
     )
     result = run.result
     assert result["against"]["robot"]["rest"] == other
     assert (run.code, result["against"]["verdict"]) == (0, "not slower"), run.out + run.err
     changes = [each for each in result["against"]["changes"] if each["quantile"] == "p50"]
     assert [each["operation"] for each in changes] == ["GET /state"]
+    heard, polled = result["streams"]
+    assert (heard["name"], heard["kind"], polled["name"], polled["kind"]) == (
+        "GET /events",
+        "sse",
+        "GET /state",
+        "polling",
+    )
+    assert heard["messages"] == heard["stamped"] > 20
+    assert heard["clock"] == "shared"
+    assert "GET /events, streamed: the data is" in latency_html(result)
+    assert "GET /events (sse)" in latency_markdown(result)
 
 
 def test_nobody_there_is_said_before_the_run(load, free_port):

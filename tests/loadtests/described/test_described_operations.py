@@ -14,6 +14,7 @@ from loadtests.described import operations, run
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
 from loadtests.described.operations import chosen, named_alike
 from loadtests.described.requests import robot_of
+from loadtests.described.streams import checked_pointer, streams_of
 from loadtests.schedule.rotation import rotation, turns_of_all
 from loadtests.settings.errors import SettingsError
 from loadtests.settings.settings import Selection
@@ -164,6 +165,22 @@ def test_a_stream_is_no_request(device):
         robot_of(opened, list(chosen(opened, ["GET /events"]).weights))
 
 
+def test_streams_are_operations_and_websockets(device):
+    opened = device()
+    found = streams_of(opened, ["GET /events", "ws://127.0.0.1:9/state"])
+    assert [(each.name, each.kind) for each in found] == [
+        ("GET /events", "sse"),
+        ("ws://127.0.0.1:9/state", "websocket"),
+    ]
+    assert found[0].octets.startswith(b"GET /events HTTP/1.1\r\n")
+    with pytest.raises(SettingsError, match="no operation 'GET /event'"):
+        streams_of(opened, ["GET /event"])
+    with pytest.raises(SettingsError, match="--stream: 'ws://' names no host"):
+        streams_of(opened, ["ws://"])
+    with pytest.raises(SettingsError, match="a pointer is written /header/stamp"):
+        checked_pointer("header.stamp")
+
+
 def test_secrets_stand_in_requests_only_where_they_are_sent(device, tmp_path):
     file = tmp_path / "key"
     file.write_text("t0ken-of-robot")
@@ -208,6 +225,7 @@ def test_a_rotation_spreads_the_calls_of_each_operation():
     ("words", "message"),
     [
         ("--basic-file {0} --rest http://127.0.0.1:9", "--basic-file is for a device with a description"),
+        ("--stream ws://127.0.0.1:9 --rest http://127.0.0.1:9", "--stream is for a device with a description"),
         ("--operation x --rest http://127.0.0.1:9", "--operation 'x' is not one of delivery, coffee, pose"),
         ("http://127.0.0.1:9/a.json --client zeep", "measured over REST, with the client wire"),
         ("http://127.0.0.1:9/a.json --thresholds {0}", "its service levels are in the statement's [slo]"),
