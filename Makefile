@@ -9,17 +9,28 @@ WORKERS ?= $(shell echo $$(($$(nproc) + 2)))
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' 2>/dev/null && command -v $$p && break; done)
 INTERFACES := $(addprefix reference_robot/interfaces/,mybot_delivery_app nav2_msgs tf2_msgs)
-INTERFACE_FILES := $(shell find reference_robot/interfaces -type f -not -path '*/build/*')
+INTERFACE_FILES := $(sort $(shell find reference_robot/interfaces -type f -not -path '*/build/*'))
+# What `make demo` needs; the tools for tests and lint come with the others.
+DEMO := '.[load,robot,ros]'
+DEV := '.[load,robot,ros,dev]'
+# uv installs in seconds what takes pip minutes. It is used where it is there or can be had, and pip where it fails.
+UV = $(shell command -v uv || command -v $(BIN)/uv)
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+installed = $(if $(UV),$(UV) pip install --quiet --python $(BIN)/python $(1) ||) $(PIP) install $(1)
+built = $(if $(UV),$(UV) build --quiet --wheel --python $(BIN)/python --out-dir $(2) $(1) ||) $(PIP) wheel --no-deps --wheel-dir $(2) $(1)
+# The wheels of the interface packages, for all clones: by their sources and the Python that they are for.
+WHEELS = $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/roaas/interfaces/$(shell { sha256sum $(INTERFACE_FILES); \
+	$(BIN)/python -c 'import sysconfig; print(sysconfig.get_config_var("SOABI"))'; } | sha256sum | cut -c -16)
 
 .PHONY: help install demo test lint selftest coverage-page bench clean
 
 help:
 	@echo "make demo      set up, start the robot, certify it, measure it, leave the reports in $(OUT)/"
 	@echo "make test      set up, then lint, types and all tests"
-	@echo "make install   set up only: $(VENV) with the command roaas in it"
+	@echo "make install   set up only: $(VENV) with the command roaas in it, and the tools for tests"
 	@echo "make selftest  show that the suite kills mutants and has no false positives (about half an hour)"
 	@echo "make bench     print the benchmarks' ratios"
-	@echo "make clean     remove what the others made"
+	@echo "make clean     remove what the others made, except for the interface packages in the user's cache"
 
 install: $(VENV)/.installed
 
@@ -34,17 +45,29 @@ prerequisites:
 	@command -v c++ >/dev/null || \
 		{ echo "missing: a C++ compiler, to build the ROS interfaces (Debian, Ubuntu: apt install g++)" >&2; exit 2; }
 	@test "$$(uname -sm)" = "Linux x86_64" || \
-		{ echo "the robot runs on Linux x86-64 only (ROS 2 from PyPI); the suite alone runs anywhere: pip install '.[load]'" >&2; exit 2; }
+		{ echo "the robot runs on Linux x86-64 only (ROS 2 from PyPI); the suite alone runs anywhere: pip install '.[all]'" >&2; exit 2; }
 
-$(VENV)/.installed: pyproject.toml constraints.txt $(INTERFACE_FILES) | prerequisites
-	@echo "== setting up $(VENV) with $(PYTHON) (about two minutes)"
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[load,robot,ros,dev]'
-	@echo "== building the ROS 2 interface packages"
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps $(addprefix ./,$(INTERFACES))
+$(VENV)/.made: | prerequisites
+	@echo "== making $(VENV) with $(PYTHON)"
+	@$(PYTHON) -m venv $(VENV)
+	@test -n "$(UV)" || $(PIP) install uv || echo "without uv, the next steps take about three minutes"
 	@touch $@
 
-demo: install
+$(VENV)/.demo: pyproject.toml constraints.txt $(INTERFACE_FILES) | $(VENV)/.made
+	@echo "== installing what the demo needs"
+	@$(call installed,--constraint constraints.txt --editable $(DEMO))
+	@wheels='$(WHEELS)'; test -d "$$wheels" || { \
+		echo "== building the ROS 2 interface packages, which stay in $$wheels"; mkdir -p "$${wheels%/*}"; \
+		printf '%s\n' $(INTERFACES) | xargs -P 3 -I {} bash -c "$(call built,./{},'$$wheels.$$$$')" && mv -T "$$wheels.$$$$" "$$wheels"; }
+	@$(call installed,--no-deps --force-reinstall '$(WHEELS)'/*.whl)
+	@touch $@
+
+$(VENV)/.installed: $(VENV)/.demo
+	@echo "== installing the tools for tests and lint"
+	@$(call installed,--constraint constraints.txt --editable $(DEV))
+	@touch $@
+
+demo: $(VENV)/.demo
 	$(BIN)/python demo.py --out $(OUT)
 
 test: install browser servers lint

@@ -33,8 +33,7 @@ _COMMANDS = {
     "selftest": ("conformance.cli.selftest", "Test the suite: it must kill mutants, and must not fail a good device."),
     "contract": ("conformance.cli.contract", "Show the requirements, export the contract's files."),
 }
-_EXTRAS = {"robot", "load"}  # commands that need the optional dependencies of the same name
-_ROOMS = {"conformance", "loadtests", "reference_robot", "reports"}
+_EXTRAS = {"load"}  # commands that need the optional dependencies of the same name
 _INSTALLED = Path(__file__).with_name("roaas_rooms")
 
 
@@ -67,20 +66,27 @@ class _Rooms(click.Group):
         if cmd_name not in _COMMANDS:
             return None
         open_rooms()
+        if cmd_name in _EXTRAS:
+            extras = import_module("conformance.commandline.extras")
+            problem = extras.lacking(cmd_name, f"'roaas {cmd_name}'")
+            if problem:
+                raise click.UsageError(problem, ctx)
         module, _ = _COMMANDS[cmd_name]
-        try:
-            command = getattr(import_module(module), cmd_name)
-        except ModuleNotFoundError as missing:
-            if cmd_name not in _EXTRAS or (missing.name or "").split(".")[0] in _ROOMS:
-                raise
-            raise click.UsageError(
-                f"'roaas {cmd_name}' needs the Python module {missing.name!r}, which is not installed: "
-                f"pip install 'roaas[{cmd_name}]'",
-                ctx,
-            ) from missing
+        command = getattr(import_module(module), cmd_name)
         if not isinstance(command, click.Command):
             raise TypeError(f"{module}.{cmd_name} is not a command")
         return command
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; name the extra that it lacks, if it turns out to need one, as the report of a load test."""
+        try:
+            return super().invoke(ctx)
+        except ModuleNotFoundError as missing:
+            extras = import_module("conformance.commandline.extras")
+            problem = extras.told(missing.name, f"'roaas {ctx.invoked_subcommand}'")
+            if problem is None:
+                raise
+            raise click.UsageError(problem) from missing
 
 
 class FrontDoor:
@@ -103,10 +109,10 @@ class FrontDoor:
         import_module("reports.rendering")
 
     @staticmethod
-    def render(written: Path, notary: Any = None) -> None:
-        """Write, and optionally sign, the reports for a result file, also after a failed or interrupted run."""
-        for path in import_module("reports.rendering").render(written.parent, notary):
-            click.echo(f"report: {path}")
+    def render(written: Path, notary: Any = None) -> list[Path]:
+        """Write the reports for a result file, sign it if there is a notary, and return the paths of the reports."""
+        reports: list[Path] = import_module("reports.rendering").render(written.parent, notary)
+        return reports
 
     @staticmethod
     def compare(old: Path, new: Path, threshold: float) -> int:
@@ -149,8 +155,13 @@ class FrontDoor:
         return known
 
 
-# All commands inherit how help is asked for and that it shows the defaults.
-_SETTINGS = {"help_option_names": ["-h", "--help"], "show_default": True, "obj": FrontDoor()}
+# All commands inherit how help is asked for, that it shows the defaults, and whether there are colours (no-color.org).
+_SETTINGS = {
+    "help_option_names": ["-h", "--help"],
+    "show_default": True,
+    "obj": FrontDoor(),
+    "color": False if os.environ.get("NO_COLOR") else None,
+}
 
 
 @click.command(cls=_Rooms, context_settings=_SETTINGS)

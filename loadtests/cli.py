@@ -1,7 +1,6 @@
 """`roaas load`: the options, and the process that does the measuring."""
 
 import os
-import shlex
 import signal
 import subprocess
 import sys
@@ -17,13 +16,13 @@ import click
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, ResultCommand
+from conformance.commandline.without_folders import command_without_folders
 from conformance.contract.toml_file import TomlFileError
 from conformance.packs.table1.statement import Statement, load_robot_statement
 from conformance.packs.table1.thresholds import load_thresholds
 from conformance.statement.endpoints import Endpoints
 from loadtests.clients.failures import CallError
 from loadtests.described.device import DESCRIBED_ONLY, Named
-from loadtests.measuring.command_line import without_folders
 from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest, store
 from loadtests.schedule.plan import CLIENTS, INTERFACES
 from loadtests.settings.cli_options import KNEE_SEARCHES, CliOptions
@@ -32,6 +31,8 @@ from loadtests.settings.settings import STEP_S, Settings
 from loadtests.settings.settle import DEFAULT_DURATION_S, DEFAULT_RATE, DEFAULT_WARMUP_S, settle
 
 DEFAULT_OUT = "out"  # as `roaas certify` does
+#: Options whose values look like files, and are none.
+_NO_FILES = ("--operation", "--call", "--never", "--stream", "--stamp-field")
 #: Threads of NumPy's linear algebra wait for one another by spinning, ten times as long on a busy machine.
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 _FILE = click.Path(path_type=Path)
@@ -289,7 +290,7 @@ class _Baselines:
 
 def _command_line() -> str:
     """Return the command line without the folders of this machine."""
-    return shlex.join(["roaas", *map(without_folders, sys.argv[1:])])
+    return command_without_folders(sys.argv[1:], _NO_FILES)
 
 
 def _make_folder(folder: Path) -> None:

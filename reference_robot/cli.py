@@ -17,7 +17,8 @@ _PORT: Final = click.IntRange(0, 65535)
 
 # Modules that the robot imports, and how to install them.
 _NEEDED: Final = {
-    "rclpy": "ROS 2 Jazzy: pip install 'roaas[ros]', or apt's ros-jazzy-rclpy and `source /opt/ros/jazzy/setup.bash`",
+    "rclpy": "ROS 2 Jazzy: pip install 'roaas[robot,ros]', "
+    "or apt's ros-jazzy-rclpy and `source /opt/ros/jazzy/setup.bash`",
     "mybot_delivery_app.msg": "the interface package: pip install reference_robot/interfaces/mybot_delivery_app",
     "nav2_msgs.action": "the interface package: pip install reference_robot/interfaces/nav2_msgs, "
     "or apt's ros-jazzy-nav2-msgs",

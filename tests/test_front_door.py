@@ -9,6 +9,7 @@ import click
 import psutil
 import pytest
 from click.testing import CliRunner
+from processes import ended
 
 import roaas
 from conformance.commandline.exit_codes import ExitCode
@@ -51,6 +52,27 @@ def test_a_file_that_the_command_did_not_write_is_not_rendered(tmp_path, rendere
 
     assert run(callback) == ExitCode.UNREACHABLE
     assert rendered == []
+
+
+def test_help_imports_click_and_nothing_else_that_is_installed():
+    script = (
+        "import sys; before = set(sys.modules); import roaas; roaas.main(['--help'], standalone_mode=False);"
+        "new = {name.partition('.')[0] for name in set(sys.modules) - before};"
+        "print(*new - sys.stdlib_module_names, file=sys.stderr)"
+    )
+    done = ended(sys.executable, "-c", script)
+    assert set(done.stderr.split()) == {"roaas", "click"}
+
+
+@pytest.mark.parametrize(("value", "colour"), [("", True), ("1", False)])
+def test_no_color_is_kept_on_a_terminal_as_well(value, colour):
+    script = (
+        "import click, roaas; roaas.main.callback = None; roaas.main.add_command(click.Command('x',"
+        "callback=lambda: print(click.get_current_context().color)));"
+        "roaas.main.get_command = lambda _, name: roaas.main.commands[name]; roaas.main(['x'])"
+    )
+    done = ended(sys.executable, "-c", script, env=os.environ | {"NO_COLOR": value})
+    assert done.stdout.strip() == ("None" if colour else "False")
 
 
 def test_wrong_usage_renders_nothing(rendered):

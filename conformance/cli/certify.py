@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import shlex
 import signal
 import sys
 from pathlib import Path
@@ -19,6 +18,7 @@ from conformance.cli.summary import print_summary
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, FrontDoor, ResultCommand
+from conformance.commandline.without_folders import command_without_folders
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.contract.places import places
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
 _POSITIVE = click.FloatRange(min=0, min_open=True)
 _FILE = click.Path(exists=True, dir_okay=False)
-# So many more objects than were given back make Python look for garbage.
-_OBJECTS = 20_000
 
 
 @click.command(cls=ResultCommand)
@@ -100,6 +98,14 @@ _OBJECTS = 20_000
     "--parallel", type=click.IntRange(min=1), metavar="N", help="With --fleet: at most N robots at once.  [default: 4]"
 )
 @click.option("--sign", "key", type=_FILE, metavar="KEY", help="Sign the result with this private key.")
+@click.option(
+    "--progress",
+    type=click.Choice(["auto", "lines", "none"]),
+    default="auto",
+    help="What is written to stderr: auto is a bar on a terminal, and lines elsewhere.",
+)
+@click.option("--quiet", "-q", "progress", flag_value="none", help="The same as --progress none.")
+@click.option("--json", "as_json", is_flag=True, help="Print result.json to stdout in place of the summary.")
 @click.option("--force", is_flag=True, help="With --init: overwrite STATEMENT.")
 @click.pass_obj
 def certify(door: FrontDoor, /, targets: tuple[str, ...], **options: Any) -> CommandResult:
@@ -116,6 +122,8 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **options: Any) -> Com
     """
     # A terminated run still stops the robot and writes what it has.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    if options["as_json"] and (options["plan"] or options["init"]):
+        raise click.UsageError("--json prints the result of a run, and --plan and --init have none: give one of them")
     if options["fleet"]:
         from conformance.cli.certify_fleet import certify_fleet  # noqa: PLC0415 - one robot needs nothing of it
 
@@ -168,8 +176,11 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
     if options["plan"]:
         return _plan(chosen, options, contract)
     outcome = _certify(door, chosen, options, contract, statement)
-    print_summary(outcome)
-    return CommandResult(outcome.exit_code, outcome.path, notary)
+    if options["as_json"]:
+        click.echo(outcome.path.read_text(encoding="utf-8"), nl=False)
+    else:
+        print_summary(outcome)
+    return CommandResult(outcome.exit_code, outcome.path, notary, tell=not options["as_json"])
 
 
 def _plan(chosen: Statement, options: dict[str, Any], contract: Contract) -> CommandResult:
@@ -200,9 +211,9 @@ def _certify(
     from conformance.verdict.baseline import BaselineError, load_baseline  # noqa: PLC0415
     from conformance.verdict.run import Given  # noqa: PLC0415
 
-    # A run makes many objects that live for a moment, and few that are garbage in circles: looking for those less often
-    # than every 700 objects saves a twentieth of its processor time.
-    gc.set_threshold(_OBJECTS)
+    # A run makes many objects that live for a moment, and few that are garbage in circles: looking for those after
+    # 20,000 new objects instead of 700 saves a twentieth of its processor time.
+    gc.set_threshold(20_000)
     try:
         connection = connection_of(chosen.endpoints)
         if chosen.endpoints.ca_file:
@@ -221,9 +232,11 @@ def _certify(
     run.requirement_set, run.given = requirements, given
     run.prepare = door.prepare if door else None  # there is none where the command runs without roaas.py
     notes = (*options.get("remarks", ()), *_notes(run))
-    command = shlex.join(["roaas", *sys.argv[1:]])
+    command = command_without_folders(sys.argv[1:], ("--call", "--never"))
     robot, calls = RobotUnderTest(run, connection), tuple(told(*_rules(run))) if contract.described else ()
-    return judge(robot, options["out"], command=command, baseline=baseline, notes=notes, announced=calls)
+    progress, bar = None if options["progress"] == "none" else sys.stderr, options["progress"] == "auto"
+    said: dict[str, Any] = {"progress": progress, "bar": bar, "notes": notes, "announced": calls}
+    return judge(robot, options["out"], command=command, baseline=baseline, **said)
 
 
 def _run(chosen: Statement, options: dict[str, Any], contract: Contract) -> Run:

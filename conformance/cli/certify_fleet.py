@@ -23,7 +23,7 @@ _FOR_ALL = (
     "profile", "classes", "pack", "requirements", "effort", "minutes", "seed", "nonce", "timeout_s", "request_rate",
     "key",
 )  # fmt: skip
-_OWN = ("fleet", "parallel", "out", "allow_motion")
+_OWN = ("fleet", "parallel", "out", "allow_motion", "progress", "as_json")
 
 
 def certify_fleet(path: Path, options: dict[str, Any]) -> CommandResult:
@@ -67,7 +67,7 @@ def certify_fleet(path: Path, options: dict[str, Any]) -> CommandResult:
             write(results, interrupted=True)
 
     async def judge() -> tuple[list[MemberResult], bool]:
-        fleet = FleetRun(runs, parallel, sys.stderr, keep)
+        fleet = FleetRun(runs, parallel, None if options["progress"] == "none" else sys.stderr, keep)
         return await fleet.judge(), fleet.interrupted
 
     results, interrupted = asyncio.run(judge())
@@ -75,9 +75,12 @@ def certify_fleet(path: Path, options: dict[str, Any]) -> CommandResult:
         written = write(results, interrupted=interrupted)
     except OSError as error:
         raise click.UsageError(f"--out {options['out']}: {error}") from error
-    _print_summary(results)
-    click.echo(f"result: {written}")
-    return CommandResult(exit_code(results, interrupted=interrupted), written)
+    if options["as_json"]:
+        click.echo(written.read_text(encoding="utf-8"), nl=False)
+    else:
+        _print_summary(results)
+        click.echo(f"result: {written}")
+    return CommandResult(exit_code(results, interrupted=interrupted), written, tell=not options["as_json"])
 
 
 def _shared() -> list[str]:

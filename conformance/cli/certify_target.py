@@ -9,6 +9,8 @@ from typing import Any
 import click
 import msgspec
 
+from conformance.commandline.extras import lacking
+from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
 from conformance.documents.description import is_url
 from conformance.documents.openapi import operations_of
@@ -74,6 +76,8 @@ def _described(
     overlays = tuple(options["overlays"]) or (api.overlays if api else ())
     base_url = options["base_url"] or (api.base_url if api else None)
     soap = is_wsdl(source) or source in {options["wsdl"], api.wsdl if api else None}
+    if soap:
+        _check_soap()
     try:
         # Where an API key goes, the description may say, so that it is read without one.
         connection = connection_of(where if where.api_key else msgspec.structs.replace(where, api_key_file=None))
@@ -144,6 +148,8 @@ def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> 
             raise StatementError(f"{key.replace('_', '-')} {url!r} is no URL: it has to start with http:// or https://")
     if not where.interfaces:
         raise StatementError("no robot is named: give a STATEMENT, --rest, --publishers-wsdl or --subscribers-wsdl")
+    if {*where.interfaces} != {Interface.REST}:
+        _check_soap()
     claims = declared.claims
     if options["profile"] or options["classes"]:
         claims = _claims(options, contract)
@@ -153,6 +159,17 @@ def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> 
     if options["allow"] or options["never"]:
         calls = Calls((*calls.allow, *options["allow"]), (*calls.never, *options["never"]))
     return msgspec.structs.replace(declared, endpoints=where, claims=claims, calls=calls)
+
+
+def _check_soap() -> None:
+    """Check that the libraries are installed by which SOAP services are judged.
+
+    Raises:
+        click.UsageError: one is missing.
+    """
+    problem = lacking("soap", "judging a SOAP service")
+    if problem:
+        raise click.UsageError(problem)
 
 
 def _claims(options: dict[str, Any], contract: Contract) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from conformance.contract.classes import QUESTIONS
 if TYPE_CHECKING:
     from conformance.engine.certification import Certification
 
+_COLOURS = {"pass": "green", "fail": "red", "inconclusive": "yellow"}
 _MARKS = {"pass": "pass", "fail": "FAIL", "inconclusive": "inconclusive", "not-claimed": "not claimed"}
 # A device that is judged by its own description conforms to no contract.
 _SHOWN_CURL = 1000
@@ -32,7 +33,8 @@ def print_summary(outcome: Certification) -> None:
     for name, value in document["classes"].items():
         reason = document["class_reasons"].get(name, "")
         view = " (black box)" if document["class_views"].get(name) == "black box" else ""
-        click.echo(f"  {name + view:<30} {_MARKS[value]:<13}{inert(reason[:300])}".rstrip())
+        mark, blanks = click.style(_MARKS[value], fg=_COLOURS.get(value)), " " * (13 - len(_MARKS[value]))
+        click.echo(f"  {name + view:<30} {mark}{blanks}{inert(reason[:300])}".rstrip())
     by_id = {requirement["id"]: requirement for requirement in document["requirements"]}
     for topic, question in QUESTIONS.items():
         found = [(cause, by_id[cause["requirement"]]) for cause in document["causes"]]

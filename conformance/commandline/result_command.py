@@ -13,11 +13,13 @@ class CommandResult(NamedTuple):
         exit_code: exit code of the process.
         file: the result file that was written, or None.
         notary: the signer that the front door provided, or None.
+        tell: whether the names of the rendered pages are printed; not where stdout is for programs.
     """
 
     exit_code: int
     file: Path | None = None
     notary: Any = None
+    tell: bool = True
 
 
 class FrontDoor(Protocol):
@@ -29,8 +31,8 @@ class FrontDoor(Protocol):
     def prepare(self) -> None:
         """Load what render() needs, at a moment when nobody waits for it."""
 
-    def render(self, written: Path, notary: Any) -> None:
-        """Write the pages of a result file, and sign it if there is a signer."""
+    def render(self, written: Path, notary: Any) -> list[Path]:
+        """Write the pages of a result file, sign it if there is a signer, and return their paths."""
 
 
 class ResultCommand(click.Command):
@@ -47,5 +49,7 @@ class ResultCommand(click.Command):
         """
         result: CommandResult = super().invoke(ctx)
         if result.file is not None and ctx.obj is not None:
-            ctx.obj.render(result.file, result.notary)
+            for path in ctx.obj.render(result.file, result.notary):
+                if result.tell:
+                    click.echo(f"report: {path}")
         ctx.exit(result.exit_code)

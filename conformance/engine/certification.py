@@ -49,6 +49,7 @@ def certify(
     command: str = "",
     baseline: tuple[Expectation, ...] = (),
     progress: TextIO | None = sys.stderr,
+    bar: bool = False,
     notes: tuple[str, ...] = (),
     announced: tuple[str, ...] = (),
 ) -> Certification:
@@ -60,6 +61,7 @@ def certify(
         command: the command that repeats the run, for the result.
         baseline: expected failures.
         progress: stream for progress lines, or None.
+        bar: whether the progress of the checks is a bar instead of lines, if the stream is a terminal.
         notes: remarks for the result, which are printed as well.
         announced: what is printed and not among the remarks, because the result tells it elsewhere.
 
@@ -77,7 +79,7 @@ def certify(
                 # Of a robot that is not there, they would only hide that.
                 if progress is not None:
                     progress.writelines(f"{note}\n" for note in (*notes, *announced))
-                run.interrupted |= _run_checks(robot, progress, remarks, recordings)
+                run.interrupted |= _run_checks(robot, Progress(robot, progress, bar=bar), remarks, recordings)
                 if not (run.interrupted or run.aborted):
                     look_again(run, robot.connection, robot.rest)
             else:
@@ -146,9 +148,8 @@ def _leave_out(seen: Iterable[Evidence]) -> None:
             evidence.unclaimed = (evidence.skips or ["nothing that may be called shows it"])[0]
 
 
-def _run_checks(robot: RobotUnderTest, progress: TextIO | None, remarks: list[str], recordings: Recordings) -> bool:
+def _run_checks(robot: RobotUnderTest, teller: Progress, remarks: list[str], recordings: Recordings) -> bool:
     """Run the checks with pytest, without configuration from the current folder; return True when interrupted."""
-    teller = Progress(robot, progress)
     plugin = ChecksPlugin(lambda: robot, lambda: robot.run.contract, recordings)
     try:
         with pytest.MonkeyPatch.context() as environment:
@@ -160,7 +161,8 @@ def _run_checks(robot: RobotUnderTest, progress: TextIO | None, remarks: list[st
         remarks.append(f"The suite itself failed, please report this: {type(error).__name__}: {error}")
         robot.run.aborted = robot.run.aborted or "the suite itself failed"
         return False
-    teller.tell("done")
+    finally:
+        teller.end()
     if code in {pytest.ExitCode.INTERNAL_ERROR, pytest.ExitCode.USAGE_ERROR}:
         remarks.append("The suite itself failed: please report this with the command and the robot's answers.")
         robot.run.aborted = robot.run.aborted or "the suite itself failed"

@@ -1,55 +1,99 @@
-"""Progress of a run, as lines of text."""
+"""Progress of a run: a bar on a terminal, lines of text elsewhere."""
 
+import os
+import shutil
 import time
 from collections.abc import Iterator
-from typing import TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
+import click
 import pytest
 
 from conformance.contract.classes import Level
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.stage import STAGES
 
+if TYPE_CHECKING:
+    from click._termui_impl import ProgressBar
+
 # A line at least this often, s.
 _OFTEN_S = 2.0
+# Columns of the bar alone, and of the bar with brackets, counts and blanks.
+_BAR, _BEFORE_TEXT = 24, 42
+
+
+def _has_bar(out: TextIO | None) -> bool:
+    """Return whether a stream is a terminal that can move its cursor."""
+    return out is not None and out.isatty() and os.environ.get("TERM") not in {None, "", "dumb"}
 
 
 class Progress:
-    """A pytest plugin that writes progress lines to ``out``, or nothing if that is None."""
+    """A pytest plugin that writes the progress of the checks to ``out``, or nothing if that is None.
 
-    def __init__(self, robot: RobotUnderTest, out: TextIO | None) -> None:
-        self._robot, self._out = robot, out
+    Args:
+        robot: the connected robot.
+        out: stream, or None.
+        bar: whether to draw a bar if ``out`` is a terminal.
+    """
+
+    def __init__(self, robot: RobotUnderTest, out: TextIO | None, *, bar: bool = False) -> None:
+        self._robot, self._out, self._drawn = robot, out, bar and _has_bar(out)
         self._started = self._told = time.monotonic()
         self._phase = ""
         self._done = self._total = 0
+        self._bar: ProgressBar[Any] | None = None
 
     def pytest_collection_finish(self, session: pytest.Session) -> None:
         """Store the number of checks."""
         self._total = len(session.items)
+        if self._drawn:
+            self._bar = click.progressbar(
+                length=self._total, file=self._out, show_eta=False, show_pos=True, width=_BAR, item_show_func=_fitted
+            )
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
-        """Write a line when a stage begins, and when none was written for a while."""
+        """Redraw the bar; or write a line when a stage begins, and when none was written for a while."""
         mark = item.get_closest_marker("phase")
         phase = mark.args[0] if mark else STAGES[0]
+        text = f"{phase}: {item.name.removeprefix('test_').replace('_', ' ')}"
         now = time.monotonic()
-        if phase != self._phase or now - self._told > _OFTEN_S:
+        if self._bar is not None:
+            self._bar.update(0, f"{self._so_far()} | {text}")
+        elif phase != self._phase or now - self._told > _OFTEN_S:
             self._phase, self._told = phase, now
-            self.tell(f"{phase}: {item.name.removeprefix('test_').replace('_', ' ')}")
+            self._write(text)
         result = yield
         self._done += 1
+        if self._bar is not None:
+            self._bar.update(1)
         return result
 
-    def tell(self, text: str) -> None:
-        """Write one line."""
-        if self._out is None:
-            return
+    def end(self) -> None:
+        """Write the last line, or leave the bar's, also after an interruption."""
+        if self._bar is None:
+            self._write("done")
+        else:
+            self._bar.update(0, f"{self._so_far()} | done")
+            self._bar.render_finish()
+
+    def _so_far(self) -> str:
         run = self._robot.run
         # What a robot may do and does not is no failing of its.
         findings = sum(run.contract.ledger[id_].level is not Level.MAY for id_ in run.judge.refuted())
         found = f", {findings} requirement{'s' if findings != 1 else ''} not met" if findings else ""
+        return f"{self._robot.connection.sent} requests{found}"
+
+    def _write(self, text: str) -> None:
+        if self._out is None:
+            return
         self._out.write(
             f"[{time.monotonic() - self._started:5.1f} s] {self._done:3d}/{self._total} checks, "
-            f"{self._robot.connection.sent} requests{found} | {text}\n"
+            f"{self._so_far()} | {text}\n"
         )
         self._out.flush()
+
+
+def _fitted(text: str | None) -> str:
+    """Return as much of a text as fits behind the bar: a line that wraps could not be drawn over."""
+    return (text or "")[: max(0, shutil.get_terminal_size().columns - _BEFORE_TEXT)]

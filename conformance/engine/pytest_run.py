@@ -5,6 +5,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from conformance.commandline.extras import lacking
+from conformance.contract.interfaces import Interface
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.engine.connecting import connection_of
@@ -37,6 +39,9 @@ def robot_from_options(config: pytest.Config) -> RobotUnderTest:
     where = statement.endpoints
     if not where.interfaces:
         raise pytest.UsageError("name a robot: --robot-rest, --robot-publishers-wsdl or --robot-subscribers-wsdl")
+    problem = lacking("soap", "judging a SOAP service") if {*where.interfaces} != {Interface.REST} else None
+    if problem:
+        raise pytest.UsageError(problem)
     effort = config.getoption("robot_effort")
     if effort not in EFFORTS:
         raise pytest.UsageError(f"--robot-effort {effort}: there are {', '.join(EFFORTS)}")

@@ -10,6 +10,7 @@ from typing import Any
 from msgspec import to_builtins
 
 from conformance.commandline.atomic_write import write_atomically
+from conformance.commandline.without_folders import without_folders
 from conformance.contract.interfaces import Interface
 from conformance.engine.resending import written
 from conformance.engine.robot_under_test import RobotUnderTest
@@ -59,7 +60,9 @@ def result_document(
         "target": _target(robot),
         "statement": {
             "robot": statement.robot,
-            "endpoints": {key: value for key, value in to_builtins(statement.endpoints).items() if value is not None},
+            "endpoints": {
+                key: _shown(value) for key, value in to_builtins(statement.endpoints).items() if value is not None
+            },
             "claims": list(run.claims),
             **statement.figures,
             "motion_allowed": run.allow_motion,
@@ -95,6 +98,13 @@ def result_document(
     }
 
 
+def _shown(value: Any) -> Any:
+    """Return what a statement declares without the folders of its files."""
+    if isinstance(value, dict):
+        return {key: _shown(inner) for key, inner in value.items()}
+    return without_folders(value) if isinstance(value, str) else value
+
+
 def _api(robot: RobotUnderTest, causes: list[Cause]) -> dict[str, Any]:
     """Return what was called of an API that is judged by its own description, under its key."""
     if robot.log is None or robot.rest is None:
@@ -107,7 +117,7 @@ def _target(robot: RobotUnderTest) -> dict[str, Any]:
     target: dict[str, Any] = {"rest": where.rest}
     for name, wsdl in ((Interface.PUBLISHERS, where.publishers_wsdl), (Interface.SUBSCRIBERS, where.subscribers_wsdl)):
         service = robot.soap.there.get(name)
-        target[f"{name}_wsdl"] = wsdl
+        target[f"{name}_wsdl"] = wsdl and without_folders(wsdl)
         target[f"{name}_endpoint"] = service.client.base_url + service.path if service else None
     return {**target, "ros_domain_id": robot.run.statement.domain_id}
 

@@ -24,7 +24,7 @@ from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
 # What is imported late because few commands need it, and is needed later in a run.
-_NEEDED_LATER: Final = ("conformance.api.soap.zeep_client", "schemathesis.specs.openapi", "jsonschema")
+_NEEDED_LATER: Final = ("schemathesis.specs.openapi", "jsonschema")
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -89,6 +89,7 @@ def _prepare(services: Iterable[SoapService], run: Run) -> None:
     with suppress(Exception):
         for service in services:
             _ = service.described.types, service.contract.types
+            importlib.import_module("conformance.api.soap.zeep_client")
         for module in _NEEDED_LATER:
             importlib.import_module(module)
         if run.prepare is not None:

@@ -13,9 +13,9 @@ from typing import Self
 
 import psutil
 
+from conformance.commandline.without_folders import without_folders
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.robot import Robot
-from loadtests.measuring.command_line import without_folders
 
 _SECRET = re.compile(r"^-.*(token|password|secret|key)\b(?!-file)", re.IGNORECASE)
 

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import msgspec
 
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.without_folders import without_folders
 from loadtests.clients.library import LIBRARY
 from loadtests.clients.payloads import CATALOGUE
-from loadtests.measuring.command_line import without_folders
 from loadtests.measuring.end_to_end import LOST_S
 from loadtests.measuring.environment import describe
 from loadtests.measuring.machine import Moment, conditions

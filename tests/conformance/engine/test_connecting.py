@@ -102,4 +102,5 @@ def test_a_device_behind_a_login_is_certified_by_its_statement(tmp_path):
     assert "1 of 1 operations called" in done.stdout, done.stdout + done.stderr
     result = (out / "result.json").read_text(encoding="utf-8")
     assert "$ROAAS_TOKEN" in result
+    assert str(tmp_path) not in result, "the folders of this machine are nobody's business"
     assert all(secret not in result + done.stdout + done.stderr for secret in (_TOKEN, _SECRET))

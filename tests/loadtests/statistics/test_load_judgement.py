@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from loadtests.measuring.command_line import without_folders
 from loadtests.schedule.plan import Load, Plan
 from loadtests.statistics.figures import series
 from loadtests.statistics.judgement import judge
@@ -61,17 +60,3 @@ def test_the_correlation_of_neighbours_is_that_of_the_series():
         values[index] = 0.6 * values[index - 1] + rng.normal()
     assert lag_correlation(values, np.zeros(4000, dtype=int)) == pytest.approx(0.6, abs=0.05)
     assert lag_correlation(values, np.arange(4000)) is None, "no neighbours within a repeat"
-
-
-@pytest.mark.parametrize(
-    ("word", "shown"),
-    [
-        ("--out=/home/me/x/out", "--out=out"),
-        ("/home/me/robot.toml", "robot.toml"),
-        ("http://robot:7003/base/path", "http://robot:7003/base/path"),
-        ("file:///home/me/a.wsdl", "a.wsdl"),
-        ("sh ~/bin/restart /etc/robot/x", "sh restart x"),
-    ],
-)
-def test_a_command_line_names_no_folder_of_the_machine(word, shown):
-    assert without_folders(word) == shown

@@ -1,0 +1,36 @@
+"""The optional dependencies: which extra of the distribution brings which Python module."""
+
+from importlib.util import find_spec
+from typing import Final
+
+_SOAP: Final = ("zeep", "xmlschema")
+#: The modules that an extra of pyproject.toml brings, by their import names. `roaas robot` names its own.
+EXTRAS: Final = {
+    "soap": _SOAP,
+    "load": (
+        *("locust", "hdrh", "matplotlib", "numpy", "httptools", "prometheus_client", "scipy", "diptest", "websockets"),
+        *_SOAP,
+    ),
+}
+
+
+def lacking(extra: str, user: str) -> str | None:
+    """Return what to tell a user whose installation lacks an extra; None if all its modules are installed.
+
+    Args:
+        extra: name of the extra.
+        user: what needs it, the subject of the sentence, such as "'roaas load'".
+    """
+    missing = next((name for name in EXTRAS[extra] if find_spec(name) is None), None)
+    return _told(user, missing, extra) if missing else None
+
+
+def told(module: str | None, user: str) -> str | None:
+    """Return the same for a module that could not be imported; None if no extra brings it."""
+    top = (module or "").partition(".")[0]
+    extra = next((extra for extra, modules in EXTRAS.items() if top in modules), None)
+    return _told(user, top, extra) if extra else None
+
+
+def _told(user: str, module: str, extra: str) -> str:
+    return f"{user} needs the Python module {module!r}, which is not installed: pip install 'roaas[{extra}]'"

@@ -1,0 +1,71 @@
+"""The progress of a run: a bar on a terminal, lines elsewhere, nothing where nobody wants it."""
+
+import io
+from types import SimpleNamespace
+
+import pytest
+
+from conformance.engine.progress import Progress
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def robot():
+    run = SimpleNamespace(judge=SimpleNamespace(refuted=list), contract=SimpleNamespace(ledger={}))
+    return SimpleNamespace(run=run, connection=SimpleNamespace(sent=7))
+
+
+def check(name):
+    return SimpleNamespace(name=f"test_{name}", get_closest_marker=lambda _: None)
+
+
+def written(out, *, bar=True):
+    """What a run of two checks writes to a stream."""
+    progress = Progress(robot(), out, bar=bar)
+    checks = [check("first_one"), check("second_one")]
+    progress.pytest_collection_finish(SimpleNamespace(items=checks))
+    for one in checks:
+        hook = progress.pytest_runtest_protocol(one)
+        next(hook)
+        with pytest.raises(StopIteration):
+            hook.send(None)
+    progress.end()
+    return out.getvalue() if out else ""
+
+
+@pytest.fixture(autouse=True)
+def _terminal(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "64")
+
+
+def test_a_terminal_shows_a_bar_that_fits_into_a_line_and_gives_the_cursor_back():
+    text = written(Terminal())
+    drawn = text.replace("\x1b[?25l", "").replace("\x1b[?25h", "").split("\r")
+    assert "2/2" in drawn[-1]
+    assert "first one" not in text, "the name does not fit, so it is cut"
+    assert "7 requests | resting"[:12] in text
+    assert max(len(line.rstrip("\n")) for line in drawn) <= 64
+    assert text.endswith("\x1b[?25h\n")
+    assert "\x1b[3" not in text, "no colour"
+
+
+@pytest.mark.parametrize("term", ["dumb", ""])
+def test_a_terminal_that_cannot_move_its_cursor_gets_lines(monkeypatch, term):
+    monkeypatch.setenv("TERM", term)
+    assert "\x1b" not in written(Terminal())
+
+
+@pytest.mark.parametrize(("out", "bar"), [(io.StringIO(), True), (Terminal(), False)])
+def test_lines_tell_how_many_checks_are_done(out, bar):
+    first, last = written(out, bar=bar).splitlines()
+    assert "0/2 checks, 7 requests" in first
+    assert "first one" in first
+    assert last.endswith("2/2 checks, 7 requests | done")
+
+
+def test_without_a_stream_nothing_is_written():
+    assert written(None) == ""
