@@ -210,8 +210,12 @@ def test_what_others_wrote_is_pinned():
     [
         ["check-jsonschema", "--builtin-schema", "vendor.github-actions", "github/action.yml"],
         ["check-jsonschema", "--builtin-schema", "vendor.gitlab-ci", "gitlab/roaas.yml"],
+        ["check-jsonschema", "--builtin-schema", "vendor.github-workflows", "../.github/workflows/release.yml"],
+        ["check-jsonschema", "--builtin-schema", "vendor.github-workflows", "../.github/workflows/tests.yml"],
+        ["check-jsonschema", "--builtin-schema", "vendor.citation-file-format", "../CITATION.cff"],
         ["zizmor", "--offline", "--no-progress", "github/action.yml"],
-        ["shellcheck", "certify.sh"],
+        ["zizmor", "--offline", "--no-progress", "../.github/workflows"],
+        ["shellcheck", "certify.sh", "release.sh", "wheel.sh"],
         ["hadolint", "../deploy/container/Containerfile.suite"],
         ["hadolint", "../deploy/container/Containerfile.robot"],
         ["hadolint", "../deploy/kubernetes/Dockerfile"],
