@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import click
 import msgspec
 
-from conformance.commandline.extras import lacking
-from conformance.contract.interfaces import Interface
+from conformance.commandline.extras import lacking_soap
 from conformance.contract.pack import Contract
 from conformance.documents.description import is_url
 from conformance.documents.openapi import operations_of
@@ -76,8 +76,7 @@ def _described(
     overlays = tuple(options["overlays"]) or (api.overlays if api else ())
     base_url = options["base_url"] or (api.base_url if api else None)
     soap = is_wsdl(source) or source in {options["wsdl"], api.wsdl if api else None}
-    if soap:
-        _check_soap()
+    _check_soap(["soap"] if soap else [])
     try:
         # Where an API key goes, the description may say, so that it is read without one.
         connection = connection_of(where if where.api_key else msgspec.structs.replace(where, api_key_file=None))
@@ -148,8 +147,7 @@ def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> 
             raise StatementError(f"{key.replace('_', '-')} {url!r} is no URL: it has to start with http:// or https://")
     if not where.interfaces:
         raise StatementError("no robot is named: give a STATEMENT, --rest, --publishers-wsdl or --subscribers-wsdl")
-    if {*where.interfaces} != {Interface.REST}:
-        _check_soap()
+    _check_soap(where.interfaces)
     claims = declared.claims
     if options["profile"] or options["classes"]:
         claims = _claims(options, contract)
@@ -161,13 +159,13 @@ def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> 
     return msgspec.structs.replace(declared, endpoints=where, claims=claims, calls=calls)
 
 
-def _check_soap() -> None:
-    """Check that the libraries are installed by which SOAP services are judged.
+def _check_soap(interfaces: Iterable[str]) -> None:
+    """Check that the libraries are installed by which these interfaces are judged.
 
     Raises:
         click.UsageError: one is missing.
     """
-    problem = lacking("soap", "judging a SOAP service")
+    problem = lacking_soap(interfaces)
     if problem:
         raise click.UsageError(problem)
 

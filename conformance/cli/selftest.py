@@ -13,6 +13,7 @@ import click
 from conformance.cli.contract import contract_option, loaded
 from conformance.cli.selftest_progress import Progress, compare
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.extras import lacking_soap
 from conformance.contract.locating import ContractError
 
 if TYPE_CHECKING:
@@ -209,6 +210,9 @@ def _finish(report: Report, run: Callable[[], None], options: dict[str, Any]) ->
     """Run, write the results even after an interruption, and exit with the exit code."""
     from conformance.selftest.robots import RobotError  # noqa: PLC0415 - see _by_hand()
 
+    problem = lacking_soap(report.contract.interfaces, "'roaas selftest' of this contract")
+    if problem:
+        raise click.UsageError(problem)
     started, interrupted = time.monotonic(), False
     try:
         run()

@@ -1,5 +1,6 @@
 """The optional dependencies: which extra of the distribution brings which Python module."""
 
+from collections.abc import Iterable
 from importlib.util import find_spec
 from typing import Final
 
@@ -25,8 +26,13 @@ def lacking(extra: str, user: str) -> str | None:
     return _told(user, missing, extra) if missing else None
 
 
+def lacking_soap(interfaces: Iterable[str], user: str = "judging a SOAP service") -> str | None:
+    """Return the same for a device with these interfaces: all but `rest` are SOAP services."""
+    return lacking("soap", user) if {*interfaces} - {"rest"} else None
+
+
 def told(module: str | None, user: str) -> str | None:
-    """Return the same for a module that could not be imported; None if no extra brings it."""
+    """Return what to tell a user about a module that could not be imported; None if no extra brings it."""
     top = (module or "").partition(".")[0]
     extra = next((extra for extra, modules in EXTRAS.items() if top in modules), None)
     return _told(user, top, extra) if extra else None

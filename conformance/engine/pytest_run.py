@@ -5,8 +5,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from conformance.commandline.extras import lacking
-from conformance.contract.interfaces import Interface
+from conformance.commandline.extras import lacking_soap
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.engine.connecting import connection_of
@@ -39,7 +38,7 @@ def robot_from_options(config: pytest.Config) -> RobotUnderTest:
     where = statement.endpoints
     if not where.interfaces:
         raise pytest.UsageError("name a robot: --robot-rest, --robot-publishers-wsdl or --robot-subscribers-wsdl")
-    problem = lacking("soap", "judging a SOAP service") if {*where.interfaces} != {Interface.REST} else None
+    problem = lacking_soap(where.interfaces)
     if problem:
         raise pytest.UsageError(problem)
     effort = config.getoption("robot_effort")

@@ -54,6 +54,7 @@ def test_a_missing_module_is_named_with_the_command_that_installs_it(monkeypatch
         (["load", "--rest", "http://127.0.0.1:1"], "locust", "load"),
         (["compare", "old.json", "new.json"], "numpy", "load"),
         (["certify", "--publishers-wsdl", "http://127.0.0.1:1/x?wsdl"], "zeep", "soap"),
+        (["selftest", "--target", "plain"], "zeep", "soap"),
         (["certify", "--wsdl", "http://127.0.0.1:1/x?wsdl"], "zeep", "soap"),
     ],
 )
