@@ -9,6 +9,7 @@ import pytest
 import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
+from processes import ended
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -85,3 +86,11 @@ def test_only_the_job_that_publishes_has_an_identity():
     assert jobs["publish"]["environment"]["name"] == "pypi"
     assert not [step for step in jobs["publish"]["steps"] if "run" in step]
     assert "secrets." not in (ROOT / ".github/workflows/release.yml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("target", "tools"), [("demo", False), ("test", True)])
+def test_only_tests_need_the_tools_of_developers(target, tools):
+    done = ended("make", "--dry-run", "--always-make", target, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    assert "'.[load,robot,ros]'" in done.stdout
+    assert (",dev]" in done.stdout) == tools

@@ -69,6 +69,20 @@ def test_each_robot_has_its_end_whatever_the_others_do(tmp_path, web_server, clo
     assert signed.predicate.roaas.robot.name == "poor"
 
 
+def test_a_program_reads_the_result_on_stdout_and_nobody_the_progress(tmp_path, closed_port):
+    fleet = fleet_file(tmp_path, {"down": closed_port})
+    done = ended(*command(fleet, "--class", "rest-resources", "--json", "--quiet"))
+    assert (done.returncode, done.stderr) == (3, "")
+    assert done.stdout == (tmp_path / "out" / "fleet.json").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("other", ["--plan", "--init"])
+def test_what_has_no_result_cannot_be_printed_as_json(other):
+    done = CliRunner().invoke(roaas.main, ["certify", "robot.toml", "--json", other])
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "--json prints the result of a run" in done.stderr
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_fleet_ends_its_runs_and_keeps_what_it_has(tmp_path, listening, number):
     urls = {name: listening(lambda connection: time.sleep(300) or connection) for name in ("first", "second")}
