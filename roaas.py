@@ -32,6 +32,7 @@ _COMMANDS = {
     ),
     "selftest": ("conformance.cli.selftest", "Test the suite: it must kill mutants, and must not fail a good device."),
     "contract": ("conformance.cli.contract", "Show the requirements, export the contract's files."),
+    "explain": ("conformance.cli.explain", "Explain a requirement: why, by which source, how judged, how to fix it."),
 }
 _EXTRAS = {"load"}  # commands that need the optional dependencies of the same name
 _INSTALLED = Path(__file__).with_name("roaas_rooms")

@@ -44,6 +44,9 @@ def print_summary(outcome: Certification) -> None:
             click.echo(f"\n{question}")
         for cause, requirement in found:
             _print_cause(cause, requirement)
+    if document["causes"]:
+        id_ = document["causes"][0]["requirement"]
+        click.echo(f"\nwhy a requirement matters and how to meet it: roaas explain ID, as in roaas explain {id_}")
     not_claimed = "not judged" if "api" in document else "not-claimed"
     counts = Counter(requirement["verdict"] for requirement in document["requirements"])
     counts[not_claimed] = counts.pop("not-claimed", 0)

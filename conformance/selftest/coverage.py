@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import pytest
@@ -45,13 +45,28 @@ class Binding:
     mutants: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Check:
+    """One check.
+
+    Attributes:
+        name: as ``module::function``.
+        does: what it does, the first line of its docstring.
+        scenarios: what the scenarios do whose traces it judges; empty for a check that sends its own requests.
+    """
+
+    name: str
+    does: str
+    scenarios: tuple[str, ...] = ()
+
+
 class _Checks:
     """A pytest plugin that records the requirement ids in the markers of every check, including unknown ids."""
 
     def __init__(self, contract: Contract) -> None:
         self._ledger, self._everywhere = contract.ledger, contract.name == DEFAULT_PACK
         self._renamed = contract.renamed
-        self.found: dict[str, dict[str, None]] = defaultdict(dict)
+        self.found: dict[str, dict[str, Check]] = defaultdict(dict)
         self.broken = ""
 
     def pytest_itemcollected(self, item: pytest.Item) -> None:
@@ -62,7 +77,11 @@ class _Checks:
         for part in expanded(marked, self._ledger):
             id_ = self._renamed.get(part, part)
             if own or id_ in self._ledger:
-                self.found[id_][f"{item.path.stem}::{item.name.partition('[')[0]}"] = None
+                check = _described(item)
+                earlier = self.found[id_].get(check.name, check)
+                self.found[id_][check.name] = replace(
+                    check, scenarios=tuple(dict.fromkeys([*earlier.scenarios, *check.scenarios]))
+                )
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
         """Record the error when a module with checks cannot be imported."""
@@ -70,9 +89,23 @@ class _Checks:
             self.broken = f"{report.nodeid} cannot be imported: {report.longrepr}"
 
 
+def _described(item: pytest.Item) -> Check:
+    """Return a collected check; of a rule, the one with this scenario alone."""
+    name = f"{item.path.stem}::{item.name.partition('[')[0]}"
+    mark = item.get_closest_marker("rule")
+    if mark is None:
+        return Check(name, _first_line(getattr(item, "function", None)))
+    rule, scenario = mark.args
+    return Check(name, _first_line(rule.judge), (scenario.summary,))
+
+
+def _first_line(function: object) -> str:
+    return (getattr(function, "__doc__", None) or "").strip().partition("\n")[0]
+
+
 @cache
-def checks_by_requirement(contract: Contract) -> dict[str, tuple[str, ...]]:
-    """Return the names of the checks by requirement id; pytest collects them from their markers, as in a run.
+def checks_of(contract: Contract) -> dict[str, tuple[Check, ...]]:
+    """Return the checks by requirement id, by module; pytest collects them from their markers, as in a run.
 
     Raises:
         ContractError: a module with checks cannot be imported.
@@ -83,7 +116,19 @@ def checks_by_requirement(contract: Contract) -> dict[str, tuple[str, ...]]:
     collect(robot, ChecksPlugin(lambda: robot, lambda: contract), checks)
     if checks.broken:
         raise ContractError(checks.broken)
-    return {id_: tuple(sorted(names, key=lambda name: name.partition("::")[0])) for id_, names in checks.found.items()}
+    return {
+        id_: tuple(sorted(there.values(), key=lambda check: check.name.partition("::")[0]))
+        for id_, there in checks.found.items()
+    }
+
+
+def checks_by_requirement(contract: Contract) -> dict[str, tuple[str, ...]]:
+    """Return the names of the checks by requirement id.
+
+    Raises:
+        ContractError: a module with checks cannot be imported.
+    """
+    return {id_: tuple(check.name for check in checks) for id_, checks in checks_of(contract).items()}
 
 
 def bindings(contract: Contract) -> tuple[Binding, ...]:

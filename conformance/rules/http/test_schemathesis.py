@@ -66,7 +66,7 @@ def _targets(api: RestInterface, *, moving: bool) -> list[Target]:
 @pytest.mark.phase("describe")
 @pytest.mark.requirement(*_IDS, "strict-input/query-parameter", "strict-input/query-missing")
 def test_reading_operations(api: RestInterface, judge: Judge, explore: Explorer) -> None:
-    """Send generated requests for operations that move nothing."""
+    """Send generated requests for operations that move nothing; not at quick effort."""
     guard = MotionGuard(api)
     for target in _targets(api, moving=False):
         _run(api, judge, explore, guard, target)
@@ -75,7 +75,7 @@ def test_reading_operations(api: RestInterface, judge: Judge, explore: Explorer)
 @pytest.mark.phase("input")
 @pytest.mark.requirement(*_IDS, *_STRICT)
 def test_moving_operations(api: RestInterface, judge: Judge, explore: Explorer) -> None:
-    """Send generated requests for operations that may move the robot: invalid ones, and a few valid ones."""
+    """Send generated requests for operations that may move the robot, most of them invalid; not at quick effort."""
     guard = MotionGuard(api)
     api.device.halt(api)
     for target in _targets(api, moving=True):
@@ -125,7 +125,7 @@ def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item:
 @pytest.mark.phase("input")
 @pytest.mark.requirement("http/declared-status")
 def test_walk_along_the_links(api: RestInterface, rest: HttpClient, judge: Judge, explore: Explorer) -> None:
-    """Walk from operation to operation along the contract's links, a few times."""
+    """Walk from operation to operation along the contract's links, a few times; not at quick effort."""
     if api.run.effort.name == "quick":
         return  # the observers judge http/declared-status on every other request
     from conformance.api.rest.generated import as_request, as_thesis, state_machine  # noqa: PLC0415 - as above

@@ -50,7 +50,7 @@ def test_pose_and_velocity(robot: Robot, subscribers: SoapService, judge: Judge,
 @pytest.mark.phase("resting")
 @pytest.mark.requirement("equivalence/velocity")
 def test_single_velocities(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
-    """Compare each velocity over SOAP with the odometry around it, so that intermittent faults are found too."""
+    """Compare each velocity over SOAP with the odometry around it, to find intermittent faults; not at quick."""
     if effort.name == "quick":
         return  # too few to notice it
     beside = BesideOdometry(judge, robot.limits, requirement="equivalence/velocity")

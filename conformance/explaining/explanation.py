@@ -1,0 +1,66 @@
+"""One requirement with everything that is known about it."""
+
+from dataclasses import dataclass
+
+from conformance.contract.classes import Prerequisite
+from conformance.contract.ledger import Requirement
+from conformance.contract.pack import Contract
+from conformance.explaining.advice import Source, Topic, sources_of, topic_of
+from conformance.mutation.mutant import Mutant
+from conformance.mutation.self_test import self_test_of
+from conformance.selftest.coverage import Check, checks_of
+
+#: At which effort checks run, and with how many cases.
+EFFORTS = (
+    "At each effort, unless a check says otherwise. Where cases are generated, quick tries about a tenth of "
+    "standard's, and deep as many as --minutes allows."
+)
+#: What a run must have, in words.
+NEEDS = {
+    Prerequisite.MOTION: "permission to move the device (--allow-motion)",
+    Prerequisite.OBSERVER: "a view of what requests cause: a ROS probe (--ros-domain-id), or the device's own list",
+    Prerequisite.LIMITS: "limits in the statement",
+    Prerequisite.HOLD: "a hold time in the statement",
+    Prerequisite.RESOLVED: "declared tolerances that are small beside the limits",
+    Prerequisite.SEEN: "a device that shows this by itself; others are not judged by it",
+    Prerequisite.PROBE: "a ROS probe (--ros-domain-id)",
+}
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A requirement with its reasons, sources, checks, mutants and advice.
+
+    Attributes:
+        requirement: the requirement.
+        sources: where it comes from.
+        topic: why it matters and how to meet it, or None.
+        checks: the checks that judge it.
+        mutants: the hand-written mutants of the pack that it must kill.
+    """
+
+    requirement: Requirement
+    sources: tuple[Source, ...]
+    topic: Topic | None
+    checks: tuple[Check, ...]
+    mutants: tuple[Mutant, ...]
+
+    @property
+    def why(self) -> str:
+        """Return what breaks in practice: what the ledger says of this requirement, then what is so of its subject."""
+        return " ".join(filter(None, (self.requirement.breaks, self.topic.why if self.topic else None)))
+
+
+def explained(contract: Contract, requirement: Requirement) -> Explanation:
+    """Return the explanation of a requirement.
+
+    Raises:
+        ContractError: a module with checks or mutants cannot be imported.
+    """
+    return Explanation(
+        requirement,
+        sources_of(requirement.source),
+        topic_of(requirement.id),
+        checks_of(contract).get(requirement.id, ()),
+        tuple(mutant for mutant in self_test_of(contract).mutants if requirement.id in mutant.catches),
+    )
