@@ -22,12 +22,13 @@ built = $(if $(UV),$(UV) build --quiet --wheel --python $(BIN)/python --out-dir 
 WHEELS = $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/roaas/interfaces/$(shell { sha256sum $(INTERFACE_FILES); \
 	$(BIN)/python -c 'import sysconfig; print(sysconfig.get_config_var("SOABI"))'; } | sha256sum | cut -c -16)
 
-.PHONY: help install demo test lint selftest coverage-page bench clean
+.PHONY: help install demo test lint docs screenshots selftest coverage-page bench clean
 
 help:
 	@echo "make demo      set up, start the robot, certify it, measure it, leave the reports in $(OUT)/"
 	@echo "make test      set up, then lint, types and all tests"
 	@echo "make install   set up only: $(VENV) with the command roaas in it, and the tools for tests"
+	@echo "make docs      build the documentation site: build/site/index.html"
 	@echo "make selftest  show that the suite kills mutants and has no false positives (about half an hour)"
 	@echo "make bench     print the benchmarks' ratios"
 	@echo "make clean     remove what the others made, except for the interface packages in the user's cache"
@@ -77,6 +78,18 @@ lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# Fails on each warning, a broken link or anchor, and a page that would load something from another host.
+docs: $(VENV)/.docs
+	$(BIN)/python docs/site/build.py
+
+$(VENV)/.docs: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
+	@touch $@
+
+# The pictures of README and docs, from the results of `make demo`.
+screenshots: install browser
+	$(BIN)/python docs/site/screenshots.py $(OUT)
 
 # The report tests look at the pages in a real browser.
 .PHONY: browser

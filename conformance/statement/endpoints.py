@@ -33,11 +33,11 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         rest: base URL.
-        publishers_wsdl: URL or file; likewise subscribers_wsdl.
-        publishers_endpoint: URL of the service if it differs from the WSDL's; likewise subscribers_endpoint.
+        publishers_wsdl, subscribers_wsdl: URL or file of the service's WSDL.
+        publishers_endpoint, subscribers_endpoint: URL of the service if it differs from the WSDL's.
         ca_file: certificate authorities to trust.
         token_file: file with the bearer token.
-        basic_file: file with ``user:password`` for HTTP's basic authentication; likewise digest_file.
+        basic_file, digest_file: file with ``user:password`` for HTTP's basic or digest authentication.
         username_token_file: file with ``user:password`` for WS-Security's UsernameToken.
         api_key: where the API key goes: ``header NAME``, ``query NAME`` or ``cookie NAME``.
         api_key_file: file with the API key.

@@ -110,12 +110,27 @@ class Statement(msgspec.Struct, frozen=True):
 
 
 class _Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Which device it is.
+
+    Attributes:
+        name: the device's name, on certificates and in registries.
+        vendor: who makes it.
+        version: its firmware or software.
+    """
+
     name: str | int | float | None = None
     vendor: str | int | float | None = None
     version: str | int | float | None = None
 
 
 class _Claims(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the vendor claims; without claims, each class is judged whose interfaces have an address.
+
+    Attributes:
+        profile: a profile of the contract, such as ``full``: all of its classes.
+        classes: conformance classes, beside those of the profile.
+    """
+
     profile: str | None = None
     classes: tuple[str, ...] | None = None
 

@@ -43,7 +43,10 @@ class Noise(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How far the odometry of a robot at rest is off: the greatest figures that a statement may declare.
 
     Attributes:
-        position_m: m; heading_rad: rad; linear_m_s: m/s; angular_rad_s: rad/s.
+        position_m: of its position, m.
+        heading_rad: of its heading, rad.
+        linear_m_s: of its linear velocity, m/s.
+        angular_rad_s: of its angular velocity, rad/s.
     """
 
     position_m: Annotated[float, Meta(ge=0, le=0.05)] = 0.0
@@ -53,26 +56,11 @@ class Noise(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Limits(msgspec.Struct, frozen=True, kw_only=True):
-    """What judging uses; each default is the figure for what is not declared.
+    """What judging uses, as in DeclaredLimits; each default is the figure for what is not declared.
 
     Attributes:
-        linear_m_s: greatest commanded speed, m/s, of both directions; angular_rad_s: likewise, rad/s.
         linear_least_m_s: least linear.x, m/s, if it is not ``-linear_m_s``; linear_greatest_m_s, angular_least_rad_s,
             angular_greatest_rad_s: likewise.
-        lateral_m_s: greatest speed of linear.y, m/s, if it is not ``linear_m_s``.
-        navigation_linear_m_s: greatest speed of the robot's own navigation, m/s, if it is not ``linear_m_s``;
-            navigation_angular_rad_s: likewise, rad/s.
-        settle_s: time within which a commanded velocity is reached, s.
-        hold_s: time for which a velocity holds unless renewed, s; None: not declared, not judged.
-        tolerance: relative tolerance of a reached velocity; tolerance_linear_m_s: the absolute one of its linear part,
-            m/s; tolerance_angular_rad_s: of its angular part, rad/s.
-        noise: of the odometry.
-        odometry_hz: how often there is a new odometry, Hz; None: not declared, and seen by its stamps.
-        time_scale: by how much the robot's clock is faster than the one on the wall.
-        clock_offset_s: by how much the robot's clock is ahead of its ``Date`` header, s.
-        goal_m: how far from a goal's position the robot may end the goal, m; goal_rad: from its heading, rad.
-        goal_s: how long a hindered robot may make no progress towards a goal, s.
-        plan_step_m: the greatest distance between two successive poses of a plan, m.
         linear_declared: whether ``linear_m_s`` is the robot's, so that what lies beyond it can be judged;
             likewise angular_declared.
     """
@@ -163,14 +151,31 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The table ``[limits]`` of a statement: fields as in Limits; None: not declared.
-
-    ``tolerance_abs`` is one figure for both absolute tolerances, where they are not named themselves.
-
-    ``linear_m_s`` and ``angular_rad_s`` may be a pair, the least and the greatest velocity: ``[0, 0.7]`` has no
-    reverse gear.
+    """What the robot can do and how exactly, as its vendor declares it; None: not declared.
 
     The bounds are the contract's (contract.md#statement): by a wider tolerance a robot would be judged by nothing.
+
+    Attributes:
+        linear_m_s: greatest speed of linear.x, m/s; or the least and the greatest velocity: ``[0, 0.7]`` has no reverse
+            gear.
+        angular_rad_s: greatest turning rate, rad/s; or the least and the greatest one.
+        lateral_m_s: greatest speed of linear.y, m/s, if it is not ``linear_m_s``.
+        navigation_linear_m_s: greatest speed of the robot's own navigation, m/s, if it is not ``linear_m_s``.
+        navigation_angular_rad_s: its greatest turning rate, rad/s, if it is not ``angular_rad_s``.
+        settle_s: time within which a commanded velocity is reached, s.
+        hold_s: time for which a velocity holds unless renewed, s; undeclared: not judged.
+        tolerance: relative tolerance of a reached velocity.
+        tolerance_abs: absolute tolerance of both parts of a velocity, m/s and rad/s, unless named by themselves.
+        tolerance_linear_m_s: absolute tolerance of its linear part, m/s.
+        tolerance_angular_rad_s: absolute tolerance of its angular part, rad/s.
+        noise: of the odometry.
+        odometry_hz: how often there is a new odometry, Hz; undeclared: seen by its stamps.
+        time_scale: by how much the robot's clock is faster than the one on the wall.
+        clock_offset_s: by how much the robot's clock is ahead of its ``Date`` header, s.
+        goal_m: how far from a goal's position the robot may end the goal, m.
+        goal_rad: how far from a goal's heading it may end the goal, rad.
+        goal_s: how long a hindered robot may make no progress towards a goal, s.
+        plan_step_m: the greatest distance between two successive poses of a plan, m.
     """
 
     linear_m_s: Range | None = None

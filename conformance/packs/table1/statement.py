@@ -32,7 +32,8 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         goals: poses (x, y, yaw) that can be reached; empty: found by asking for plans.
         odom_to_map: (x, y, yaw) of the odometry frame in the frame of goals.
         actuated: the velocity components that the robot can actuate.
-        turns_on_the_spot: whether it can turn without driving; if not, ``min_radius_m`` is its smallest circle.
+        turns_on_the_spot: whether it can turn without driving; if not, ``min_radius_m`` must be declared.
+        min_radius_m: radius of the narrowest circle that it can drive, m.
         wheel_separation_m: distance of the wheels whose speed linear.x limits, so that a robot drives slower while it
             turns, m; 0: either limit can be reached whatever the other part is; None: not declared.
     """
@@ -58,7 +59,13 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Ros(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The robot's ROS side, for the probe."""
+    """The robot's ROS side, for the probe.
+
+    Attributes:
+        domain_id: its ROS domain; without it, no probe observes the robot.
+        delivery_topic: topic on which it publishes deliveries.
+        cmd_vel_topic: topic on which it publishes velocities.
+    """
 
     domain_id: Annotated[int, msgspec.Meta(ge=0, le=232)] | None = None  # DDS's range
     delivery_topic: Text = "/DeliveryRequestMsg/from_json"

@@ -68,7 +68,17 @@ class ThresholdsError(TomlFileError):
 
 
 class Threshold(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One limit on one series. It is met only if the upper bound of the 95 % interval lies below it."""
+    """One limit on one series. It is met only if the upper bound of the 95 % interval lies below it.
+
+    Attributes:
+        operation: what is called.
+        interface: over which interface.
+        quantile: the figure of the series that is judged.
+        below_ms: what it must lie below, ms.
+        time: ``service`` counts from the sending of a request, ``response`` from when it was due.
+        client: whose requests: the lean client's, or those of the library that people use.
+        name: for readers; empty: made from the others.
+    """
 
     operation: Operation
     interface: ApiStyle
