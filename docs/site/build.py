@@ -31,6 +31,26 @@ _ELSEWHERE = {
     "deploy/kubernetes/README.md": "kubernetes.md",
 }
 _LINK = re.compile(r"\]\(([^)#:\s]+)(#[^)]*)?\)")
+# What these pages say is on others, which a search should find.
+_UNSEARCHED = dict.fromkeys(("coverage.md", "changes.md", "contributing.md"), "nosearch: true")
+# Words that readers search by and a page does not use.
+_KEYWORDS = {
+    f"{page}.md": f"myst: {{html_meta: {{keywords: '{', '.join(words.split())}'}}}}"
+    for page, words in {
+        "baseline": "allow ignore suppress waiver expected flaky exception xfail skip regressions",
+        "certificates": "customer proof trust signature key share publish send",
+        "ci": "pipeline jenkins github gitlab docker image workflow badge annotations",
+        "fleet": "many robots parallel website dashboard",
+        "install": "setup pip without ros windows macos tab autocomplete bash zsh fish upgrade python version",
+        "load": "latency performance benchmark slow slower faster regression release percentile p99 throughput",
+        "motion": "move speed limits axis stop emergency watchdog",
+        "own-robot": "openapi swagger wsdl soap harm safe read-only dangerous move moving api key password login auth",
+        "packs": "custom contract rules plugin extend write checks",
+        "paper-robot": "quick start demo simulation simulator example getting started",
+        "security": "nginx gateway prefix reverse proxy self signed certificate private ca https tls token",
+        "verdicts": "exit code return status result meaning duration time effort quick deep skipped",
+    }.items()
+}
 # A link that shows a file's name is given the page's title.
 _UNTITLED = re.compile(r"\[`?[\w./-]+\.md`?\]\((?=[^)]+\.md)")
 
@@ -64,8 +84,9 @@ def _gather(source: Path) -> None:
     for folder in ("motion", "images"):
         if (DOCS / folder).is_dir():
             shutil.copytree(DOCS / folder, source / folder)
-    coverage = source / "coverage.md"  # whose words are on the pages of the requirements, which a search should find
-    coverage.write_text(f"---\nnosearch: true\n---\n{coverage.read_text(encoding='utf-8')}", encoding="utf-8")
+    for name, heading in {**_UNSEARCHED, **_KEYWORDS}.items():
+        page = source / name
+        page.write_text(f"---\n{heading}\n---\n{page.read_text(encoding='utf-8')}", encoding="utf-8")
     (source / "cli.md").write_text(
         commands.completed((source / "cli.md").read_text(encoding="utf-8")), encoding="utf-8"
     )

@@ -1,5 +1,25 @@
 """Sphinx's configuration of the documentation site, which docs/site/build.py builds."""
 
+from pathlib import Path
+
+from sphinx.search import languages
+from sphinx.search.en import SearchEnglish
+
+_FILLERS = (
+    "about after all am an any because can cannot do does doing don each every from get give had has have how i "
+    "its just know let like make me mean means much my need one our should so some still tell than them "
+    "thing us use want way we were what when where which while who why without would you your"
+)
+
+
+class _Questions(SearchEnglish):
+    """English, and people who type a whole question: a page need not have these words to be found."""
+
+    stopwords = SearchEnglish.stopwords | frozenset(_FILLERS.split())
+
+
+languages["en"] = _Questions
+html_search_scorer = str(Path(__file__).with_name("scorer.js"))
 project = "RoAAS"
 copyright = "the RoAAS authors. Apache-2.0"  # noqa: A001 - Sphinx's name
 html_title = "RoAAS"

@@ -4,7 +4,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 
-from conformance.contract.classes import QUESTIONS, ConformanceClass
+from conformance.contract.classes import QUESTIONS, ConformanceClass, Origin
 from conformance.contract.generic import generic_classes
 from conformance.contract.ledger import Requirement
 from conformance.contract.pack import Contract
@@ -33,6 +33,7 @@ A violated **MUST** fails, a violated **SHOULD** warns, a **MAY** informs ([verd
 
 ```{{toctree}}
 :hidden:
+:titlesonly:
 
 {tree}
 ```
@@ -43,6 +44,13 @@ Advice by subject. Each page has the requirements that it is about, and code for
 
 {subjects}
 """
+
+_ORIGINS = {
+    Origin.NORM: "It comes from a norm, so it binds every device of that kind.",
+    Origin.DESCRIPTION: "It comes from a description (OpenAPI, WSDL), so it binds the device that is described.",
+    Origin.WEAKNESS: "It comes from a catalogue of known weaknesses.",
+    Origin.CONTRACT: "It comes from the contract, so it binds robots that claim the contract.",
+}
 
 
 def pages() -> dict[str, str]:
@@ -106,7 +114,7 @@ def _requirement(explanation: Explanation, contract: Contract) -> str:
         f"# {item.id}", "",
         f"[Requirements](../../requirements.md) / [{item.class_}](../{item.class_}.md)", "",
         f"> {item.text}", "",
-        f"Level **{item.level}**, from: {item.origin}.{aliases}", "",
+        f"Level **{item.level}**. {_ORIGINS[item.origin]}{aliases}", "",
     ]  # fmt: skip
     if explanation.why:
         lines += ["## Why it matters", "", explanation.why, ""]
