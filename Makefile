@@ -14,9 +14,10 @@ INTERFACE_FILES := $(sort $(shell find reference_robot/interfaces -type f -not -
 DEMO := '.[load,robot,ros]'
 DEV := '.[load,robot,ros,dev]'
 # uv installs in seconds what takes pip minutes. It is used where it is there or can be had, and pip where it fails.
+# Modules are compiled when they are installed, as pip does: else each run does it where Python may write no cache.
 UV = $(shell command -v uv || command -v $(BIN)/uv)
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
-installed = $(if $(UV),$(UV) pip install --quiet --python $(BIN)/python $(1) ||) $(PIP) install $(1)
+installed = $(if $(UV),$(UV) pip install --quiet --compile-bytecode --python $(BIN)/python $(1) ||) $(PIP) install $(1)
 built = $(if $(UV),$(UV) build --quiet --wheel --python $(BIN)/python --out-dir $(2) $(1) ||) $(PIP) wheel --no-deps --wheel-dir $(2) $(1)
 # The wheels of the interface packages, for all clones: by their sources and the Python that they are for.
 WHEELS = $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/roaas/interfaces/$(shell { sha256sum $(INTERFACE_FILES); \
@@ -61,6 +62,7 @@ $(VENV)/.demo: pyproject.toml constraints.txt $(INTERFACE_FILES) | $(VENV)/.made
 		echo "== building the ROS 2 interface packages, which stay in $$wheels"; mkdir -p "$${wheels%/*}"; \
 		printf '%s\n' $(INTERFACES) | xargs -P 3 -I {} bash -c "$(call built,./{},'$$wheels.$$$$')" && mv -T "$$wheels.$$$$" "$$wheels"; }
 	@$(call installed,--no-deps --force-reinstall '$(WHEELS)'/*.whl)
+	@$(BIN)/python -m compileall -q conformance loadtests reference_robot reports roaas.py roaas_pytest.py
 	@touch $@
 
 $(VENV)/.installed: $(VENV)/.demo
@@ -84,7 +86,7 @@ docs: $(VENV)/.docs
 	$(BIN)/python docs/site/build.py
 
 $(VENV)/.docs: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
+	@$(call installed,--constraint constraints.txt --editable '.[docs]')
 	@touch $@
 
 # The pictures of README and docs, from the results of `make demo`.
