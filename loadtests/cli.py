@@ -31,8 +31,6 @@ from loadtests.settings.settings import STEP_S, Settings
 from loadtests.settings.settle import DEFAULT_DURATION_S, DEFAULT_RATE, DEFAULT_WARMUP_S, settle
 
 DEFAULT_OUT = "out"  # as `roaas certify` does
-#: Options whose values look like files, and are none.
-_NO_FILES = ("--operation", "--call", "--never", "--stream", "--stamp-field")
 #: Threads of NumPy's linear algebra wait for one another by spinning, ten times as long on a busy machine.
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 _FILE = click.Path(path_type=Path)
@@ -290,7 +288,7 @@ class _Baselines:
 
 def _command_line() -> str:
     """Return the command line without the folders of this machine."""
-    return command_without_folders(sys.argv[1:], _NO_FILES)
+    return command_without_folders(sys.argv[1:], ("--operation", "--call", "--never", "--stream", "--stamp-field"))
 
 
 def _make_folder(folder: Path) -> None:
