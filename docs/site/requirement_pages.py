@@ -62,7 +62,7 @@ def pages() -> dict[str, str]:
     by_class: dict[str, list[Requirement]] = defaultdict(list)
     for item in ledger.values():
         by_class[item.class_].append(item)
-    names = [name for name in classes if name in by_class]
+    names = [name for name in dict.fromkeys([*contract.classes, *classes]) if name in by_class]
     result = {"requirements.md": _index(found.values(), {name: by_class[name] for name in names}, classes)}
     result |= {f"requirements/{name}.md": _class(classes[name], by_class[name]) for name in names}
     result |= {f"{page_of(id_)}.md": _requirement(explanation, contract) for id_, explanation in found.items()}
@@ -160,7 +160,7 @@ def _fix(topic: Topic, ids: list[str]) -> str:
     lines += [f"Requirements: {_ids(ids, '../')}.", "", topic.why, "", topic.fix, ""]
     for name, code in topic.code.items():
         title, language = FRAMEWORKS[name]
-        lines += [f"## {title}", "", f"```{_lexer(code, language)}", code.rstrip(), "```", ""]
+        lines += [f"```{{rubric}} {title}", "```", "", f"```{_lexer(code, language)}", code.rstrip(), "```", ""]
     return "\n".join(lines)
 
 
