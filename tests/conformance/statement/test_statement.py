@@ -113,7 +113,10 @@ def test_a_full_statement(tmp_path):
         ("[motion]\ngoals = [[1, 2, 'x']]", "[motion] goals[0][2] = 'x' must be a finite number"),
         ("[motion]\nactuated = ['linear.w']", "[motion] actuated[0] = 'linear.w' must be one of angular.x, angular.y,"),
         ("[ros]\ndomain_id = 500", "[ros] domain_id = 500 must be a whole number from 0 to 232"),
-        ("[load]\nmax_rates = 3", "[load] unknown key 'max_rates'; known are max_duration_s, max_rate, thresholds"),
+        (
+            "[load]\nmax_rates = 3",
+            "[load] unknown key 'max_rates'; known are max_duration_s, max_rate, operations, thresholds",
+        ),
         ("[load]\nmax_rate = 'fast'", "[load] max_rate = 'fast' must be a positive number"),
         (
             "[[load.thresholds]]\noperation = 'pose'",

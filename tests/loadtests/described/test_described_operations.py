@@ -113,6 +113,10 @@ def test_the_statement_names_operations_and_service_levels(device, tmp_path):
         ("3", "[slo] 'pose' = 3 must be a table"),
         ('{ p99_ms = 3 }\n[load]\noperations = { "GET /x" = 0 }', "'GET /x' = 0 must be a whole number from 1 to 1000"),
         ('{ p99_ms = 3 }\n[load]\noperations = { "GET /x" = "3" }', "[load.operations] Expected `int`, got `str`"),
+        (
+            '{ p99_ms = 3 }\n[load]\noperations = { "GET /x" = 3 }',
+            "[load] operations is for a device with a description",
+        ),
         ("{ p99_ms = 3 }\nother = { p99_ms = 3 }", "[slo] 'other' is no operation"),
     ],
 )
