@@ -8,7 +8,7 @@ from conformance.contract.pack import Contract
 from conformance.engine.suite import JUDGING, suite_digest
 from conformance.packs.table1.files import CONTRACT_DIR
 
-_OTHERS = ("fleet", "selftest", "cli", "mutation", "packs", "commandline")
+_OTHERS = ("fleet", "selftest", "cli", "explaining", "mutation", "packs", "commandline")
 
 
 @pytest.fixture

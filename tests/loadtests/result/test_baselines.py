@@ -23,7 +23,7 @@ _PAGE = Path(__file__).parents[3] / "docs" / "load.md"
 def load(tmp_path, monkeypatch):
     """Run `roaas load` with a measurement that has been made already."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(roaas.FrontDoor, "render", staticmethod(lambda *_: None))  # its pages have tests of their own
+    monkeypatch.setattr(roaas.FrontDoor, "render", staticmethod(lambda *_: []))  # its pages have tests of their own
 
     def run(*options, **changed):
         result = json.loads(EXAMPLE.read_text()) | changed
