@@ -71,7 +71,7 @@ def test_failures_are_counted_in_time(described):
 def test_the_page_begins_with_what_is_noticed_and_shows_service_levels(described):
     page = html.document_fromstring(latency_html(described))
     shown = " ".join(page.text_content().split())
-    first = page.xpath("//ul[@id='noticed']/li")[0].text_content()
+    first = page.xpath("//p[@id='noticed']")[0].text_content()
     assert first.startswith("GET /a/{b_c}: a person")
     assert shown.index(first[:40]) < shown.index(described["headline"]["sentence"][:40])
     assert [tag.text for tag in page.xpath("//section[@aria-labelledby='slo']//span")] == [
