@@ -84,21 +84,14 @@ def accepted(_accepted: list[AcceptedDeliveries]) -> AcceptedDeliveries:
 
 
 @pytest.fixture(autouse=True)
-def _listed(_accepted: list[AcceptedDeliveries]) -> Iterator[None]:
-    """Look after each check for the deliveries that the robot has accepted."""
+def _looked_at(_standstills: list[Standstill], _accepted: list[AcceptedDeliveries]) -> Iterator[None]:
+    """Look after each check whether an earlier attempt moves the robot, and for the deliveries that it has accepted."""
     yield
-    for one in _accepted:
-        with suppress(NoAnswerError):  # the next check meets that as well
-            one.read()
-
-
-@pytest.fixture(autouse=True)
-def _looked_at(_standstills: list[Standstill]) -> Iterator[None]:
-    """Look after each check whether an earlier attempt moves the robot."""
-    yield
-    for one in _standstills:
-        with suppress(NoAnswerError):  # the next check meets that as well
-            one.look()
+    with suppress(NoAnswerError):  # the next check meets that as well
+        for standstill in _standstills:
+            standstill.look()
+        for accepted in _accepted:
+            accepted.read()
 
 
 @pytest.fixture
