@@ -7,6 +7,7 @@ import click
 
 from roaas import main
 
+BAR = r"\|"
 _SECTION = re.compile(r"^## (roaas[\w -]*)\n(.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL)
 
 
@@ -36,7 +37,8 @@ def _reference(name: str, command: click.Command) -> str:
     context = click.Context(command, info_name=name, **(main.context_settings | {"obj": None}))
     usage = " ".join([name, *command.collect_usage_pieces(context)])
     rows = [record for option in command.get_params(context) if (record := option.get_help_record(context))]
-    cells = (" | ".join((f"`{names}`", _cell(text))) for names, text in rows)
+    # A bar in a table ends the cell, in code as well.
+    cells = (" | ".join((f"`{names.replace('|', BAR)}`", _cell(text))) for names, text in rows)
     return "\n".join([f"```text\n{usage}\n```", "", "| option | does |", "|---|---|", *(f"| {row} |" for row in cells)])
 
 

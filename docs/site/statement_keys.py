@@ -10,6 +10,7 @@ import msgspec
 from msgspec import inspect
 
 from conformance.packs.table1.statement import StatementFile
+from conformance.statement.load import ServiceLevel
 from conformance.statement.motion_map import MotionMap
 from conformance.statement.statement import Api, Auth, Calls
 
@@ -51,7 +52,7 @@ def page() -> str:
 
 
 #: Tables that are read before the rest, or by themselves.
-_OWN = {"api": Api, "auth": Auth, "calls": Calls}
+_OWN = {"api": Api, "auth": Auth, "calls": Calls, "slo": dict[str, ServiceLevel]}
 
 
 def _table(name: str, shape: Any, about: str = "") -> Iterator[str]:
