@@ -15,9 +15,11 @@ from conformance.packs.table1.robot.probe.client import RosProbe
 from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.robot.standstill import Standstill
 from conformance.packs.table1.robot.stopping import bring_to_rest
+from conformance.packs.table1.robot.valid_responses import ValidResponses
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.scenarios.stage import Stage
+from conformance.transport.client import Connection
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.run import Run
 
@@ -57,6 +59,12 @@ def standstill(api: RestInterface, _standstills: list[Standstill]) -> Standstill
     if not _standstills:
         _standstills.append(Standstill(api))
     return _standstills[0]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _validated(run: Run, interfaces: Interfaces, connection: Connection) -> None:
+    """Judge every successful SOAP response of the run by the XSD."""
+    connection.listeners.append(ValidResponses(run.judge, interfaces.soap.there.values()))
 
 
 @pytest.fixture(scope="session")
