@@ -83,7 +83,7 @@ def test_a_workflow_pins_what_others_wrote_and_gives_each_job_its_rights(name):
 def test_only_the_job_that_publishes_has_an_identity():
     jobs = WORKFLOWS["release"]["jobs"]
     assert [name for name, job in jobs.items() if "id-token" in job["permissions"]] == ["publish"]
-    assert jobs["publish"]["environment"]["name"] == "pypi"
+    assert jobs["publish"]["environment"] == "pypi"
     assert not [step for step in jobs["publish"]["steps"] if "run" in step]
     assert "secrets." not in (ROOT / ".github/workflows/release.yml").read_text(encoding="utf-8")
 
