@@ -12,8 +12,8 @@ from conformance.selftest.coverage import Check, checks_of
 
 #: At which effort checks run, and with how many cases.
 EFFORTS = (
-    "At each effort, unless a check says otherwise. Where cases are generated, quick tries about a tenth of "
-    "standard's, and deep as many as --minutes allows."
+    "At each effort, unless a check says otherwise. Quick tries about a tenth of the cases that standard generates, "
+    "and every other value of those that a check lists. Deep generates as many cases as --minutes allows."
 )
 #: What a run must have, in words.
 NEEDS = {
