@@ -13,7 +13,7 @@ from conformance.documents.representation import UnreadableError, local_name, pa
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-pytestmark = [pytest.mark.phase("resting"), pytest.mark.needs("rest")]
+pytestmark = pytest.mark.needs("rest")
 _XML = "application/xml"
 _TEXT = "text/plain"
 _IDS = {_XML: "rest-formats/xml", _TEXT: "rest-formats/text"}
@@ -26,6 +26,7 @@ def _say_lacking(api: RestInterface, media_type: str, *ids: str) -> None:
             api.run.judge.unclaimed(id_, f"the contract has no responses as {media_type}")
 
 
+@pytest.mark.phase("resting")
 @pytest.mark.requirement(
     "rest-formats/xml", "rest-formats/xml-root", "rest-formats/text", "rest-formats/charset", "rest-formats/vary"
 )
@@ -69,6 +70,7 @@ def _root_fault(operation: Operation, body: bytes) -> str:
     return "" if found == wanted else f"the root element {found!r} where the type is {wanted!r}"
 
 
+@pytest.mark.phase("resting")
 @pytest.mark.requirement("rest-formats/same-values")
 def test_formats_carry_the_same_values(api: RestInterface, judge: Judge) -> None:
     """Compare every value of each resource in all its formats."""
@@ -80,3 +82,13 @@ def test_formats_carry_the_same_values(api: RestInterface, judge: Judge) -> None
         compared += judge_same_values(api, call, others).response.ok
     if not compared and not any(set(_IDS) & set(item.formats) for item in operations_of(api.run.contract)):
         judge.unclaimed("rest-formats/same-values", "the contract has one format only")
+
+
+@pytest.mark.phase("aside")
+@pytest.mark.requirement("rest-formats/same-values")
+def test_formats_of_lists(api: RestInterface) -> None:
+    """Compare every value of each list once more: it may have been empty, or have held equal entries, before."""
+    for call in reads(api):
+        others = [name for name in _IDS if name in call.operation.formats]
+        if others and kind_of(call.operation.shape or {}) == "array":
+            judge_same_values(api, call, others)
