@@ -3,10 +3,9 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, read_envelope, statement_in
-from reports.attestation.signing import Notary
 from reports.attestation.statement import RESULT_SUBJECT, sha256
 from reports.certificate.moves_drawn import pictures
 from reports.certificate.page import certificate_html, certificate_print
@@ -18,8 +17,12 @@ from reports.latency.junit import latency_junit
 from reports.pages.page import write_pages
 from reports.reading import FLEET_NAME, LATENCY_NAME, RESULT_NAME, read_fleet, read_latency, read_result
 
+if TYPE_CHECKING:
+    # It takes a twentieth of a second, and few results are signed.
+    from reports.attestation.signing import Notary
 
-def render(directory: Path, notary: Notary | None = None) -> list[Path]:
+
+def render(directory: Path, notary: "Notary | None" = None) -> list[Path]:
     """Write the pages for each result file in a directory, and return their paths.
 
     `result.json` becomes certificate.html, certificate.md and junit.xml; if it is signed, certificate-print.html as
@@ -70,7 +73,7 @@ def _in_formats(result: Mapping[str, Any], names: Sequence[str]) -> dict[str, st
     return {FORMATS[name].file: FORMATS[name].write(result) for name in names}
 
 
-def _conformance(path: Path, notary: Notary | None) -> dict[str, str]:
+def _conformance(path: Path, notary: "Notary | None") -> dict[str, str]:
     document = read_result(path)
     digest = sha256(path.read_bytes())
     seal = Seal(digest, notary.key if notary else _signed_by(path, digest))

@@ -1,6 +1,7 @@
 """One certification: connect to the robot, run the checks, derive the verdicts, write the result."""
 
 import datetime as dt
+import gc
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -148,6 +149,17 @@ def _leave_out(seen: Iterable[Evidence]) -> None:
             evidence.unclaimed = (evidence.skips or ["nothing that may be called shows it"])[0]
 
 
+class _LoadedForGood:
+    """A pytest plugin that spares the garbage collector what stays until the end of the process: modules and checks.
+
+    Hypothesis looks through all that the collector knows when its first test begins: a tenth of a second.
+    """
+
+    def pytest_collection_finish(self) -> None:
+        """Move every object that exists to the collector's permanent generation."""
+        gc.freeze()
+
+
 def _run_checks(robot: RobotUnderTest, teller: Progress, remarks: list[str], recordings: Recordings) -> bool:
     """Run the checks with pytest, without configuration from the current folder; return True when interrupted."""
     plugin = ChecksPlugin(lambda: robot, lambda: robot.run.contract, recordings)
@@ -156,7 +168,7 @@ def _run_checks(robot: RobotUnderTest, teller: Progress, remarks: list[str], rec
             environment.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
             environment.delenv("PYTEST_ADDOPTS", raising=False)
             folders = map(str, robot.run.contract.rules)
-            code = pytest.main([*folders, *pytest_options()], plugins=[plugin, teller])
+            code = pytest.main([*folders, *pytest_options()], plugins=[plugin, teller, _LoadedForGood()])
     except Exception as error:  # noqa: BLE001 - whatever breaks, what was judged until then is not lost
         remarks.append(f"The suite itself failed, please report this: {type(error).__name__}: {error}")
         robot.run.aborted = robot.run.aborted or "the suite itself failed"

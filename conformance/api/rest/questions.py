@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
-from typing import Any, Final
+from typing import Final
 from urllib.parse import quote
 
 from conformance.api.rest.applicable import allowed, answered
@@ -50,8 +50,9 @@ def questions(api: RestInterface, more: Iterable[Question] = ()) -> list[Questio
         api: the robot's REST interface.
         more: further questions, of the contract pack.
     """
-    found = [*_reads(api), *_refused(api), *_unknown(), *more]
-    alone = [(item, api.client.send("GET", item.path, headers=(("Accept", item.accept),)).response) for item in found]
+    others = [*_refused(api), *_unknown(), *more]
+    alone = _reads(api)
+    alone += [(item, api.client.send("GET", item.path, headers=(("Accept", item.accept),)).response) for item in others]
     return [_of_status(item, answer.status) for item, answer in alone if not item.mismatch(answer)]
 
 
@@ -85,18 +86,16 @@ def _of_status(question: Question, status: int) -> Question:
     return Question(question.path, question.accept, mismatch)
 
 
-def _reads(api: RestInterface) -> list[Question]:
-    """Return a question for each resource in each format."""
-    return [
-        Question(
-            call.path,
-            media_type,
-            _shape_of(call, media_type, _names(call.send(api, ("Accept", media_type)))),
-            comes_and_goes=call.operation.declared(HTTPStatus.NOT_FOUND) is not None,
-        )
-        for call in answered(api)
-        for media_type in call.operation.formats
-    ]
+def _reads(api: RestInterface) -> list[tuple[Question, Response]]:
+    """Return a question for each resource in each format, and the response to it alone."""
+    found: list[tuple[Question, Response]] = []
+    for call in answered(api):
+        for media_type in call.operation.formats:
+            answer = call.send(api, ("Accept", media_type)).response
+            mismatch = _shape_of(call, media_type, _names_in(answer))
+            comes_and_goes = call.operation.declared(HTTPStatus.NOT_FOUND) is not None
+            found.append((Question(call.path, media_type, mismatch, comes_and_goes), answer))
+    return found
 
 
 def _shape_of(call: Call, media_type: str, names: frozenset[str]) -> Callable[[Response], str]:
@@ -118,10 +117,6 @@ def _shape_of(call: Call, media_type: str, names: frozenset[str]) -> Callable[[R
         return f"an object without {min(names - found)}" if is_other else ""
 
     return mismatch
-
-
-def _names(exchange: Any) -> frozenset[str]:
-    return _names_in(exchange.response)
 
 
 def _names_in(answer: Response) -> frozenset[str]:

@@ -23,7 +23,7 @@ _IN_A_ROW = 6
 _SERVED = 2
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def asked() -> list[Question]:
     """Return the list of distinguishable requests, which the first check fills and the others share."""
     return []

@@ -1,20 +1,94 @@
-"""Plain reads, and many of them: the observers judge each, so that one failure in fifty is noticed."""
+"""Many reads, one after another on one connection: each is answered, whatever its number, and by the observers' rules.
 
+One series serves several requirements. Servers used to allow a hundred requests on one connection, and a failure in
+fifty is noticed in twice as many.
+"""
+
+import itertools
 import math
+import time
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from http import HTTPStatus
 
 import pytest
 
+from conformance.api.expectation import expect
 from conformance.api.rest.applicable import reads
+from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
-from conformance.verdict.effort import Effort
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, Unanswered
+from conformance.transport.parallel import is_busy
+from conformance.transport.put_off import put_off_s
+from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
-# Reads of each resource at standard effort; and reads in all, at any effort, with a robot that is not slow.
-_EACH = 60
-_IN_ALL = 56
+_AVAILABLE, _MANY = "http/available", "http/many-requests"
+# Reads in the series, and of each resource at standard effort.
+_IN_ALL, _EACH = 120, 60
+# So many requests that were dropped are the robot's habit, and not the end of an idle connection.
+_DROPS = 3
+# Only a robot that does not answer all reads that follow each other at once, for no longer than this, s, is read again,
+# at the rate that the requirement names.
+_FIRST_S = 3.0
+_READS, _EVERY_S = 100, 0.1
+# A client that was told to slow down reads at this interval, s, so often.
+_SLOW_READS, _SLOW_S = 10, 1.0
+_LONGEST_WAIT_S = 10.0
+
+
+@dataclass
+class _Reads:
+    """What became of reads at one rate, in order.
+
+    Attributes:
+        rate: the rate, in words.
+        attempts: the reads with their responses.
+        usual: the status that each read of a series would have got at first, or on a connection of its own.
+        dropped: how many requests of the series had been dropped by then.
+    """
+
+    rate: str
+    attempts: list[Attempt] = field(default_factory=list)
+    usual: list[int] = field(default_factory=list)
+    dropped: list[int] = field(default_factory=list)
+
+    @property
+    def lost(self) -> list[Attempt]:
+        """The reads without an answer: a server error, too many requests, or no response."""
+        return [
+            one
+            for one in self.attempts
+            if is_busy(one) or (isinstance(one, Exchange) and one.response.status >= HTTPStatus.INTERNAL_SERVER_ERROR)
+        ]
+
+    @property
+    def put_off(self) -> list[Attempt]:
+        """Those of them that the robot put off, and said for how long."""
+        return [one for one in self.lost if put_off_s(one) is not None]
+
+    @property
+    def fine(self) -> bool:
+        """Whether at least 99 % were answered; a single lost read is no share."""
+        return len(self.lost) <= max(1, len(self.attempts) // 100)
+
+    def note(self, attempt: Attempt, usual: int, dropped: int) -> None:
+        """Add one read of a series."""
+        self.attempts.append(attempt)
+        self.usual.append(usual)
+        self.dropped.append(dropped)
+
+
+@pytest.fixture(scope="session")
+def series() -> _Reads:
+    """Return the reads on one connection, which the first check sends."""
+    return _Reads("as fast as the robot answers")
 
 
 @pytest.mark.requirement(
+    _MANY,
     "http/declared-status",
     "http/declared-body",
     "http/content-type",
@@ -27,16 +101,103 @@ _IN_ALL = 56
     "http/json-encoding",
     "http/json-unique-names",
 )
-def test_each_resource_is_read_over_and_over(api: RestInterface, effort: Effort) -> None:
-    """Send each GET operation in turn; the observers judge every response.
+def test_reads_on_one_connection(api: RestInterface, judge: Judge, series: _Reads) -> None:
+    """Send many reads on one connection: each gets the status that it gets on a connection of its own.
 
-    The turns take a prime number of requests more than there are operations, so that a robot which fails with every
-    n-th answer does not always fail with the same one.
+    The observers judge every response. The robot may close a connection at any time (RFC 9112 9.5), and the client then
+    sends the request again on a new one. A robot that does so again and again on a busy connection drops requests.
     """
-    calls = reads(api)
+    judge.at_risk = (_MANY,)
+    _send(api, series)
+    for number, (attempt, usual, dropped) in enumerate(zip(series.attempts, series.usual, series.dropped, strict=True)):
+        if isinstance(attempt, Unanswered):
+            raise NoAnswerError(attempt)
+        expect(judge, _MANY, attempt).status(usual, when=f"it is request {number + 1} on one connection")
+        expect(judge, _MANY, attempt).that(
+            dropped < _DROPS,
+            f"a response to each of {number + 1} requests that follow each other at once",
+            f"a connection that the server closed {dropped} times without a response to a request on it",
+            cause="dropped",
+        )
+
+
+def _send(api: RestInterface, series: _Reads) -> None:
+    """Send the series, if no check has sent it yet, until a request is not answered or too many were dropped."""
+    if series.attempts:
+        return
+    calls, connection = reads(api), api.client.connection
+    usual: dict[str, int] = {}
+    resent = connection.resent
+    with closing(HttpClient(api.client.base_url, connection)) as client:
+        for turn, call in enumerate(_turns(api, calls)):
+            accept = (("Accept", "application/json"),) if turn % 2 else ()
+            try:
+                exchange = client.send("GET", call.path, headers=accept)
+            except NoAnswerError as none:
+                series.note(none.unanswered, 0, connection.resent - resent)
+                return
+            if exchange.response.status != usual.setdefault(call.path, exchange.response.status):
+                # The robot's state may have changed (a resource is gone, the load is high): that is no fault here.
+                usual[call.path] = client.send("GET", call.path, fresh=True).response.status
+            series.note(exchange, usual[call.path], connection.resent - resent)
+            if series.dropped[-1] >= _DROPS:
+                return
+
+
+def _turns(api: RestInterface, calls: Sequence[Call]) -> list[Call]:
+    """Return the reads in their order: all in turn, beginning with another one each time.
+
+    So a robot that fails with every n-th response does not always fail with the same operation.
+    """
+    effort = api.run.effort
     rounds = effort.cases(_EACH)
-    if calls and not api.run.effort.slow:
-        rounds = max(rounds, math.ceil(_IN_ALL / len(calls)))
-    for turn in range(rounds):
-        for call in calls[turn % len(calls) :] + calls[: turn % len(calls)]:
-            call.send(api, *((("Accept", "application/json"),) if turn % 2 else ()))
+    if not effort.slow:
+        rounds = max(rounds, math.ceil(_IN_ALL / max(1, len(calls))))
+    return [call for turn in range(rounds) for call in (*calls[turn % len(calls) :], *calls[: turn % len(calls)])]
+
+
+@pytest.mark.requirement(_AVAILABLE)
+def test_availability(api: RestInterface, judge: Judge, series: _Reads) -> None:
+    """Look at the series of reads, and read anew if the robot has lost some: ten times, then once a second."""
+    calls = [call for call in reads(api) if call.send(api).response.status < HTTPStatus.INTERNAL_SERVER_ERROR]
+    if not calls:
+        judge.note(_AVAILABLE, "no resource could be read")
+        return
+    _send(api, series)
+    seen = series
+    if len(seen.attempts) < (1 if api.run.effort.slow else _READS):
+        # The series has ended early.
+        seen = _read(api, calls, series.rate, _READS, 0.0, _FIRST_S)
+    if not seen.fine:
+        _wait(seen)
+        seen = _read(api, calls, "10 reads a second", _READS, _EVERY_S, _READS * _EVERY_S)
+    # A robot may set its clients a rate, but not one below a read a second.
+    if not seen.fine and len(seen.put_off) == len(seen.lost):
+        _wait(seen)
+        seen = _read(api, calls, "1 read a second", _SLOW_READS, _SLOW_S, _SLOW_READS * _SLOW_S)
+    shown = (seen.lost or seen.attempts)[-1]
+    expect(judge, _AVAILABLE, shown).that(
+        seen.fine,
+        f"at least 99 % of the reads answered ({seen.rate})",
+        f"{len(seen.lost)} of {len(seen.attempts)} reads without an answer, the last one with {shown.came}",
+        cause=shown.came,
+    )
+
+
+def _read(api: RestInterface, calls: Sequence[Call], rate: str, count: int, every_s: float, most_s: float) -> _Reads:
+    seen = _Reads(rate)
+    begun = time.monotonic()
+    for number, call in enumerate(itertools.islice(itertools.cycle(calls), count)):
+        time.sleep(max(0.0, begun + number * every_s - time.monotonic()))
+        try:
+            seen.attempts.append(api.client.send("GET", call.path))
+        except NoAnswerError as none:
+            seen.attempts.append(none.unanswered)
+        if time.monotonic() > begun + most_s:
+            break
+    return seen
+
+
+def _wait(seen: _Reads) -> None:
+    """Wait as long as the robot asked for."""
+    time.sleep(min(_LONGEST_WAIT_S, max((put_off_s(one) or 0 for one in seen.put_off), default=0)))

@@ -70,6 +70,7 @@ def _composed(mutant: GeneratedMutant, kinds: frozenset[str]) -> Iterator[Genera
             says=f"{mutant.says.removesuffix('.').removesuffix(', every time')}, {phrase}.",
             operator=f"{mutant.operator}@{name}",
             make=partial(_make, mutant, when),
+            always=mutant,
         )
 
 

@@ -144,7 +144,9 @@ def _judge(
     )
     given_up = False
     claimed = statement_of(job_for(robot, proxy, efforts[0], seed), contract).claimed(contract)
-    waiting = [(effort, attempt) for effort in efforts for attempt in _attempts(contract, mutant, claimed)]
+    attempts = tuple(_attempts(contract, mutant, claimed))
+    # What quick has not noticed is seldom near: at the next effort everything is judged at once.
+    waiting = [(efforts[0], one) for one in attempts] + [(effort, attempts[-1]) for effort in efforts[1:]]
     while waiting:
         effort, (classes, requirements) = waiting[0]
         known = control.known(effort)

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Self
 
 from conformance.mutation.messages import Change, Forward, Request, Response
 from conformance.mutation.mutant import Mutant
@@ -37,6 +38,7 @@ class GeneratedMutant:
         exchange: the operation.
         classes: conformance classes whose checks can kill it, the likeliest first.
         make: makes the change for one run, which counts the messages that it alters.
+        always: the same mutant without its condition, if it is composed with one.
     """
 
     name: str
@@ -45,6 +47,7 @@ class GeneratedMutant:
     exchange: Exchange
     classes: tuple[str, ...]
     make: Callable[[Tally], Change]
+    always: Self | None = None
 
     @property
     def interface(self) -> str:

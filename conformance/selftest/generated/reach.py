@@ -36,11 +36,11 @@ class Recorder:
 
 
 def unreached(mutants: Iterable[GeneratedMutant], messages: list[Message]) -> frozenset[str]:
-    """Return the names of the faults with a condition that messages alone decide, and that alter none of them."""
-    decidable = [one for one in mutants if _is_decidable(one)]
-    exchanges = {one.exchange.name: one.exchange for one in decidable}
+    """Return the names of the faults that alter none of the messages, or would alter none without their condition."""
+    mutants = [one for one in mutants if one.always is not None]
+    exchanges = {one.exchange.name: one.exchange for one in mutants}
     by_operation = {name: _around(exchange, messages) for name, exchange in exchanges.items()}
-    return frozenset(one.name for one in decidable if not _alters(one, by_operation[one.exchange.name]))
+    return frozenset(one.name for one in mutants if not _alters(_shown(one), by_operation[one.exchange.name]))
 
 
 def _around(exchange: Exchange, messages: list[Message]) -> list[Message]:
@@ -49,9 +49,10 @@ def _around(exchange: Exchange, messages: list[Message]) -> list[Message]:
     return [message for number, message in enumerate(messages) if number in concerned or number + 1 in concerned]
 
 
-def _is_decidable(mutant: GeneratedMutant) -> bool:
+def _shown(mutant: GeneratedMutant) -> GeneratedMutant:
+    """Return what messages show of a fault: without its condition, where messages alone do not decide that."""
     _, _, condition = mutant.operator.partition("@")
-    return bool(condition) and condition not in _OF_TIME
+    return mutant.always if mutant.always is not None and condition in _OF_TIME else mutant
 
 
 def _alters(mutant: GeneratedMutant, messages: list[Message]) -> bool:

@@ -117,6 +117,8 @@ class _Stiller:
     def _no_goal_left(self, patience: Patience) -> bool:
         for _ in poll(WALL_CLOCK, 0.0, lambda: patience.over):
             cancelled = self._ask("DELETE", GOAL_PATH)
+            if cancelled is not None and cancelled.response.status == HTTPStatus.NOT_FOUND:
+                return True
             current = self._ask("GET", GOAL_PATH, ACCEPT_JSON)
             # Anything but a goal that can be read: there is none, or no such resource, or no telling. Whether the robot
             # moves is seen by its velocity.
