@@ -9,7 +9,7 @@ _SOAP: Final = ("zeep", "xmlschema")
 EXTRAS: Final = {
     "soap": _SOAP,
     "load": (
-        *("locust", "hdrh", "matplotlib", "numpy", "httptools", "prometheus_client", "scipy", "diptest", "websockets"),
+        *("locust", "hdrh", "matplotlib", "numpy", "httptools", "prometheus_client", "scipy", "websockets"),
         *_SOAP,
     ),
 }
