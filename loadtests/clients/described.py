@@ -17,8 +17,10 @@ class Described:
         name: method and path, as in the description.
         method: HTTP method.
         base_url: where it is.
-        octets: one request for each set of values; shell variables stand where credentials go (`Credentials`).
+        octets: one request for each set of values; shell variables stand where credentials go (`Credentials`). None
+            where a scenario makes the requests.
         responses: status and media types of each good response.
+        refused: why a scenario may not call it; empty where it may.
     """
 
     name: str
@@ -26,6 +28,7 @@ class Described:
     base_url: str
     octets: tuple[bytes, ...]
     responses: tuple[tuple[int, tuple[str, ...]], ...]
+    refused: str = ""
 
     def requests(self, credentials: Credentials, number: int) -> list[Request]:
         """Return `number` requests, the sets of values in rotation.

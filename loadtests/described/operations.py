@@ -12,7 +12,7 @@ from loadtests.described.device import Device
 from loadtests.settings.errors import SettingsError
 
 _WEIGHTED = re.compile(r"(?P<name>.*?)(?:=(?P<weight>[1-9]\d{0,2}|1000))?", re.DOTALL)
-#: The recorder numbers operations with four bits.
+#: Each operation gets its share of the requests: of more, none would have enough.
 MOST = 16
 _SHOWN = 12
 _LONGEST = 300
@@ -51,11 +51,11 @@ def chosen(device: Device, named: Iterable[str]) -> Chosen:
     notes = []
     for name, weight in wanted.items():
         for operation in _meant(name, known):
-            refused = _refused(device, operation)
-            if refused and is_literal(name, operation):
-                raise SettingsError(f"{operation.label} is not called: {refused}")
-            if refused:
-                notes.append(f"{operation.label} is not called: {refused}")
+            why = refused(device, operation)
+            if why and is_literal(name, operation):
+                raise SettingsError(f"{operation.label} is not called: {why}")
+            if why:
+                notes.append(f"{operation.label} is not called: {why}")
             else:
                 weights[operation] = weight
     if not weights:
@@ -111,7 +111,7 @@ def _meant(name: str, known: tuple[Operation, ...]) -> list[Operation]:
     raise SettingsError(f"the description has no operation {name!r}: {hint}")
 
 
-def _refused(device: Device, operation: Operation) -> str:
+def refused(device: Device, operation: Operation) -> str:
     """Return why an operation is not measured; empty if it is."""
     reason = device.api.call_rules.decide(operation)
     if not reason.may:

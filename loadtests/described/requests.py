@@ -37,6 +37,11 @@ def robot_of(device: Device, operations: Collection[Operation]) -> Robot:
             surveyor.begin(operation)
     except PartialTraceError:
         raise CallError("closed", f"{device.api.client.base_url}: the device stopped responding") from None
+    return robot_at(device, tuple(_described(surveyor, operation) for operation in operations))
+
+
+def robot_at(device: Device, described: tuple[Described, ...]) -> Robot:
+    """Return the robot with operations, by the device's address and credentials."""
     where, connection = device.statement.endpoints, device.api.client.connection
     certificate = connection.certificate
     return Robot(
@@ -45,7 +50,7 @@ def robot_of(device: Device, operations: Collection[Operation]) -> Robot:
         subscribers=None,
         ca_file=where.ca_file,
         timeout_s=where.timeout_s,
-        described=tuple(_described(surveyor, operation) for operation in operations),
+        described=described,
         credentials=connection.credentials.items,
         certificate=None if certificate is None else (str(certificate[0]), str(certificate[1] or "") or None),
     )
@@ -82,7 +87,7 @@ def _described(surveyor: Surveyor, operation: Operation) -> Described:
         method=operation.method,
         base_url=surveyor.api.client.base_url,
         octets=tuple(octets),
-        responses=_responses(operation),
+        responses=declared_good(operation),
     )
 
 
@@ -97,7 +102,7 @@ def octets_of(probe: Probe) -> bytes:
     return "\r\n".join([*lines, "", ""]).encode() + request.body
 
 
-def _responses(operation: Operation) -> tuple[tuple[int, tuple[str, ...]], ...]:
+def declared_good(operation: Operation) -> tuple[tuple[int, tuple[str, ...]], ...]:
     """Return the declared responses that are no errors; if none is, each 2xx with any media type."""
     explicit = any(key.startswith(("2", "3")) for key in operation.responses)
     found = []

@@ -7,10 +7,12 @@ from typing import Any, Self
 
 from conformance.api.rest.stops import send_stops
 from conformance.documents.description import is_url
+from conformance.documents.openapi import operations_of
 from conformance.packs.table1.statement import Load, Statement
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
 from loadtests.described.operations import chosen, named_alike
 from loadtests.described.requests import robot_of
+from loadtests.described.scenario import callable_robot, scenario_of
 from loadtests.described.streams import checked_pointer, streams_of
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.errors import SettingsError
@@ -69,11 +71,23 @@ class Described:
             SettingsError: the operations or options do not make a run.
             CallError: the device does not respond.
         """
+        options, scenario = self.options, self.options["scenario"]
+        target = self._target() if scenario is None else self._of_scenario(scenario)
+        self._acts = target.moves
+        taken = {
+            name: value for name, value in options.items() if name not in {*DESCRIBED_ONLY, *_PAPERS_ONLY, "against"}
+        }
+        if scenario is not None:
+            taken["users"] = options["users"] or 1
+        other = None if self.other is None else _statement(self.other)
+        return settle(CliOptions.of(**taken, against=other, command=command), _statement(self.device), target)
+
+    def _target(self) -> Target:
+        """Return the operations that the options name."""
         options, device = self.options, self.device
         operations = chosen(device, options["operations"])
         names, weights = [each.label for each in operations.weights], tuple(operations.weights.values())
         changing = [each.label for each in operations.weights if not each.safe or each.motion]
-        self._acts = bool(changing)
         robot = robot_of(device, operations.weights)
         levels = {named_alike(name, device): level for name, level in device.statement.slo.items()}
         target = Target(
@@ -82,7 +96,7 @@ class Described:
             moves=bool(changing),
             steps_move=names[0] in changing,
             other=None if self.other is None else robot_of(self.other, _same(self.other, operations.weights)),
-            description=self.source if is_url(self.source) else Path(self.source).name,
+            description=self._described,
             slo={name: level for name, level in levels.items() if name in names},
             notes=(*device.remarks, *operations.notes),
             streams=Streams(streams_of(device, options["streams"]), checked_pointer(options["stamp_field"])),
@@ -92,11 +106,31 @@ class Described:
             target = replace(
                 target, notes=(*target.notes, f"not measured, so not judged: [slo] {', '.join(unmeasured)}")
             )
-        taken = {
-            name: value for name, value in options.items() if name not in {*DESCRIBED_ONLY, *_PAPERS_ONLY, "against"}
-        }
-        other = None if self.other is None else _statement(self.other)
-        return settle(CliOptions.of(**taken, against=other, command=command), _statement(device), target)
+        return target
+
+    def _of_scenario(self, file: str) -> Target:
+        """Return the operations that a scenario may call."""
+        options, device = self.options, self.device
+        scenario = scenario_of(file, options)
+        robot = callable_robot(device)
+        names = [each.name for each in robot.described if not each.refused]
+        moves = any(each.label in names and (not each.safe or each.motion) for each in operations_of(device.contract))
+        return Target(
+            robot,
+            Selection(tuple(names), ("rest",), ("wire",)),
+            moves=moves,
+            steps_move=moves,
+            description=self._described,
+            slo={named_alike(name, device): level for name, level in device.statement.slo.items()},
+            notes=device.remarks,
+            streams=Streams(streams_of(device, options["streams"]), checked_pointer(options["stamp_field"])),
+            scenario=scenario,
+        )
+
+    @property
+    def _described(self) -> str:
+        """Return the description's URL, or the name of its file."""
+        return self.source if is_url(self.source) else Path(self.source).name
 
     def stop(self) -> None:
         """Send what the description marks as a stop (x-roaas-stop), if the run called what may change something."""

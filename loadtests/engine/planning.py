@@ -63,6 +63,7 @@ def duel_plan(settings: Settings, *robots: Robot) -> tuple[Plan, list[str]]:
         offers=offers,
         robots=len(robots),
         weights=wanted.weights,
+        scenario=settings.scenario is not None,
     )
     notes = sorted(missing)
     if ROSBRIDGE in interfaces:

@@ -122,6 +122,14 @@ class Streams:
 
 
 @dataclass(frozen=True)
+class Scenario:
+    """A Locust file with the tasks of the users, and the digest of its content, by which workers know it."""
+
+    file: str
+    sha256: str
+
+
+@dataclass(frozen=True)
 class Against:
     """The robot to compare with, and the share by which the robot under load may be slower."""
 
@@ -142,6 +150,7 @@ class Settings:
         description: URL or name of the description that the operations come from; None for the paper's robot.
         notes: what the result should say of the choice of operations.
         streams: what to listen to.
+        scenario: what the users do; None where requests come at set times, or one after the other.
     """
 
     robot: Robot
@@ -159,6 +168,7 @@ class Settings:
     description: str | None = None
     notes: tuple[str, ...] = ()
     streams: Streams = field(default_factory=Streams)
+    scenario: Scenario | None = None
 
     def to_json(self) -> str:
         """Return the settings for the process that measures."""

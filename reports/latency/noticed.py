@@ -102,7 +102,14 @@ def _how_often(share: float, result: Mapping[str, Any], one: Mapping[str, Any]) 
 
 def _limits(result: Mapping[str, Any], failed: bool) -> Iterator[str]:  # noqa: FBT001 -- whether any request failed
     plan = result["plan"]
-    load = f"{rate(plan['rate'])} requests/s" if plan.get("rate") else f"{plan.get('users')} users"
+    users = f"{plan.get('users')} user{'' if plan.get('users') == 1 else 's'}"
+    load = f"{rate(plan['rate'])} requests/s" if plan.get("rate") else users
     near = (result["environment"].get("robot") or {}).get("same_machine")
     network = " on the robot's own machine: a network adds its delay" if near else ""
     yield f"{'' if failed else 'No request failed. '}Measured at {load} for {plan['duration_s']:g} s{network}."
+    if plan["model"] == "closed":
+        whose = "The scenario's users wait" if plan.get("scenario") else "Each user waits"
+        yield (
+            f"{whose} for a response before the next request (closed model): a slow robot gets fewer requests. "
+            "Requests at a fixed rate, as with --rate, may take longer than these."
+        )
