@@ -149,9 +149,11 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
     "streams",
     multiple=True,
     metavar="NAME|URL",
-    help="Also listen to this stream: an operation that sends events, or a WebSocket (ws://…); repeatable.",
+    help="Also listen to this stream: an operation that sends events, a WebSocket (ws://…), or a topic of a rosbridge "
+    "(ws://…#/odom); repeatable.",
 )
 @click.option("--stamp-field", metavar="POINTER", help="Where a message has its time, such as /header/stamp.")
+@click.option("--clock-field", metavar="POINTER", help="Where the polled response has the robot's time, such as /now.")
 @click.option("--end-to-end", is_flag=True, help="Also measure the time until the robot's application has a delivery.")
 @click.option("--ros-domain-id", type=click.IntRange(0, 232), help="The robot's ROS domain, for --end-to-end.")
 @click.option("--thresholds", type=_FILE, help="TOML file of [[threshold]] tables.")
@@ -269,7 +271,9 @@ class _Baselines:
 
 def _command_line() -> str:
     """Return the command line without the folders of this machine."""
-    return command_without_folders(sys.argv[1:], ("--operation", "--call", "--never", "--stream", "--stamp-field"))
+    return command_without_folders(
+        sys.argv[1:], ("--operation", "--call", "--never", "--stream", "--stamp-field", "--clock-field")
+    )
 
 
 def _make_folder(folder: Path) -> None:

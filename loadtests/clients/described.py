@@ -48,8 +48,8 @@ class Stream:
 
     Attributes:
         name: method and path of the operation, or the WebSocket's URL.
-        kind: `sse` or `websocket`.
-        url: where it is.
+        kind: `sse`, `websocket` or `rosbridge`.
+        url: where it is; that of a rosbridge has the topic as its fragment.
         octets: the request, with shell variables for credentials; empty for a WebSocket.
     """
 

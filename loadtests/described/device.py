@@ -28,7 +28,8 @@ from loadtests.settings.errors import SettingsError
 #: Options, by their names in Python, that a device with a description alone has.
 DESCRIBED_ONLY = (
     "openapi", "wsdl", "overlays", "base_url", "allow", "never", "basic_file", "digest_file", "api_key", "api_key_file",
-    "headers_file", "client_cert_file", "client_key_file", "streams", "stamp_field", "scenario",
+    "headers_file", "client_cert_file", "client_key_file", "streams", "stamp_field", "clock_field",
+    "scenario",
 )  # fmt: skip
 #: The credentials in options, by their names in Python.
 CREDENTIALS = ("token_file", "basic_file", "digest_file", "api_key", "api_key_file", "headers_file")

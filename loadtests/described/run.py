@@ -13,10 +13,10 @@ from loadtests.described.device import DESCRIBED_ONLY, Device, Named
 from loadtests.described.operations import chosen, named_alike
 from loadtests.described.requests import robot_of
 from loadtests.described.scenario import callable_robot, scenario_of
-from loadtests.described.streams import checked_pointer, streams_of
+from loadtests.described.streams import streams_to_hear
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.errors import SettingsError
-from loadtests.settings.settings import Selection, Settings, Streams
+from loadtests.settings.settings import Selection, Settings
 from loadtests.settings.settle import settle
 from loadtests.settings.target import Target
 
@@ -99,7 +99,7 @@ class Described:
             description=self._described,
             slo={name: level for name, level in levels.items() if name in names},
             notes=(*device.remarks, *operations.notes),
-            streams=Streams(streams_of(device, options["streams"]), checked_pointer(options["stamp_field"])),
+            streams=streams_to_hear(device, options),
         )
         unmeasured = [name for name in levels if name not in names]
         if unmeasured:
@@ -123,7 +123,7 @@ class Described:
             description=self._described,
             slo={named_alike(name, device): level for name, level in device.statement.slo.items()},
             notes=device.remarks,
-            streams=Streams(streams_of(device, options["streams"]), checked_pointer(options["stamp_field"])),
+            streams=streams_to_hear(device, options),
             scenario=scenario,
         )
 

@@ -72,10 +72,11 @@ def _addresses(robot: Robot) -> list[str]:
 def same_machine(robot: Robot) -> bool:
     """Return whether all of a robot's addresses are this machine's, as far as can be known without DNS."""
     addresses = _addresses(robot)
-    return bool(addresses) and all(_is_here(Endpoint.parse(address).host) for address in addresses)
+    return bool(addresses) and all(is_here(Endpoint.parse(address).host) for address in addresses)
 
 
-def _is_here(host: str) -> bool:
+def is_here(host: str) -> bool:
+    """Return whether a host is this machine, as far as can be known without DNS."""
     if host == "localhost":
         return True
     try:

@@ -33,6 +33,7 @@ from loadtests.statistics import (
 )
 from loadtests.statistics.against import EXIT_CODES, Against, against
 from loadtests.statistics.between_runs import between_runs
+from loadtests.statistics.clock_offset import SHARED
 from loadtests.statistics.comparisons import AaControl, aa_controls, further_interfaces, soap_over_rest
 from loadtests.statistics.headline import Found, headline
 from loadtests.statistics.intervals import order_interval_ms
@@ -195,12 +196,13 @@ def _end_to_end(outcome: Outcome) -> dict[str, Any]:
 
 def _streams(outcome: Outcome) -> list[dict[str, Any]]:
     """Return the `streams`: what came over each stream, and by polling beside them."""
-    clock = "shared" if same_machine(outcome.robots[0]) else "not known"
-    return [
-        {"name": one.name, "kind": one.kind, "clock": clock, "error": one.error}
-        | streams.stream_figures(one.moments_ns, one.ages_ms, one.listened_s)
-        for one in outcome.heard
-    ]
+    here, found = same_machine(outcome.robots[0]), []
+    for one in outcome.heard:
+        offset = None if one.clock is None else SHARED if here else one.clock.offset
+        clock = "not known" if offset is None else "shared" if here else "estimated"
+        figures_of = streams.stream_figures(one.moments_ns, one.ages_ms, one.listened_s, offset)
+        found.append({"name": one.name, "kind": one.kind, "clock": clock, "error": one.error} | figures_of)
+    return found
 
 
 def _silent(outcome: Outcome) -> list[str]:

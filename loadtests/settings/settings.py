@@ -115,10 +115,16 @@ class EndToEnd:
 
 @dataclass(frozen=True)
 class Streams:
-    """The streams to listen to after the comparison, and the JSON pointer to the stamp in a message (RFC 6901)."""
+    """The streams to listen to after the comparison, and JSON pointers (RFC 6901) into messages.
+
+    Attributes:
+        stamp: to the time of the data in a message.
+        clock: to the time, in the response that is polled, at which the robot made that response.
+    """
 
     listen: tuple[Stream, ...] = ()
     stamp: str | None = None
+    clock: str | None = None
 
 
 @dataclass(frozen=True)

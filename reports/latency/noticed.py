@@ -75,11 +75,15 @@ def _of_streams(result: Mapping[str, Any]) -> Iterator[str]:
     """Yield how old the data is that a display shows, for each stream and for polling beside it."""
     for one in result.get("streams", []):
         ages, intervals = one["age_ms"], one["interval_ms"]
-        if ages and intervals:
-            how = "polled" if one["kind"] == "polling" else "streamed"
+        name = f"{excerpt(one['name'], 100)}, {'polled' if one['kind'] == 'polling' else 'streamed'}"
+        if one.get("stamped") and one.get("clock") == "not known":
+            yield f"{name}: the age of the data is not known, because the robot's clock is not."
+        elif ages and intervals:
+            error = one.get("age_error_ms")
+            sure = f"; the robot's clock is known to ± {ms(error)} ms only" if error else ""
             yield (
-                f"{excerpt(one['name'], 100)}, {how}: the data is {ms(ages['p50'])} ms old when it comes "
-                f"({ms(ages['max'])} ms at most), and a display that shows it until the next shows data that is up to "
+                f"{name}: the data is {ms(ages['p50'])} ms old when it comes ({ms(ages['max'])} ms at most{sure}), and "
+                f"a display that shows it until the next shows data that is up to "
                 f"{ms(ages['max'] + intervals['max'])} ms old."
             )
 
