@@ -102,9 +102,10 @@ def test_the_web_ui_shows_the_runs_numbers(toy, load, free_port):
     assert 0 < counts[-1] <= 180
 
 
-def test_the_kubernetes_manifest_is_one_and_gives_options_that_there_are():
+@pytest.mark.parametrize("name", ["loadtest.yaml", "described.yaml"])
+def test_a_kubernetes_manifest_is_one_and_gives_options_that_there_are(name):
     folder = ROOT / "deploy" / "kubernetes"
-    manifest = yaml.safe_load((folder / "loadtest.yaml").read_text())
+    manifest = yaml.safe_load((folder / name).read_text())
     schema = json.loads((folder / "locusttest.schema.json").read_text())
     operators = jsonschema.Draft202012Validator(schema)
     operators.validate(manifest)
