@@ -14,6 +14,9 @@ CLIENT_WORDS = {
     "beforehand and each is sent once",
     "zeep": "what an ordinary user's program calls: zeep over SOAP, the requests library over REST",
 }
+_SCENARIO = (
+    "our own HTTP/1.1 client on gevent and llhttp; requests are built when the scenario sends them, each is sent once"
+)
 
 
 def plan_words(settings: Settings, plan: Plan, pacing: str) -> dict[str, Any]:
@@ -33,7 +36,7 @@ def plan_words(settings: Settings, plan: Plan, pacing: str) -> dict[str, Any]:
         "timeout_s": plan.timeout_s,
         "operations": [plan.operations[number] for number in called] if plan.scenario else list(plan.operations),
         "interfaces": list(plan.interfaces),
-        "clients": {name: CLIENT_WORDS[name] for name in plan.clients},
+        "clients": {name: _SCENARIO if plan.scenario else CLIENT_WORDS[name] for name in plan.clients},
         "zeep_rate": load.rate if plan.open_model and LIBRARY in plan.clients else None,
         "repeats": settings.repeats.number,
         "restart_command": without_folders(settings.repeats.restart_command or "") or None,

@@ -79,12 +79,17 @@ def _of_streams(result: Mapping[str, Any]) -> Iterator[str]:
         if one.get("stamped") and one.get("clock") == "not known":
             yield f"{name}: the age of the data is not known, because the robot's clock is not."
         elif ages and intervals:
-            error = one.get("age_error_ms")
-            sure = f"; the robot's clock is known to ± {ms(error)} ms only" if error else ""
+            error = one.get("age_error_ms") or 0.0
+            old = f"{ms(ages['p50'])} ms old when it comes ({ms(ages['max'])} ms at most)"
+            if error:
+                least = max(0.0, ages["p50"] - error)
+                old = (
+                    f"{ms(least)} to {ms(ages['p50'] + error)} ms old when it comes (the robot's clock is known to "
+                    f"± {ms(error)} ms only)"
+                )
             yield (
-                f"{name}: the data is {ms(ages['p50'])} ms old when it comes ({ms(ages['max'])} ms at most{sure}), and "
-                f"a display that shows it until the next shows data that is up to "
-                f"{ms(ages['max'] + intervals['max'])} ms old."
+                f"{name}: the data is {old}, and a display that shows it until the next shows data that is up to "
+                f"{ms(ages['max'] + error + intervals['max'])} ms old."
             )
 
 
@@ -107,10 +112,10 @@ def _how_often(share: float, result: Mapping[str, Any], one: Mapping[str, Any]) 
 def _limits(result: Mapping[str, Any], failed: bool) -> Iterator[str]:  # noqa: FBT001 -- whether any request failed
     plan = result["plan"]
     users = f"{plan.get('users')} user{'' if plan.get('users') == 1 else 's'}"
-    load = f"{rate(plan['rate'])} requests/s" if plan.get("rate") else users
+    load = f"at {rate(plan['rate'])} requests/s" if plan.get("rate") else f"with {users}"
     near = (result["environment"].get("robot") or {}).get("same_machine")
     network = " on the robot's own machine: a network adds its delay" if near else ""
-    yield f"{'' if failed else 'No request failed. '}Measured at {load} for {plan['duration_s']:g} s{network}."
+    yield f"{'' if failed else 'No request failed. '}Measured {load} for {plan['duration_s']:g} s{network}."
     if plan["model"] == "closed":
         whose = "The scenario's users wait" if plan.get("scenario") else "Each user waits"
         yield (
