@@ -24,7 +24,7 @@ from loadtests.clients.wire import Answer, Connection, Request, now_ns
 
 _NAMED = re.compile(r"\{([^{}]*)\}")
 _BREAK = re.compile(r"[\r\n\0]")
-_UNRESERVED = "/:@!$&'()*+,;=~%?"
+_KEPT = "/:@!$&'()*+,;=~%?"
 
 
 class NoResponseError(RescheduleTask):
@@ -209,7 +209,7 @@ class Client:
             ScenarioError: the description has no such operation, or it may not be called.
             NoResponseError: no response was received; Locust ends the task.
         """
-        path = quote(path, safe=_UNRESERVED)
+        path = quote(path, safe=_KEPT)
         return self._send(self._routes.of(method, path.partition("?")[0]), method, path, **how)
 
     def _send(

@@ -1,7 +1,7 @@
 """A run on a device with a description: its settings, and the stop at its end."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
@@ -9,6 +9,7 @@ from conformance.api.rest.stops import send_stops
 from conformance.documents.description import is_url
 from conformance.documents.openapi import operations_of
 from conformance.packs.table1.statement import Load, Statement
+from conformance.statement.load import ServiceLevel
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
 from loadtests.described.operations import chosen, named_alike
 from loadtests.described.requests import robot_of
@@ -73,7 +74,6 @@ class Described:
         """
         options, scenario = self.options, self.options["scenario"]
         target = self._target() if scenario is None else self._of_scenario(scenario)
-        self._acts = target.moves
         taken = {
             name: value for name, value in options.items() if name not in {*DESCRIBED_ONLY, *_PAPERS_ONLY, "against"}
         }
@@ -88,25 +88,27 @@ class Described:
         operations = chosen(device, options["operations"])
         names, weights = [each.label for each in operations.weights], tuple(operations.weights.values())
         changing = [each.label for each in operations.weights if not each.safe or each.motion]
+        self._acts = bool(changing)
         robot = robot_of(device, operations.weights)
-        levels = {named_alike(name, device): level for name, level in device.statement.slo.items()}
-        target = Target(
+        slo, unmeasured = self._levels(names)
+        return Target(
             robot,
             Selection(tuple(names), ("rest",), ("wire",), weights if len(set(weights)) > 1 else ()),
             moves=bool(changing),
             steps_move=names[0] in changing,
             other=None if self.other is None else robot_of(self.other, _same(self.other, operations.weights)),
-            description=self._described,
-            slo={name: level for name, level in levels.items() if name in names},
-            notes=(*device.remarks, *operations.notes),
+            description=self._description,
+            slo=slo,
+            notes=(*device.remarks, *operations.notes, *unmeasured),
             streams=streams_to_hear(device, options),
         )
-        unmeasured = [name for name in levels if name not in names]
-        if unmeasured:
-            target = replace(
-                target, notes=(*target.notes, f"not measured, so not judged: [slo] {', '.join(unmeasured)}")
-            )
-        return target
+
+    def _levels(self, names: list[str]) -> tuple[dict[str, ServiceLevel], list[str]]:
+        """Return the service levels of operations, and a note on those of others."""
+        levels = {named_alike(name, self.device): level for name, level in self.device.statement.slo.items()}
+        others = [name for name in levels if name not in names]
+        notes = [f"not measured, so not judged: [slo] {', '.join(others)}"] if others else []
+        return {name: level for name, level in levels.items() if name in names}, notes
 
     def _of_scenario(self, file: str) -> Target:
         """Return the operations that a scenario may call."""
@@ -114,21 +116,24 @@ class Described:
         scenario = scenario_of(file, options)
         robot = callable_robot(device)
         names = [each.name for each in robot.described if not each.refused]
-        moves = any(each.label in names and (not each.safe or each.motion) for each in operations_of(device.contract))
+        slo, unmeasured = self._levels(names)
+        moves = self._acts = any(
+            each.label in names and (not each.safe or each.motion) for each in operations_of(device.contract)
+        )
         return Target(
             robot,
             Selection(tuple(names), ("rest",), ("wire",)),
             moves=moves,
             steps_move=moves,
-            description=self._described,
-            slo={named_alike(name, device): level for name, level in device.statement.slo.items()},
-            notes=device.remarks,
+            description=self._description,
+            slo=slo,
+            notes=(*device.remarks, *unmeasured),
             streams=streams_to_hear(device, options),
             scenario=scenario,
         )
 
     @property
-    def _described(self) -> str:
+    def _description(self) -> str:
         """Return the description's URL, or the name of its file."""
         return self.source if is_url(self.source) else Path(self.source).name
 

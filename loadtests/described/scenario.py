@@ -18,7 +18,7 @@ from loadtests.statistics.recorder import MOST_OPERATIONS
 #: What a scenario decides by itself, or what needs requests at set times; by name in Python, with the value by default.
 _OTHERWISE = {
     "operations": (), "rate": None, "arrivals": "constant", "steps": False, "step_rates": (), "knee": False,
-    "connections": (), "against": None,
+    "connections": (), "against": None, "restart_command": None,
 }  # fmt: skip
 
 

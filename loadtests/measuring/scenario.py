@@ -31,6 +31,7 @@ from loadtests.schedule.rotation import rotation
 from loadtests.settings.settings import Scenario
 
 _PERCENT = 100
+_LONGEST = 300  # characters of an exception that are shown
 
 
 class RobotUser(locust.User):
@@ -85,7 +86,7 @@ def _told(error: BaseException, path: Path) -> str:
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename) == path]
     line = f" ({path.name}, line {frames[-1].lineno})" if frames else ""
     kind = "" if isinstance(error, ScenarioError) else f"{type(error).__name__}: "
-    return f"{kind}{error}{line}"
+    return f"{kind}{str(error)[:_LONGEST]}{line}"
 
 
 class ScenarioSession(Recording):

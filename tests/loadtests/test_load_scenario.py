@@ -61,7 +61,7 @@ def test_the_example_runs_and_each_request_is_in_its_result(device, load, tmp_pa
     url, statement = device(), tmp_path / "robot.toml"
     statement.write_text(
         f'[robot]\nname = "toy"\n[api]\nopenapi = "{url}/openapi.json"\n'
-        '[slo]\n"GET /state" = { p50_ms = 9000 }\n"GET /text" = { p50_ms = 1 }\n'
+        '[slo]\n"GET /state" = { p50_ms = 9000 }\n"GET /text" = { p50_ms = 1 }\n"POST /drive" = { p50_ms = 1 }\n'
     )
     run = load(statement, f"--scenario {EXAMPLE} --users 8 --duration 4 --warmup 0")
     result = run.result
@@ -78,6 +78,7 @@ def test_the_example_runs_and_each_request_is_in_its_result(device, load, tmp_pa
     assert 24 <= measured["GET /state"] <= 54, "six of eight users, twice a second each"
     assert {"GET /state"} == {entry["operation"] for entry in result["slo"]}
     assert "not called, so not judged: [slo] GET /text" in result["notes"]
+    assert "not measured, so not judged: [slo] POST /drive" in result["notes"]
     assert result["noise_floor"], "blocks of the same users are compared with one another"
     assert run.code == (0 if result["valid"] else 4), run.out + run.err
     page = latency_html(result)
@@ -129,6 +130,21 @@ def test_workers_share_the_users_and_what_may_change_something_is_stopped_at_the
     assert done["POST /drive"] > 20
     assert result["plan"]["limits"]["max_rate"] == 500
     assert "t0ken" not in run.out + run.err + json.dumps(result)
+
+
+def test_each_request_answers_the_devices_challenge(device, load, scenario, tmp_path):
+    user, url = tmp_path / "user", device("--auth", "digest")
+    user.write_text("robot:s3same-robot")
+    run = load(
+        f"{url}/openapi.json --scenario",
+        scenario('self.client.get("/state")'),
+        "--digest-file",
+        user,
+        "--users 2 --duration 2",
+    )
+    assert run.result["generator"]["completed"] > 20
+    assert run.result["generator"]["errors"] == 0
+    assert "s3same" not in run.out + run.err + json.dumps(run.result)
 
 
 def test_a_limit_on_the_rate_holds_for_all_users_together(device, load, scenario, tmp_path):
