@@ -223,8 +223,8 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     except KeyboardInterrupt:
         return CommandResult(ExitCode.INTERRUPTED)
     finally:
-        if device is not None:
-            device.stop()
+        for problem in device.stop() if device is not None else ():
+            click.echo(f"roaas load: {problem}", err=True)
     return kept.after(result, tolerance, click.get_current_context().obj)
 
 

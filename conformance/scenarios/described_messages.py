@@ -60,8 +60,12 @@ class DescribedMessages:
         whole = envelope((node,) if node else (), blocks or None, space or port.envelope)
         return b'<?xml version="1.0" encoding="utf-8"?>\n' + whole.written()
 
-    def usual(self, operation: SoapOperation) -> tuple[Element | None, Node | None]:
+    def usual(self, operation: SoapOperation, turn: int = 0) -> tuple[Element | None, Node | None]:
         """Return the declaration of an operation's request, and a valid message of it; None if its Body is empty.
+
+        Args:
+            operation: the operation.
+            turn: which of the given values to use, in rotation.
 
         Raises:
             NotPossibleError: none can be made.
@@ -77,7 +81,7 @@ class DescribedMessages:
             for path, _ in simple_leaves(declared, node):
                 given = self.values.get(node.at(path).name)
                 if given:
-                    node = with_text(node, path, str(given[0]))
+                    node = with_text(node, path, str(given[turn % len(given)]))
             fault = self.found.types.invalid(parse(node.written()))
             if not fault:
                 return declared, node

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 
+from conformance.transport import exchange
 from conformance.transport.credentials import Credentials
-from loadtests.clients.failures import Declared
+from loadtests.clients.failures import Declared, Reply
 from loadtests.clients.wire import Request
 
 VARIABLE = b"$ROAAS_"
@@ -14,18 +15,22 @@ class Described:
     """One operation to measure.
 
     Attributes:
-        name: method and path, as in the description.
+        name: what the result calls it: method and path, an operation of a WSDL, or a pair's name.
         method: HTTP method.
         base_url: where it is.
         octets: one request for each set of values; shell variables stand where credentials go (`Credentials`).
-        responses: status and media types of each good response.
+        responses: status and media types of each good response over REST.
+        interface: `rest` or `soap`.
+        reply: local name of the element in the Body of a good response over SOAP; empty if there is none.
     """
 
     name: str
     method: str
     base_url: str
     octets: tuple[bytes, ...]
-    responses: tuple[tuple[int, tuple[str, ...]], ...]
+    responses: tuple[tuple[int, tuple[str, ...]], ...] = ()
+    interface: str = "rest"
+    reply: str = ""
 
     def requests(self, credentials: Credentials, number: int) -> list[Request]:
         """Return `number` requests, the sets of values in rotation.
@@ -34,9 +39,19 @@ class Described:
             credentials: those that are the same in each request; answers to challenges are added when it is sent.
             number: how many.
         """
-        good = Declared(self.responses)
+        good = Declared(self.responses) if self.interface == "rest" else Reply(self.reply)
         made = [Request(credentials.revealed(each), good) for each in self.octets]
         return [made[place % len(made)] for place in range(number)]
+
+
+def bytes_of(request: exchange.Request) -> bytes:
+    """Return the bytes of a request that was sent, with variables in place of credentials."""
+    fields = [pair for pair in request.headers if pair[0] != "Connection"]
+    lines = [
+        f"{request.method} {request.target}{request.query} HTTP/1.1",
+        *(f"{name}: {text}" for name, text in fields),
+    ]
+    return "\r\n".join([*lines, "", ""]).encode() + request.body
 
 
 @dataclass(frozen=True)

@@ -56,11 +56,20 @@ class Robot:
     credentials: tuple[Credential, ...] = ()
     certificate: tuple[str, str | None] | None = None
 
+    @property
+    def soap(self) -> str | None:
+        """Return the address of the SOAP services of a device that is called by its own WSDL, or None."""
+        return next((each.base_url for each in self.described if each.interface == "soap"), None)
+
+    @property
+    def addresses(self) -> list[str]:
+        """Return the addresses of its web services."""
+        return [each for each in (self.rest, self.publishers, self.subscribers, self.soap) if each]
+
     @cached_property
     def tls(self) -> Any:
         """Return the TLS context, or None if no address needs one."""
-        addresses = (self.rest, self.publishers, self.subscribers, self.rosbridge)
-        if not any(address and address.startswith(("https:", "wss:")) for address in addresses):
+        if not any(address.startswith(("https:", "wss:")) for address in (*self.addresses, self.rosbridge or "")):
             return None
         return self.context()
 
@@ -82,23 +91,25 @@ class Robot:
         """Return the credentials that are the same in each request."""
         return Credentials(tuple(item for item in self.credentials if item.kind is not Kind.DIGEST))
 
-    def _described(self, operation: str) -> Described | None:
-        return next((each for each in self.described if each.name == operation), None)
+    def _described(self, interface: str, operation: str) -> Described | None:
+        return next((each for each in self.described if (each.interface, each.name) == (interface, operation)), None)
 
     def method(self, operation: str) -> str:
-        """Return an operation's HTTP method over REST."""
-        found = self._described(operation)
-        return found.method if found else CATALOGUE[operation].method
+        """Return an operation's HTTP method over REST; POST if it is only offered over SOAP."""
+        if self.described:
+            found = self._described("rest", operation)
+            return found.method if found else "POST"
+        return CATALOGUE[operation].method
 
     def values(self, operation: str, seed: int) -> list[Values]:
         """Return the values of each variant, for the library clients; empty for a described operation."""
-        return [] if self._described(operation) else variants(operation, seed)
+        return [] if self.described else variants(operation, seed)
 
     def address(self, interface: str, operation: str) -> str | None:
         """Return the address of an operation over an interface; None if the interface lacks the operation."""
-        described = self._described(operation)
-        if described is not None:
-            return described.base_url if interface == "rest" else None
+        if self.described:
+            found = self._described(interface, operation)
+            return found.base_url if found else None
         if interface == "rest":
             return self.rest
         if interface == "rosbridge":
@@ -113,7 +124,7 @@ class Robot:
         """Return whether a client can call an operation over an interface; zeep needs the WSDL as well."""
         if self.address(interface, operation) is None:
             return False
-        if interface == "rosbridge" or self._described(operation):
+        if interface == "rosbridge" or self.described:
             return client == "wire"
         return interface == "rest" or client == "wire" or self.wsdl(operation) is not None
 
@@ -131,7 +142,7 @@ class Robot:
         address = self.address(interface, operation)
         if address is None:
             return []
-        described = self._described(operation)
+        described = self._described(interface, operation)
         if described is not None:
             return described.requests(self.fixed, VARIANTS)
         if interface == "rosbridge":  # its own values: it must not take another interface's delivery for its echo

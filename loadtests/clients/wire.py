@@ -21,7 +21,7 @@ from gevent.hub import Waiter, get_hub
 
 from conformance.transport.credentials import Credentials
 from loadtests.clients.endpoint import Endpoint
-from loadtests.clients.failures import CallError, Declared, connect_error, require_good
+from loadtests.clients.failures import CallError, Declared, Reply, connect_error, require_good
 
 _READ = 1  # libev's EV_READ
 _CHUNK = 65_536
@@ -38,7 +38,7 @@ class Request:
     """A request as bytes, and its good responses: the bytes that their bodies contain, or what is declared."""
 
     octets: bytes
-    expects: bytes | Declared = b""
+    expects: bytes | Declared | Reply = b""
 
 
 @dataclass(slots=True)
@@ -56,7 +56,7 @@ class Answer:
     received_ns: int
     octets: int
 
-    def require_good(self, expects: bytes | Declared) -> None:
+    def require_good(self, expects: bytes | Declared | Reply) -> None:
         """Accept a 2xx response whose body contains `expects`, or a response that is declared.
 
         Raises:

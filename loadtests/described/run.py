@@ -2,16 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, Self
 
-from conformance.api.rest.stops import send_stops
 from conformance.documents.description import is_url
+from conformance.engine.describing import is_wsdl
 from conformance.packs.table1.statement import Load, Statement
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
-from loadtests.described.operations import chosen, named_alike
-from loadtests.described.requests import robot_of
+from loadtests.described.pairs import Choice
+from loadtests.described.stopping import Stopping
 from loadtests.described.streams import checked_pointer, streams_of
+from loadtests.schedule.plan import step_operation
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.errors import SettingsError
 from loadtests.settings.settings import Selection, Settings, Streams
@@ -23,7 +23,7 @@ _PAPERS_ONLY = (
     "ros_domain_id", "thresholds", "against_publishers_wsdl", "against_subscribers_wsdl",
     "against_publishers_endpoint", "against_subscribers_endpoint",
 )  # fmt: skip
-_DESCRIPTIONS = (".json", ".yaml", ".yml")
+_DESCRIPTIONS = (".json", ".yaml", ".yml", ".wsdl")
 
 
 @dataclass
@@ -31,17 +31,17 @@ class Described:
     """A run on a device with a description.
 
     Attributes:
-        source: URL or file of the description.
+        named: the descriptions and the statement.
         options: of the command.
-        device: the device.
-        other: the device to compare with, or None.
+        devices: the device by its OpenAPI description, by its WSDL, or by both.
+        others: the device to compare with, likewise; empty: none.
     """
 
-    source: str
+    named: Named
     options: Mapping[str, Any]
-    device: Device
-    other: Device | None = None
-    _acts: bool = False
+    devices: tuple[Device, ...]
+    others: tuple[Device, ...] = ()
+    _stopping: tuple[Stopping, ...] = ()
 
     @classmethod
     def of(cls, named: Named, options: Mapping[str, Any]) -> Self:
@@ -57,10 +57,10 @@ class Described:
             raise SettingsError(
                 f"--{alien[0].replace('_', '-')} is for the paper's robot, not for a device with a description{hint}"
             )
-        if set(options["interfaces"]) - {"rest"} or set(options["clients"]) - {"wire"}:
-            raise SettingsError("a device with a description is measured over REST, with the client wire")
-        device, against = Device.at(named, options), options["against"]
-        return cls(named.source or "", options, device, _other(named, options, against) if against else None)
+        if set(options["interfaces"]) - {"rest", "soap"} or set(options["clients"]) - {"wire"}:
+            raise SettingsError("a device with a description is measured over REST or SOAP, with the client wire")
+        devices, against = _opened(named, options), options["against"]
+        return cls(named, options, devices, _other(named, options, against) if against else ())
 
     def settings(self, command: str) -> Settings:
         """Return the settings of the run, after finding values that the device accepts.
@@ -69,22 +69,27 @@ class Described:
             SettingsError: the operations or options do not make a run.
             CallError: the device does not respond.
         """
-        options, device = self.options, self.device
-        operations = chosen(device, options["operations"])
-        names, weights = [each.label for each in operations.weights], tuple(operations.weights.values())
-        changing = [each.label for each in operations.weights if not each.safe or each.motion]
-        self._acts = bool(changing)
-        robot = robot_of(device, operations.weights)
-        levels = {named_alike(name, device): level for name, level in device.statement.slo.items()}
+        options, device = self.options, self.devices[0]
+        choice = Choice.of(self.devices, options["operations"])
+        names, weights, changing = tuple(choice.weights), tuple(choice.weights.values()), choice.changing
+        if changing:
+            self._stopping = tuple(map(Stopping.of, (*self.devices, *self.others)))
+        robot = choice.robot()
+        levels = choice.levels
         target = Target(
             robot,
-            Selection(tuple(names), ("rest",), ("wire",), weights if len(set(weights)) > 1 else ()),
+            Selection(
+                names,
+                tuple(each.interface for each in self.devices),
+                ("wire",),
+                weights if len(set(weights)) > 1 else (),
+            ),
             moves=bool(changing),
-            steps_move=names[0] in changing,
-            other=None if self.other is None else robot_of(self.other, _same(self.other, operations.weights)),
-            description=self.source if is_url(self.source) else Path(self.source).name,
+            steps_move=names[step_operation(names)] in changing,
+            other=choice.same(self.others).robot() if self.others else None,
+            description=self.named.shown,
             slo={name: level for name, level in levels.items() if name in names},
-            notes=(*device.remarks, *operations.notes),
+            notes=(*(remark for each in self.devices for remark in each.remarks), *choice.notes),
             streams=Streams(streams_of(device, options["streams"]), checked_pointer(options["stamp_field"])),
         )
         unmeasured = [name for name in levels if name not in names]
@@ -95,37 +100,46 @@ class Described:
         taken = {
             name: value for name, value in options.items() if name not in {*DESCRIBED_ONLY, *_PAPERS_ONLY, "against"}
         }
-        other = None if self.other is None else _statement(self.other)
+        other = _statement(self.others[0]) if self.others else None
         return settle(CliOptions.of(**taken, against=other, command=command), _statement(device), target)
 
-    def stop(self) -> None:
-        """Send what the description marks as a stop (x-roaas-stop), if the run called what may change something."""
-        for device in (self.device, self.other):
-            if device is not None and self._acts:
-                device.api.client.connection.note("POST")  # the run sent it, over connections of its own
-                send_stops(device.api)
+    def stop(self) -> list[str]:
+        """Stop each device if the run called what may change something; return why one may still move."""
+        return [problem for each in self._stopping if (problem := each.stop())]
 
 
-def _other(named: Named, options: Mapping[str, Any], against: str) -> Device:
-    """Return the device to compare with: at another URL, or with its own statement or description."""
-    if against.endswith(_DESCRIPTIONS):
-        return Device.at(Named(against, named.statement), {**options, "base_url": None, "rest": None})
-    if is_url(against):
-        return Device.at(named, {**options, "base_url": against, "rest": None})
-    own = Named.of((against,), {"openapi": None, "wsdl": None})
-    return Device.at(Named(own.source or named.source, own.statement), {**options, "base_url": None, "rest": None})
-
-
-def _same(other: Device, weights: Mapping[Any, int]) -> dict[Any, int]:
-    """Return the other device's operations of the same names.
+def _opened(named: Named, options: Mapping[str, Any]) -> tuple[Device, ...]:
+    """Return a device by its descriptions, as far as the options select their interfaces.
 
     Raises:
-        SettingsError: it lacks one, or does not allow it.
+        SettingsError: a description cannot be used, or none has an interface that the options select.
+        CallError: the device does not respond.
     """
-    try:
-        return chosen(other, [f"{each.label}={weight}" for each, weight in weights.items()]).weights
-    except SettingsError as error:
-        raise SettingsError(f"--against: {error}") from None
+    first, wanted = Device.at(named, options), set(options["interfaces"])
+    both = (first,) if named.wsdl is None or wanted == {"rest"} else (first, first.beside(named.wsdl))
+    lacking = wanted - {each.interface for each in both}
+    if lacking:
+        kind, option = ("a WSDL", "wsdl") if "soap" in lacking else ("an OpenAPI description", "openapi")
+        raise SettingsError(f"--interface {min(lacking)} needs {kind}: name it with --{option}, or in [api] {option}")
+    return tuple(each for each in both if not wanted or each.interface in wanted)
+
+
+def _other(named: Named, options: Mapping[str, Any], against: str) -> tuple[Device, ...]:
+    """Return the device to compare with: at another URL, or with its own statement or description.
+
+    Raises:
+        SettingsError: a description cannot be used, or one URL is to stand for two descriptions.
+        CallError: the device does not respond.
+    """
+    elsewhere = {**options, "base_url": None, "rest": None}
+    if not is_url(against) and not against.endswith(_DESCRIPTIONS):
+        own = Named.of((against,), {"openapi": None, "wsdl": None})
+        return _opened(own if own.source else Named(named.source, own.statement, named.wsdl), elsewhere)
+    if named.wsdl is not None and set(options["interfaces"]) != {"rest"}:
+        raise SettingsError(f"--against {against}: to compare REST and SOAP, name the other device's statement")
+    if against.endswith(_DESCRIPTIONS) or is_wsdl(against):
+        return _opened(Named(against, named.statement), elsewhere)
+    return _opened(named, {**elsewhere, "base_url": against})
 
 
 def _statement(device: Device) -> Statement:

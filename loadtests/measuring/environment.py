@@ -45,6 +45,7 @@ def describe(
             "rest": robot.rest,
             "publishers": robot.publishers,
             "subscribers": robot.subscribers,
+            **({"soap": robot.soap} if robot.soap else {}),
             **({"rosbridge": robot.rosbridge} if robot.rosbridge else {}),
             "servers": servers,
             "same_machine": same_machine(robot),

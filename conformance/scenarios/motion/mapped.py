@@ -289,6 +289,15 @@ class MappedDevice:
             NoAnswerError: there is no response.
         """
         self.stop()
+        self.await_rest()
+
+    def await_rest(self) -> None:
+        """Wait until the device rests.
+
+        Raises:
+            NotPossibleError: it does not.
+            NoAnswerError: there is no response.
+        """
         until = self.clock.now() + _RESTS_S
         while True:
             before = self.where()
