@@ -52,9 +52,10 @@ def chosen(device: Device, named: Iterable[str]) -> Chosen:
     weights: dict[Operation, int] = {}
     notes = []
     for name, weight in wanted.items():
-        for operation in _meant(device.half(name), known):
+        meant = _meant(device.half(name), known)
+        for operation in meant:
             refused = _refused(device, operation)
-            if refused and is_literal(device.half(name), operation):
+            if refused and meant == [operation] and is_literal(device.half(name), operation):
                 raise SettingsError(f"{device.name_of(operation)} is not called: {refused}")
             if refused:
                 notes.append(f"{device.name_of(operation)} is not called: {refused}")

@@ -24,7 +24,7 @@ class Choice:
         devices: the device by each of its descriptions.
         weights: how often each operation is called, by the name that the result has for it.
         operations: the operation of each of the devices, by that name.
-        notes: which of those named are not called, and why.
+        notes: which of those named are not called, and why; what each pair is.
     """
 
     devices: tuple[Device, ...]
@@ -54,7 +54,12 @@ class Choice:
             if name not in pairs:
                 near = get_close_matches(name, pairs, 1, 0) or [*pairs]
                 raise SettingsError(f"{name!r} is no pair; did you mean {near[0]!r}? To add it, {_HOW}; {_ALONE}")
-        return cls(devices, weights, {name: tuple(_only(device, name) for device in devices) for name in weights}, ())
+        operations = {name: tuple(_only(device, name) for device in devices) for name in weights}
+        notes = (
+            f"{name}: {' and '.join(f'{each.half(name)} over {each.interface.upper()}' for each in devices)}"
+            for name in weights
+        )
+        return cls(devices, weights, operations, tuple(notes))
 
     @property
     def changing(self) -> list[str]:

@@ -97,7 +97,7 @@ def test_the_statement_names_operations_and_service_levels(device, tmp_path):
     opened = device(statement=statement)
     assert labels(chosen(opened, ())) == {"GET /state": 1}
     assert named_alike("readState", opened) == "GET /state"
-    with pytest.raises(SettingsError, match=re.escape("[slo] '/*' means 9 operations: name one")):
+    with pytest.raises(SettingsError, match=re.escape("[slo] '/*' means 10 operations: name one")):
         named_alike("/*", opened)
     statement.write_text('[load]\noperations = { "GET /text" = 2 }\n[slo]\n"GET /state" = { p99_ms = 5 }\n')
     assert labels(chosen(device(statement=statement), ())) == {"GET /text": 2}
