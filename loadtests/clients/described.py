@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from conformance.transport import exchange
 from conformance.transport.credentials import Credentials
 from loadtests.clients.failures import Declared, Reply
 from loadtests.clients.wire import Request
@@ -42,16 +41,6 @@ class Described:
         good = Declared(self.responses) if self.interface == "rest" else Reply(self.reply)
         made = [Request(credentials.revealed(each), good) for each in self.octets]
         return [made[place % len(made)] for place in range(number)]
-
-
-def bytes_of(request: exchange.Request) -> bytes:
-    """Return the bytes of a request that was sent, with variables in place of credentials."""
-    fields = [pair for pair in request.headers if pair[0] != "Connection"]
-    lines = [
-        f"{request.method} {request.target}{request.query} HTTP/1.1",
-        *(f"{name}: {text}" for name, text in fields),
-    ]
-    return "\r\n".join([*lines, "", ""]).encode() + request.body
 
 
 @dataclass(frozen=True)

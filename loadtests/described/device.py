@@ -25,6 +25,7 @@ from conformance.statement.motion_map import shape_of
 from conformance.statement.statement import Statement, StatementError, api_of
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswerError
+from conformance.transport.username_token import UsernameToken
 from conformance.verdict.run import Run
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Secrets
@@ -35,11 +36,13 @@ if TYPE_CHECKING:
 
 #: Options, by their names in Python, that a device with a description alone has.
 DESCRIBED_ONLY = (
-    "openapi", "wsdl", "overlays", "base_url", "allow", "never", "basic_file", "digest_file", "api_key", "api_key_file",
-    "headers_file", "client_cert_file", "client_key_file", "streams", "stamp_field",
+    "openapi", "wsdl", "overlays", "base_url", "allow", "never", "basic_file", "digest_file", "username_token_file",
+    "api_key", "api_key_file", "headers_file", "client_cert_file", "client_key_file", "streams", "stamp_field",
 )  # fmt: skip
 #: The credentials in options, by their names in Python.
-CREDENTIALS = ("token_file", "basic_file", "digest_file", "api_key", "api_key_file", "headers_file")
+CREDENTIALS = (
+    "token_file", "basic_file", "digest_file", "username_token_file", "api_key", "api_key_file", "headers_file",
+)  # fmt: skip
 
 
 def secrets_of(options: Mapping[str, str | None]) -> Secrets:
@@ -51,9 +54,10 @@ def secrets_of(options: Mapping[str, str | None]) -> Secrets:
     given = {name: value for name, value in options.items() if value}
     try:
         connection = connection_of(Endpoints(**given))  # type: ignore[arg-type] # they are texts
-    except (StatementError, OSError) as error:
+        user = UsernameToken.of(given.get("username_token_file"))
+    except (StatementError, OSError, ValueError) as error:
         raise SettingsError(str(error)) from None
-    return Secrets(connection.token, connection.credentials.items)
+    return Secrets(connection.token, connection.credentials.items, user)
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,12 @@ from conformance.documents.openapi import Operation
 from conformance.documents.soap_services import SoapOperation, SoapPort, base_of
 from conformance.documents.wsdl_pack import each, label_of
 from conformance.documents.xml_names import local
+from conformance.documents.xml_node import Node
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
 from conformance.scenarios.scenario import NotPossibleError
-from conformance.transport.exchange import NoAnswerError
-from loadtests.clients.described import Described, bytes_of
+from conformance.transport.exchange import NoAnswerError, Request
+from conformance.transport.username_token import hidden
+from loadtests.clients.described import Described
 from loadtests.clients.failures import CallError, Reply
 from loadtests.clients.payloads import VARIANTS
 from loadtests.described.device import Device
@@ -32,22 +34,21 @@ def described_message(device: Device, messages: DescribedMessages, operation: Op
     Raises:
         SettingsError: no valid message can be made.
     """
-    if messages.token is not None:
-        raise SettingsError("a UsernameToken is used once, so messages that are made beforehand cannot carry one")
     port, own = _found(messages, operation)
     reply = Reply(local(own.response or ""))
     good, bad = list[bytes](), list[bytes]()
-    for message in dict.fromkeys(_messages(messages, port, own)):
+    for node in dict.fromkeys(_bodies(messages, own)):
+        message = messages.message(port, node)
         try:
             sent = device.api.client.send("POST", target_of(port), headers=fields_of(port, own), body=message)
             answer, request = sent.response, sent.request
             reply.require(answer.status, answer.header("location"), None, answer.body)
-            good.append(bytes_of(request))
+            good.append(hidden(bytes_of(request)))
         except NoAnswerError as none:
-            bad.append(bytes_of(none.unanswered.request))
+            bad.append(hidden(bytes_of(none.unanswered.request)))
             break  # each further call would wait for the same deadline
         except CallError:
-            bad.append(bytes_of(request))
+            bad.append(hidden(bytes_of(request)))
         if good and not operation.safe:
             break
     return Described(
@@ -60,8 +61,8 @@ def described_message(device: Device, messages: DescribedMessages, operation: Op
     )
 
 
-def _messages(messages: DescribedMessages, port: SoapPort, operation: SoapOperation) -> Iterator[bytes]:
-    """Yield messages with the statement's values in rotation; the same one again where it names too few.
+def _bodies(messages: DescribedMessages, operation: SoapOperation) -> Iterator[Node | None]:
+    """Yield what the Body has, with the statement's values in rotation; the same again where it names too few.
 
     Raises:
         SettingsError: no valid message can be made.
@@ -69,6 +70,16 @@ def _messages(messages: DescribedMessages, port: SoapPort, operation: SoapOperat
     turns = min(VARIANTS, max(map(len, messages.values.values()), default=1))
     try:
         for turn in range(turns):
-            yield messages.message(port, messages.usual(operation, turn)[1])
+            yield messages.usual(operation, turn)[1]
     except NotPossibleError as error:
         raise SettingsError(str(error)) from None
+
+
+def bytes_of(request: Request) -> bytes:
+    """Return the bytes of a request that was sent, with variables in place of credentials."""
+    fields = [pair for pair in request.headers if pair[0] != "Connection"]
+    lines = [
+        f"{request.method} {request.target}{request.query} HTTP/1.1",
+        *(f"{name}: {text}" for name, text in fields),
+    ]
+    return "\r\n".join([*lines, "", ""]).encode() + request.body

@@ -100,7 +100,7 @@ class Choice:
             for robot in robots
             for name, each in zip(self.operations, robot.described, strict=True)
         )
-        return replace(robots[0], described=tuple(named))
+        return replace(robots[0], described=tuple(named), username_token=robots[-1].username_token)
 
     def same(self, others: tuple[Device, ...]) -> "Choice":
         """Return the operations of the same names of the device to compare with.

@@ -8,11 +8,11 @@ from conformance.api.rest.variations import Kind, Variation
 from conformance.documents.openapi import Operation, operations_of
 from conformance.scenarios.scenario import PartialTraceError
 from conformance.scenarios.survey import Probe, Surveyor, order_of
-from loadtests.clients.described import Described, bytes_of
+from loadtests.clients.described import Described
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Robot
 from loadtests.described.device import Device
-from loadtests.described.messages import described_message
+from loadtests.described.messages import bytes_of, described_message
 from loadtests.settings.errors import SettingsError
 
 _STREAM = "its response does not end, as that of a stream"
@@ -40,6 +40,7 @@ def robot_of(device: Device, operations: Collection[Operation]) -> Robot:
         timeout_s=where.timeout_s,
         described=_described_of(device, operations),
         credentials=connection.credentials.items,
+        username_token=device.messages.token if device.messages is not None else None,
         certificate=None if certificate is None else (str(certificate[0]), str(certificate[1] or "") or None),
     )
 

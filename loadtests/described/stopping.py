@@ -54,7 +54,7 @@ class Stopping:
         send_stops(api)
         try:
             if self._mapped is not None:
-                self._mapped.await_rest()
+                self._mapped.come_to_rest(stop=False)
         except (NotPossibleError, NoAnswerError, NotPermittedError) as error:
             return f"the device was told to stop after the load, but may still move: {error}"
         return ""
