@@ -120,7 +120,7 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
     "operations",
     multiple=True,
     metavar="NAME[=WEIGHT]",
-    help="Call this operation: 'GET /state' of a description, or delivery, coffee or pose; repeatable.",
+    help="Call this operation: 'GET /state' or GetPose of a description, or delivery, coffee or pose; repeatable.",
 )
 @click.option("--interface", "interfaces", multiple=True, type=click.Choice(INTERFACES), help="Only this interface.")
 @click.option("--client", "clients", multiple=True, type=click.Choice(CLIENTS), help="Only this client.")
@@ -191,8 +191,8 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
 def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     """Measure how fast a robot responds, and compare SOAP with REST.
 
-    DESCRIPTION is the URL or file of an OpenAPI or Swagger description: the operations that --operation names are
-    measured. Only those that read are called, unless --call allows more.
+    DESCRIPTION is the URL or file of an OpenAPI or Swagger description, or of a WSDL: the operations that --operation
+    names are measured. Only those that read are called, unless --call allows more.
 
     With --against, two robots take turns, and the result says whether this one is slower than the other.
 

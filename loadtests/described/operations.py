@@ -8,7 +8,6 @@ from difflib import get_close_matches
 from conformance.api.call_rules import Reason, is_literal, matches
 from conformance.documents.openapi import Operation, operations_of
 from conformance.statement.load import ServiceLevel
-from conformance.statement.statement import Statement
 from loadtests.described.device import Device
 from loadtests.described.messages import at_hand
 from loadtests.settings.errors import SettingsError
@@ -44,7 +43,7 @@ def chosen(device: Device, named: Iterable[str]) -> Chosen:
         SettingsError: a name means no operation, an operation may not be called, or nothing is named.
     """
     statement, known = device.statement, operations_of(device.contract)
-    wanted = wanted_of(named, statement)
+    wanted = wanted_of(named, statement.load.operations, statement.slo)
     if not wanted:
         listed = ", ".join(f"'{device.name_of(each)}'" for each in known[:_SHOWN])
         more = f" and {len(known) - _SHOWN} more" if len(known) > _SHOWN else ""
@@ -80,9 +79,11 @@ def named_alike(name: str, device: Device) -> str:
     return device.name_of(found[0])
 
 
-def wanted_of(named: Iterable[str], statement: Statement) -> dict[str, int]:
+def wanted_of(
+    named: Iterable[str], operations: Mapping[str, int], levels: Mapping[str, ServiceLevel]
+) -> dict[str, int]:
     """Return names with weights: those of the options, or else the statement's [load], or else its [slo]."""
-    return _read(named) or statement.load.operations or _by_rates(statement.slo)
+    return _read(named) or dict(operations) or _by_rates(levels)
 
 
 def _read(named: Iterable[str]) -> dict[str, int]:

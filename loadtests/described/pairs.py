@@ -49,7 +49,8 @@ class Choice:
         pairs = statement.load.pairs
         if not pairs:
             raise SettingsError(f"no operation is declared that both descriptions have: {_HOW}; {_ALONE}")
-        weights = wanted_of(named, statement) or dict.fromkeys(pairs, 1)
+        levels = {name: level for name, level in statement.slo.items() if name in pairs}
+        weights = wanted_of(named, statement.load.operations, levels) or dict.fromkeys(pairs, 1)
         for name in weights:
             if name not in pairs:
                 near = get_close_matches(name, pairs, 1, 0) or [*pairs]
@@ -73,17 +74,24 @@ class Choice:
             )
         ]
 
-    @property
-    def levels(self) -> dict[str, ServiceLevel]:
+    def levels(self, *, partial: bool) -> dict[str, ServiceLevel]:
         """Return the service levels of the statement, by the names that the result has for the operations.
+
+        Args:
+            partial: whether the device has a description more, whose operations may have levels as well.
 
         Raises:
             SettingsError: a name means nothing, or several operations.
         """
-        levels = self.devices[0].statement.slo
-        if len(self.devices) == 1:
-            return {named_alike(name, self.devices[0]): level for name, level in levels.items()}
-        return dict(levels)
+        found = dict[str, ServiceLevel]()
+        for name, level in self.devices[0].statement.slo.items():
+            try:
+                found[name if name in self.weights else named_alike(name, self.devices[0])] = level
+            except SettingsError:
+                if not partial:
+                    raise
+                found[name] = level
+        return found
 
     def robot(self) -> Robot:
         """Return the robot to measure, after finding values that it accepts.

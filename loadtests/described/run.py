@@ -75,7 +75,7 @@ class Described:
         if changing:
             self._stopping = tuple(map(Stopping.of, (*self.devices, *self.others)))
         robot = choice.robot()
-        levels = choice.levels
+        levels = choice.levels(partial=self.named.wsdl is not None)
         target = Target(
             robot,
             Selection(

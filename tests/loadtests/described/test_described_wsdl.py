@@ -151,6 +151,9 @@ drive = { rest = "POST /drive", soap = "GetLoad" }
 wrong = { rest = "GET /state", soap = "GetLoads" }
 several = { rest = "*state", soap = "*" }
 many = { rest = "GET /*", soap = "GetLoad" }
+[slo]
+weight = { p50_ms = 5 }
+"GET /items" = { p50_ms = 5 }
 """
 
 
@@ -180,8 +183,12 @@ def test_a_pair_is_one_operation_over_both_interfaces(both):
     assert (choice.weights, choice.changing) == ({"weight": 2}, [])
     assert choice.notes == ("weight: GET /state over REST and GetLoad over SOAP",)
     assert Choice.of(devices, ["several"]).operations.keys() == {"several"}
+    assert Choice.of(devices[:2], []).weights == {"weight": 1}, "the pair that has a service level"
+    levels = {"weight", "GET /items"}
+    assert choice.levels(partial=True).keys() == levels
     for interface, name in (("rest", "GET /state"), ("soap", "GetLoad")):
         alone = Choice.of(devices_of(both, interface), ["weight=2"])
+        assert alone.levels(partial=True).keys() == {name, "GET /items"}
         assert alone.weights == {name: 2}, "the name of a pair stands for the half that is measured"
 
 
