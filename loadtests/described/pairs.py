@@ -56,10 +56,13 @@ class Choice:
                 near = get_close_matches(name, pairs, 1, 0) or [*pairs]
                 raise SettingsError(f"{name!r} is no pair; did you mean {near[0]!r}? To add it, {_HOW}; {_ALONE}")
         operations = {name: tuple(_only(device, name) for device in devices) for name in weights}
-        notes = (
-            f"{name}: {' and '.join(f'{each.half(name)} over {each.interface.upper()}' for each in devices)}"
-            for name in weights
-        )
+        notes = []
+        for name, halves in operations.items():
+            told = (
+                f"{device.name_of(half)} over {device.interface.upper()}"
+                for device, half in zip(devices, halves, strict=True)
+            )
+            notes.append(f"{name}: {' and '.join(told)}")
         return cls(devices, weights, operations, tuple(notes))
 
     @property

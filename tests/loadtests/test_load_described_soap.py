@@ -1,13 +1,14 @@
 """`roaas load` on operations of a WSDL, and on operations that a device offers over REST and SOAP."""
 
 import contextlib
+import json
 import re
 import subprocess
 import sys
 
 import pytest
 from lxml import etree
-from soap_devices import camera, serving
+from soap_devices import PASSWORD, USER, camera, serving, table
 
 from reports.latency.junit import latency_junit
 from reports.latency.page import latency_html, latency_markdown
@@ -63,6 +64,21 @@ def test_operations_of_a_wsdl_with_weights_faults_and_service_levels(load, tmp_p
     assert "SOAP fault: overheated" in latency_markdown(result)
 
 
+def test_workers_send_each_message_with_a_token_of_its_own(load, tmp_path):
+    device, user = table(), tmp_path / "user"
+    user.write_text(f"{USER}:{PASSWORD}")
+    with serving(device) as url:
+        run = load(
+            f"{url}/table.wsdl --operation GetAngle --processes 2",
+            "--rate 60 --duration 2 --warmup 0.1 --username-token-file",
+            user,
+        )
+    series = run.series("GetAngle", "soap")
+    assert (series["count"] > 30, series["errors"]) == (True, 0), run.out + run.err
+    assert len(device.seen) > series["count"], "it refuses a nonce that it has seen"
+    assert PASSWORD not in run.out + run.err + json.dumps(run.result)
+
+
 def test_two_devices_with_wsdls_take_turns(load):
     with contextlib.ExitStack() as stack:
         urls = [stack.enter_context(serving(camera())) for _ in range(2)]
@@ -82,6 +98,7 @@ def test_soap_beside_rest_is_compared_in_turns(robot, load, tmp_path):
     statement.write_text(
         f'[robot]\nname = "plain"\n[api]\nopenapi = "{rest}/openapi.json"\n'
         f'wsdl = "{soap}/turtlesim_subscriber_ws?wsdl"\n'
+        "[load]\nmax_rate = 120\n"
         '[load.pairs]\nstate = { rest = "GET /robot/pose/", soap = "GetPose" }\n'
         "[slo]\nstate = { p50_ms = 9000 }\n"
     )
