@@ -62,7 +62,7 @@ class Choice:
                 f"{device.name_of(half)} over {device.interface.upper()}"
                 for device, half in zip(devices, halves, strict=True)
             )
-            notes.append(f"{name}: {' and '.join(told)}")
+            notes.append(f"the pair {name} is {' and '.join(told)}")
         return cls(devices, weights, operations, tuple(notes))
 
     @property

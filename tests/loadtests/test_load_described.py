@@ -146,15 +146,18 @@ def test_https_with_its_own_authority_and_a_login(started, load, certificate, tm
     assert (refused.code, "[auth] login = 'POST /login': the device responded 403" in refused.err) == (2, True)
 
 
-def test_the_knee_of_a_device_that_answers_one_request_after_the_other(device, load):
-    url = device("--serial", "--slow", "0.004")  # at most 250 a second
+def test_the_knee_of_a_device_that_answers_one_request_after_the_other(device, load, tmp_path):
+    url, statement = device("--serial", "--slow", "0.004"), tmp_path / "robot.toml"  # at most 250 a second
+    statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n[slo]\n"GET /state" = {{ p50_ms = 400 }}\n')
     run = load(
-        f"{url}/openapi.json --operation 'GET /state' --rate 40 --duration 1 --warmup 0.1",
-        "--steps --step-rates 50,1000 --knee --knee-searches 2 --step-duration 1",
+        str(statement),
+        "--rate 40 --duration 1 --warmup 0.1",
+        "--steps --step-rates 20,1000 --knee --knee-searches 2 --step-duration 1",
     )
     (knee,), (search,) = run.result["knee"], run.result["knee_search"]
     assert (knee["interface"], knee["first_rate_missed"]) == ("rest", 1000)
-    assert knee["limited_by"] == "robot"
+    assert (knee["highest_rate"], knee["limited_by"]) == (20, "robot")
+    assert knee["criterion"].startswith("p50 response time below 400 ms")
     assert search["interface"] == "rest"
     assert all(met is None or met < 270 for met, _ in search["brackets"]), "no more than it can answer"
     assert all(missed is not None and missed <= 400 for _, missed in search["brackets"])

@@ -117,7 +117,7 @@ def test_soap_beside_rest_is_compared_in_turns(robot, load, tmp_path):
     assert {each["interface"] for each in result["noise_floor"]} == {"rest", "soap"}
     assert [each["interface"] for each in result["knee_search"]] == ["rest", "soap", "both"]
     assert {(each["operation"], each["interface"]) for each in result["slo"]} == {("state", "rest"), ("state", "soap")}
-    assert "state: GET /robot/pose/ over REST and GetPose over SOAP" in result["notes"]
+    assert "the pair state is GET /robot/pose/ over REST and GetPose over SOAP" in result["notes"]
     assert not any("values over REST" in note for note in result["notes"]), "both return the same message"
     assert result["plan"]["description"] == f"{rest}/openapi.json and {soap}/turtlesim_subscriber_ws?wsdl"
     page = latency_html(result)

@@ -181,7 +181,7 @@ def test_a_pair_is_one_operation_over_both_interfaces(both):
     labels = {name: [each.label for each in halves] for name, halves in choice.operations.items()}
     assert labels == {"weight": ["GET /state", "POST /scalePort/GetLoad"]}
     assert (choice.weights, choice.changing) == ({"weight": 2}, [])
-    assert choice.notes == ("weight: GET /state over REST and GetLoad over SOAP",)
+    assert choice.notes == ("the pair weight is GET /state over REST and GetLoad over SOAP",)
     assert Choice.of(devices, ["several"]).operations.keys() == {"several"}
     assert Choice.of(devices[:2], []).weights == {"weight": 1}, "the pair that has a service level"
     levels = {"weight", "GET /items"}
