@@ -12,7 +12,6 @@ import msgspec
 from conformance.api.permission import Permission
 from conformance.api.rest.interface import RestInterface
 from conformance.cli.certify_target import told_apart, what_is_judged
-from conformance.commandline.extras import lacking_soap
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.documents.description import DescriptionError, is_url
@@ -164,16 +163,13 @@ class Device:
         operations_of(run.contract)  # kept from now on
         return cls(api, remarks, DescribedMessages.of(api))
 
-    def beside(self, wsdl: str) -> "Device":
+    def beside(self, wsdl: str) -> Self:
         """Return the same device by its WSDL, with the same statement and credentials.
 
         Raises:
             SettingsError: the WSDL cannot be used.
             CallError: its server does not respond.
         """
-        lacking = lacking_soap(["soap"], "measuring a SOAP service")
-        if lacking is not None:
-            raise SettingsError(lacking)
         said, connection = self.statement, replace(self.api.client.connection, permit=lambda *_: "")
         where = msgspec.structs.replace(said.endpoints, rest=None)
         try:

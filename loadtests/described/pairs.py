@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from typing import Self
 
 from conformance.documents.openapi import Operation
 from conformance.statement.load import ServiceLevel
@@ -33,7 +34,7 @@ class Choice:
     notes: tuple[str, ...]
 
     @classmethod
-    def of(cls, devices: tuple[Device, ...], named: Iterable[str]) -> "Choice":
+    def of(cls, devices: tuple[Device, ...], named: Iterable[str]) -> Self:
         """Return what the options name, or else the statement; of two descriptions, pairs.
 
         Raises:
@@ -113,14 +114,14 @@ class Choice:
         )
         return replace(robots[0], described=tuple(named), username_token=robots[-1].username_token)
 
-    def same(self, others: tuple[Device, ...]) -> "Choice":
+    def same(self, others: tuple[Device, ...]) -> Self:
         """Return the operations of the same names of the device to compare with.
 
         Raises:
             SettingsError: it lacks one, or does not allow it.
         """
         try:
-            return Choice.of(others, [f"{name}={weight}" for name, weight in self.weights.items()])
+            return self.of(others, [f"{name}={weight}" for name, weight in self.weights.items()])
         except SettingsError as error:
             raise SettingsError(f"--against: {error}") from None
 

@@ -1,6 +1,6 @@
 """A run on a device with a description: its settings, and the stop at its end."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -33,7 +33,7 @@ class Described:
     Attributes:
         named: the descriptions and the statement.
         options: of the command.
-        devices: the device by its OpenAPI description, by its WSDL, or by both.
+        devices: the device by its OpenAPI description, by its WSDL, or by both; all of them are stopped at the end.
         others: the device to compare with, likewise; empty: none.
     """
 
@@ -70,7 +70,8 @@ class Described:
             CallError: the device does not respond.
         """
         options, device = self.options, self.devices[0]
-        choice = Choice.of(self.devices, options["operations"])
+        devices, others = (_selected(each, options["interfaces"]) for each in (self.devices, self.others))
+        choice = Choice.of(devices, options["operations"])
         names, weights, changing = tuple(choice.weights), tuple(choice.weights.values()), choice.changing
         if changing:
             self._stopping = tuple(map(Stopping.of, (*self.devices, *self.others)))
@@ -79,17 +80,14 @@ class Described:
         target = Target(
             robot,
             Selection(
-                names,
-                tuple(each.interface for each in self.devices),
-                ("wire",),
-                weights if len(set(weights)) > 1 else (),
+                names, tuple(each.interface for each in devices), ("wire",), weights if len(set(weights)) > 1 else ()
             ),
             moves=bool(changing),
             steps_move=names[step_operation(names)] in changing,
-            other=choice.same(self.others).robot() if self.others else None,
+            other=choice.same(others).robot() if others else None,
             description=self.named.shown,
             slo={name: level for name, level in levels.items() if name in names},
-            notes=(*(remark for each in self.devices for remark in each.remarks), *choice.notes),
+            notes=(*(remark for each in devices for remark in each.remarks), *choice.notes),
             streams=Streams(streams_of(device, options["streams"]), checked_pointer(options["stamp_field"])),
         )
         unmeasured = [name for name in levels if name not in names]
@@ -109,7 +107,7 @@ class Described:
 
 
 def _opened(named: Named, options: Mapping[str, Any]) -> tuple[Device, ...]:
-    """Return a device by its descriptions, as far as the options select their interfaces.
+    """Return a device by its descriptions; without its WSDL if the options select REST alone.
 
     Raises:
         SettingsError: a description cannot be used, or none has an interface that the options select.
@@ -121,7 +119,12 @@ def _opened(named: Named, options: Mapping[str, Any]) -> tuple[Device, ...]:
     if lacking:
         kind, option = ("a WSDL", "wsdl") if "soap" in lacking else ("an OpenAPI description", "openapi")
         raise SettingsError(f"--interface {min(lacking)} needs {kind}: name it with --{option}, or in [api] {option}")
-    return tuple(each for each in both if not wanted or each.interface in wanted)
+    return both
+
+
+def _selected(devices: tuple[Device, ...], interfaces: Collection[str]) -> tuple[Device, ...]:
+    """Return those with a selected interface; all if none is selected."""
+    return tuple(each for each in devices if not interfaces or each.interface in interfaces)
 
 
 def _other(named: Named, options: Mapping[str, Any], against: str) -> tuple[Device, ...]:

@@ -171,7 +171,7 @@ def both(tmp_path):
 
 def devices_of(statement, *interfaces):
     named = Named.of((str(statement),), {"openapi": None, "wsdl": None})
-    return run._opened(named, {**OPTIONS, "interfaces": interfaces})  # noqa: SLF001
+    return run._selected(run._opened(named, {**OPTIONS, "interfaces": interfaces}), interfaces)  # noqa: SLF001
 
 
 def test_a_pair_is_one_operation_over_both_interfaces(both):
