@@ -98,7 +98,7 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
     "operations",
     multiple=True,
     metavar="NAME[=WEIGHT]",
-    help="Call this operation: 'GET /state' of a description, or delivery, coffee or pose; repeatable.",
+    help="Call this operation: 'GET /state' or GetPose of a description, or delivery, coffee or pose; repeatable.",
 )
 @click.option(
     "--scenario", type=click.Path(exists=True, dir_okay=False), help="Locust file with what the users (--users) do."
@@ -174,8 +174,8 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
 def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     """Measure how fast a robot responds, and compare SOAP with REST.
 
-    DESCRIPTION is the URL or file of an OpenAPI or Swagger description: the operations that --operation names are
-    measured, or those that a --scenario calls. Only those that read are called, unless --call allows more.
+    DESCRIPTION is the URL or file of an OpenAPI or Swagger description, or of a WSDL: the operations that --operation
+    names are measured, or those that a --scenario calls. Only those that read are called, unless --call allows more.
 
     With --against, two robots take turns, and the result says whether this one is slower than the other.
 
@@ -206,8 +206,8 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     except KeyboardInterrupt:
         return CommandResult(ExitCode.INTERRUPTED)
     finally:
-        if device is not None:
-            device.stop()
+        for problem in device.stop() if device is not None else ():
+            click.echo(f"roaas load: {problem}", err=True)
     return kept.after(result, tolerance, click.get_current_context().obj)
 
 

@@ -35,6 +35,20 @@ class Permission:
         """Allow POST to a URL: that of a SOAP service whose operations only read."""
         self._reading.add(_place(url))
 
+    def may_call_ports(self, base_url: str) -> None:
+        """Allow POST to the ports of a device that is judged by its WSDL.
+
+        Args:
+            base_url: scheme and host of the device, whatever the WSDL says.
+        """
+        # xmlschema and lxml take a third of a second, which other devices need not pay.
+        from conformance.documents.soap_services import base_of, moved  # noqa: PLC0415
+        from conformance.documents.wsdl_pack import services_of  # noqa: PLC0415
+
+        found = services_of(self._run.contract)
+        for port in found.ports if found else ():
+            self.may_post_to(moved(port.url, base_of(found), base_url) if found else port.url)
+
     def forbid_post_to(self, url: str) -> None:
         """Withdraw may_post_to(): a service whose operations act has the same URL."""
         self._reading.discard(_place(url))

@@ -85,9 +85,6 @@ _FILE = click.Path(exists=True, dir_okay=False)
     "--baseline", type=click.Path(path_type=Path), help="Accepted failures, each with reason and expiry date (TOML)."
 )
 @click.option("--token-file", type=_FILE, help="File with the bearer token to send.")
-@click.option(
-    "--username-token-file", type=_FILE, help="File with user:password for WS-Security's UsernameToken (SOAP)."
-)
 @credential_options
 @click.option(
     "--out", type=click.Path(file_okay=False, path_type=Path), default=Path("out"), help="Folder for the results."

@@ -26,6 +26,9 @@ _CREDENTIALS = (
     click.option("--basic-file", type=_FILE, help="File with user:password for basic authentication."),
     click.option("--digest-file", type=_FILE, help="File with user:password for digest authentication (RFC 7616)."),
     click.option(
+        "--username-token-file", type=_FILE, help="File with user:password for WS-Security's UsernameToken (SOAP)."
+    ),
+    click.option(
         "--api-key", metavar="'PLACE NAME'", help="Where the API key goes: header, query or cookie, and its name."
     ),
     click.option("--api-key-file", type=_FILE, help="File with the API key."),

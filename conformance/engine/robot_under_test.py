@@ -103,20 +103,11 @@ class RobotUnderTest:
             return
         self.rest = RestInterface(self.run, HttpClient(where.rest, self.connection), self.alive)
         if self.run.contract.described:
-            self._permit_soap(self.rest.client.base_url)
+            self.permission.may_call_ports(self.rest.client.base_url)
             self.log = OperationLog(self.run.contract, self.rest.client.base_url)
             self.connection.listeners.append(self.log)
         with self._told(Interface.REST, where.rest):
             self._look(Interface.REST, self.rest.client, self.rest.path)
-
-    def _permit_soap(self, base_url: str) -> None:
-        """Permit messages to the ports of a device that is judged by its WSDL."""
-        from conformance.documents.soap_services import base_of, moved  # noqa: PLC0415 - as above
-        from conformance.documents.wsdl_pack import services_of  # noqa: PLC0415 - as above
-
-        found = services_of(self.run.contract)
-        for port in found.ports if found else ():
-            self.permission.may_post_to(moved(port.url, base_of(found), base_url) if found else port.url)
 
     def _connect_soap(self) -> None:
         from conformance.api.soap.callable_services import SoapServices  # noqa: PLC0415 - as above

@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.messages import ordinary, simple_leaves, with_text
-from conformance.api.soap.username_token import UsernameToken
+from conformance.api.soap.username_token import block_of
 from conformance.documents.soap_services import SoapDescription, SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import services_of
 from conformance.documents.xml import parse
@@ -16,6 +16,7 @@ from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Element
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.client import Headers
+from conformance.transport.username_token import UsernameToken
 
 
 @dataclass(frozen=True)
@@ -56,12 +57,16 @@ class DescribedMessages:
     ) -> bytes:
         """Return a message, with further header blocks, or in another namespace than that of the port's Envelope."""
         token = self.token if authorized else None
-        blocks = (*([token.block(space or port.envelope)] if token else ()), *more)
+        blocks = (*([block_of(token, space or port.envelope)] if token else ()), *more)
         whole = envelope((node,) if node else (), blocks or None, space or port.envelope)
         return b'<?xml version="1.0" encoding="utf-8"?>\n' + whole.written()
 
-    def usual(self, operation: SoapOperation) -> tuple[Element | None, Node | None]:
+    def usual(self, operation: SoapOperation, turn: int = 0) -> tuple[Element | None, Node | None]:
         """Return the declaration of an operation's request, and a valid message of it; None if its Body is empty.
+
+        Args:
+            operation: the operation.
+            turn: which of the given values to use, in rotation.
 
         Raises:
             NotPossibleError: none can be made.
@@ -77,7 +82,7 @@ class DescribedMessages:
             for path, _ in simple_leaves(declared, node):
                 given = self.values.get(node.at(path).name)
                 if given:
-                    node = with_text(node, path, str(given[0]))
+                    node = with_text(node, path, str(given[turn % len(given)]))
             fault = self.found.types.invalid(parse(node.written()))
             if not fault:
                 return declared, node

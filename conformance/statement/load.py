@@ -5,9 +5,21 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from conformance.contract.toml_file import Positive
+from conformance.contract.toml_file import Positive, Text
 
 _MOST_WEIGHT = 1000
+
+
+class Pair(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One operation that the device offers over both REST and SOAP.
+
+    Attributes:
+        rest: the operation in the OpenAPI description, as in `"GET /robot/pose/"`.
+        soap: the operation in the WSDL, as in `"GetPose"`, or `"POST /PORT/GetPose"` if several ports have it.
+    """
+
+    rest: Text
+    soap: Text
 
 
 class Load(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -17,11 +29,13 @@ class Load(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         max_rate: maximum requests per second.
         max_duration_s: maximum duration of a measurement, s.
         operations: what to measure of a device with a description: weight by operation, as in `"GET /state" = 3`.
+        pairs: operations to compare over REST and SOAP, by the name that the result has for them.
     """
 
     max_rate: Positive | None = None
     max_duration_s: Positive | None = None
     operations: dict[str, int] = {}
+    pairs: dict[str, Pair] = {}
 
     def __post_init__(self) -> None:
         """Check the weights.

@@ -5,6 +5,7 @@ import socket
 import ssl
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from functools import cached_property
 from http import HTTPStatus
 
 
@@ -24,8 +25,8 @@ class CallError(Exception):
 #: Kinds that mean that no server listens there; the others are bad responses.
 UNREACHABLE = frozenset({"refused", "resolve", "network", "tls"})
 
-_FAULT_STRING = re.compile(rb"<(?:\w+:)?faultstring[^>]*>\s*(.*?)\s*</", re.DOTALL)
-_FAULT = re.compile(rb"<(?:\w+:)?Fault[\s>/]")
+_FAULT_STRING = re.compile(rb"<(?:[\w.-]+:)?(?:faultstring|Text)\b[^>]*>\s*(.*?)\s*</", re.DOTALL)  # SOAP 1.1, 1.2
+_FAULT = re.compile(rb"<(?:[\w.-]+:)?Fault[\s>/]")
 _SHOWN = 160
 # Plain integers: every request is compared with them, and members of HTTPStatus compare more slowly.
 _OK = int(HTTPStatus.OK)
@@ -67,11 +68,51 @@ def _error(status: int, location: str | None, body: bytes, expects: bytes) -> Ca
     if HTTPStatus.MULTIPLE_CHOICES <= status < HTTPStatus.BAD_REQUEST:  # RFC 9110 section 15.4: redirection
         return CallError("redirect", f"status {status} to {location!r}: use that address as the endpoint")
     if _FAULT.search(body):
-        found = _FAULT_STRING.search(body)
-        reason = found.group(1).decode("utf-8", "replace")[:_SHOWN] if found else shown(body)
-        return CallError("fault", f"status {status}, SOAP fault: {reason}")
+        return _fault(status, body)
     hint = " (does it need a --token-file?)" if status in {401, 403} else ""
     return CallError("status", f"status {status}{hint}: {shown(body)}")
+
+
+def _fault(status: int, body: bytes) -> CallError:
+    found = _FAULT_STRING.search(body)
+    reason = found.group(1).decode("utf-8", "replace")[:_SHOWN] if found else shown(body)
+    return CallError("fault", f"status {status}, SOAP fault: {reason}")
+
+
+@dataclass(frozen=True)
+class Reply:
+    """The good response of a SOAP operation by its WSDL.
+
+    Attributes:
+        element: local name of the first element in the Body; empty for a one-way operation, or an empty Body.
+    """
+
+    element: str
+
+    @cached_property
+    def _first(self) -> re.Pattern[bytes]:
+        """The beginning of the Body, whatever the prefixes."""
+        prefix, between = r"(?:[^\s<>/:]+:)?", r"(?:\s|<!--.*?-->)*"
+        first = rf"<{prefix}Body\b[^>]*>{between}<{prefix}{re.escape(self.element)}[\s/>]"
+        return re.compile(first.encode(), re.DOTALL)
+
+    def require(self, status: int, location: str | None, content_type: bytes | None, body: bytes) -> None:
+        """Raise an error unless a response is 2xx and has the element; a fault is never good.
+
+        Raises:
+            CallError: any other response.
+        """
+        del content_type
+        if not _OK <= status < _MULTIPLE_CHOICES:
+            raise _error(status, location, body, b"")
+        if self.element and self._first.search(body):
+            return
+        if _FAULT.search(body):
+            raise _fault(status, body)
+        if self.element:
+            raise CallError(
+                "content", f"status {status}, but the Body does not begin with {self.element}: {shown(body)}"
+            )
 
 
 @dataclass(frozen=True)

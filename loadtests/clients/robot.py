@@ -7,6 +7,7 @@ from typing import Any, Self
 
 from conformance.packs.table1.statement import Ros
 from conformance.transport.credentials import Credential, Credentials, Kind
+from conformance.transport.username_token import UsernameToken
 from loadtests.clients.described import VARIABLE, Described
 from loadtests.clients.endpoint import Endpoint, tls_context
 from loadtests.clients.payloads import BUILDERS, CATALOGUE, VARIANTS, Values, variants
@@ -16,15 +17,16 @@ from loadtests.clients.wire import Connection, Request
 
 @dataclass(frozen=True)
 class Secrets:
-    """What a robot's requests prove who sends them with: the bearer token, and other credentials."""
+    """What a robot's requests prove who sends them with: the bearer token, other credentials, WS-Security's user."""
 
     token: str | None = None
     credentials: tuple[Credential, ...] = ()
+    username_token: UsernameToken | None = None
 
     @classmethod
     def of(cls, robot: "Robot") -> Self:
         """Return the secrets of a robot."""
-        return cls(robot.token, robot.credentials)
+        return cls(robot.token, robot.credentials, robot.username_token)
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ class Robot:
         described: the operations to measure, of a device that is called by its own description.
         credentials: what the requests of these operations carry.
         certificate: client certificate and its key for TLS, as files.
+        username_token: the user whose token each message of a described SOAP operation carries.
     """
 
     rest: str | None
@@ -55,12 +58,28 @@ class Robot:
     described: tuple[Described, ...] = ()
     credentials: tuple[Credential, ...] = ()
     certificate: tuple[str, str | None] | None = None
+    username_token: UsernameToken | None = None
+
+    @property
+    def soap(self) -> str | None:
+        """Return the address of the SOAP services of a device that is called by its own WSDL, or None."""
+        return next((each.base_url for each in self.described if each.interface == "soap"), None)
+
+    @property
+    def shown(self) -> dict[str, str | None]:
+        """Return the addresses of its web services by name, as results show them."""
+        papers = {"rest": self.rest, "publishers": self.publishers, "subscribers": self.subscribers}
+        return papers | ({"soap": self.soap} if self.soap else {})
+
+    @property
+    def addresses(self) -> list[str]:
+        """Return the addresses of its web services."""
+        return [each for each in self.shown.values() if each]
 
     @cached_property
     def tls(self) -> Any:
         """Return the TLS context, or None if no address needs one."""
-        addresses = (self.rest, self.publishers, self.subscribers, self.rosbridge)
-        if not any(address and address.startswith(("https:", "wss:")) for address in addresses):
+        if not any(address.startswith(("https:", "wss:")) for address in (*self.addresses, self.rosbridge or "")):
             return None
         return self.context()
 
@@ -82,23 +101,25 @@ class Robot:
         """Return the credentials that are the same in each request."""
         return Credentials(tuple(item for item in self.credentials if item.kind is not Kind.DIGEST))
 
-    def _described(self, operation: str) -> Described | None:
-        return next((each for each in self.described if each.name == operation), None)
+    def _described(self, interface: str, operation: str) -> Described | None:
+        return next((each for each in self.described if (each.interface, each.name) == (interface, operation)), None)
 
     def method(self, operation: str) -> str:
-        """Return an operation's HTTP method over REST."""
-        found = self._described(operation)
-        return found.method if found else CATALOGUE[operation].method
+        """Return an operation's HTTP method over REST; POST if it is only offered over SOAP."""
+        if self.described:
+            found = self._described("rest", operation)
+            return found.method if found else "POST"
+        return CATALOGUE[operation].method
 
     def values(self, operation: str, seed: int) -> list[Values]:
         """Return the values of each variant, for the library clients; empty for a described operation."""
-        return [] if self._described(operation) else variants(operation, seed)
+        return [] if self.described else variants(operation, seed)
 
     def address(self, interface: str, operation: str) -> str | None:
         """Return the address of an operation over an interface; None if the interface lacks the operation."""
-        described = self._described(operation)
-        if described is not None:
-            return described.base_url if interface == "rest" else None
+        if self.described:
+            found = self._described(interface, operation)
+            return found.base_url if found else None
         if interface == "rest":
             return self.rest
         if interface == "rosbridge":
@@ -113,14 +134,14 @@ class Robot:
         """Return whether a client can call an operation over an interface; zeep needs the WSDL as well."""
         if self.address(interface, operation) is None:
             return False
-        if interface == "rosbridge" or self._described(operation):
+        if interface == "rosbridge" or self.described:
             return client == "wire"
         return interface == "rest" or client == "wire" or self.wsdl(operation) is not None
 
     def http(self, interface: str, operation: str) -> Connection:
         """Return a new connection for an operation over REST or SOAP; it opens at the first call."""
         endpoint = Endpoint.parse(self.address(interface, operation) or "")
-        return Connection(endpoint, self.timeout_s, self.tls, self.digest)
+        return Connection(endpoint, self.timeout_s, self.tls, self.digest, self.username_token)
 
     def bridge(self) -> Bridge:
         """Return a new connection to the rosbridge; it opens at the first call."""
@@ -131,13 +152,19 @@ class Robot:
         address = self.address(interface, operation)
         if address is None:
             return []
-        described = self._described(operation)
+        described = self._described(interface, operation)
         if described is not None:
             return described.requests(self.fixed, VARIANTS)
         if interface == "rosbridge":  # its own values: it must not take another interface's delivery for its echo
             return [*bridge_requests(variants(operation, seed + 1), self.delivery_topic)]
         endpoint = Endpoint.parse(address)
         return [BUILDERS[interface](endpoint, operation, values, self.token) for values in variants(operation, seed)]
+
+
+def without_secrets(robot: Robot) -> Robot:
+    """Return a robot as it is sent to workers, each of which has secrets of its own."""
+    user = robot.username_token and replace(robot.username_token, password="")
+    return replace(robot, token=None, credentials=(), username_token=user)
 
 
 def with_secrets(robot: Robot, secrets: Secrets | None) -> Robot:
@@ -147,7 +174,12 @@ def with_secrets(robot: Robot, secrets: Secrets | None) -> Robot:
         ValueError: its requests need a credential that this machine does not have.
     """
     found = replace(robot, token=secrets.token, credentials=secrets.credentials) if secrets else robot
+    user = found.username_token
+    if user is not None and secrets is not None and secrets.username_token is not None:
+        user = replace(user, password=secrets.username_token.password)  # the device's clock is known from the master
+        found = replace(found, username_token=user)
     revealed = Credentials(found.credentials).revealed
-    if any(VARIABLE in revealed(octets) for each in found.described for octets in each.octets):
+    lacks_user = user is not None and not user.password
+    if lacks_user or any(VARIABLE in revealed(octets) for each in found.described for octets in each.octets):
         raise ValueError("the requests need credentials that this worker lacks: start it with the master's options")
     return found

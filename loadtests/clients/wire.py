@@ -20,8 +20,9 @@ import httptools
 from gevent.hub import Waiter, get_hub
 
 from conformance.transport.credentials import Credentials
+from conformance.transport.username_token import UsernameToken
 from loadtests.clients.endpoint import Endpoint
-from loadtests.clients.failures import CallError, Declared, connect_error, require_good
+from loadtests.clients.failures import CallError, Declared, Reply, connect_error, require_good
 
 _READ = 1  # libev's EV_READ
 _CHUNK = 65_536
@@ -38,7 +39,7 @@ class Request:
     """A request as bytes, and its good responses: the bytes that their bodies contain, or what is declared."""
 
     octets: bytes
-    expects: bytes | Declared = b""
+    expects: bytes | Declared | Reply = b""
 
 
 @dataclass(slots=True)
@@ -56,7 +57,7 @@ class Answer:
     received_ns: int
     octets: int
 
-    def require_good(self, expects: bytes | Declared) -> None:
+    def require_good(self, expects: bytes | Declared | Reply) -> None:
         """Accept a 2xx response whose body contains `expects`, or a response that is declared.
 
         Raises:
@@ -78,15 +79,22 @@ class Connection:
         timeout_s: deadline of a whole request, including the connection.
         tls: the context for https endpoints.
         digest: what answers the challenges of digest authentication; the connections of a process share it.
+        user: whose UsernameToken, a fresh one, each SOAP message carries.
     """
 
     def __init__(
-        self, endpoint: Endpoint, timeout_s: float, tls: ssl.SSLContext | None = None, digest: Credentials | None = None
+        self,
+        endpoint: Endpoint,
+        timeout_s: float,
+        tls: ssl.SSLContext | None = None,
+        digest: Credentials | None = None,
+        user: UsernameToken | None = None,
     ) -> None:
         self.endpoint = endpoint
         self.timeout_s = timeout_s
         self.tls = tls
         self.digest = digest
+        self.user = user
         self.connects = 0
         self._socket: Any = None
         self._watcher: Any = None
@@ -111,7 +119,8 @@ class Connection:
         """
         deadline = gevent.Timeout.start_new(self.timeout_s)
         try:
-            return self._call(request.octets) if self.digest is None else self._answering(request.octets, self.digest)
+            octets = request.octets if self.user is None else self.user.revealed(request.octets)
+            return self._call(octets) if self.digest is None else self._answering(octets, self.digest)
         except gevent.Timeout as timer:
             connected = self._socket is not None
             self.close()

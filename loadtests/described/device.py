@@ -1,38 +1,48 @@
 """A device with a description: what it is called by, what may be called, and with which credentials."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import click
+import msgspec
 
 from conformance.api.permission import Permission
 from conformance.api.rest.interface import RestInterface
 from conformance.cli.certify_target import told_apart, what_is_judged
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
-from conformance.documents.description import DescriptionError
-from conformance.documents.openapi import operations_of
+from conformance.documents.description import DescriptionError, is_url
+from conformance.documents.openapi import Operation, operations_of
 from conformance.engine.connecting import connection_of
-from conformance.engine.describing import UnreachableError, is_wsdl
+from conformance.engine.describing import UnreachableError, is_wsdl, soap_contract
+from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.endpoints import Endpoints
+from conformance.statement.motion_map import shape_of
 from conformance.statement.statement import Statement, StatementError, api_of
-from conformance.transport.client import HttpClient
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import NoAnswerError
+from conformance.transport.username_token import UsernameToken
 from conformance.verdict.run import Run
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Secrets
 from loadtests.settings.errors import SettingsError
 
+if TYPE_CHECKING:
+    from conformance.scenarios.described_messages import DescribedMessages
+
 #: Options, by their names in Python, that a device with a description alone has.
 DESCRIBED_ONLY = (
-    "openapi", "wsdl", "overlays", "base_url", "allow", "never", "basic_file", "digest_file", "api_key", "api_key_file",
-    "headers_file", "client_cert_file", "client_key_file", "streams", "stamp_field", "clock_field",
-    "scenario",
+    "openapi", "wsdl", "overlays", "base_url", "allow", "never", "basic_file", "digest_file", "username_token_file",
+    "api_key", "api_key_file", "headers_file", "client_cert_file", "client_key_file", "streams", "stamp_field",
+    "clock_field", "scenario",
 )  # fmt: skip
 #: The credentials in options, by their names in Python.
-CREDENTIALS = ("token_file", "basic_file", "digest_file", "api_key", "api_key_file", "headers_file")
+CREDENTIALS = (
+    "token_file", "basic_file", "digest_file", "username_token_file", "api_key", "api_key_file", "headers_file",
+)  # fmt: skip
 
 
 def secrets_of(options: Mapping[str, str | None]) -> Secrets:
@@ -44,9 +54,10 @@ def secrets_of(options: Mapping[str, str | None]) -> Secrets:
     given = {name: value for name, value in options.items() if value}
     try:
         connection = connection_of(Endpoints(**given))  # type: ignore[arg-type] # they are texts
-    except (StatementError, OSError) as error:
+        user = UsernameToken.of(given.get("username_token_file"))
+    except (StatementError, OSError, ValueError) as error:
         raise SettingsError(str(error)) from None
-    return Secrets(connection.token, connection.credentials.items)
+    return Secrets(connection.token, connection.credentials.items, user)
 
 
 @dataclass(frozen=True)
@@ -56,28 +67,40 @@ class Named:
     Attributes:
         source: URL or file of the description; None for the paper's robot.
         statement: the statement's file, or None.
+        wsdl: URL or file of the WSDL beside an OpenAPI description, or None.
     """
 
     source: str | None
     statement: Path | None
+    wsdl: str | None = None
+
+    @property
+    def shown(self) -> str:
+        """What the result calls the descriptions: URLs, or the names of files."""
+        sources = filter(None, (self.source, self.wsdl))
+        return " and ".join(one if is_url(one) else Path(one).name for one in sources)
 
     @classmethod
     def of(cls, targets: tuple[str, ...], options: Mapping[str, Any]) -> Self:
         """Return what the arguments and options of a command name.
 
         Raises:
-            SettingsError: two descriptions or two statements are named, or a WSDL.
+            SettingsError: two descriptions of one kind or two statements are named.
             StatementError: the statement cannot be read.
         """
         try:
-            source, statement = told_apart(targets, options["openapi"] or options["wsdl"])
+            source, statement = told_apart(targets, options["openapi"])
         except click.UsageError as error:
             raise SettingsError(error.message) from None
-        api = api_of(statement) if statement is not None else None
-        source = source or (api.openapi or api.wsdl if api else None)
-        if source is not None and (is_wsdl(source) or source in {options["wsdl"], api.wsdl if api else None}):
-            raise SettingsError(f"{source} is a WSDL: so far, only operations of an OpenAPI description are measured")
-        return cls(source, statement)
+        wsdl = options["wsdl"]
+        if source is not None and is_wsdl(source):
+            if wsdl is not None:
+                raise SettingsError(f"{source} and {wsdl} are several WSDLs: name one")
+            source, wsdl = None, source
+        if source is None and wsdl is None and statement is not None:
+            api = api_of(statement)
+            source, wsdl = api.openapi, api.wsdl
+        return cls(source, statement, wsdl) if source is not None else cls(wsdl, statement)
 
 
 @dataclass(frozen=True)
@@ -85,12 +108,19 @@ class Device:
     """A device with a description.
 
     Attributes:
-        api: its REST interface, as the suite calls it.
+        api: its interface, as the suite calls it.
         remarks: what a reader of the result should know.
+        messages: makes the messages of a WSDL; None for a device with an OpenAPI description.
     """
 
     api: RestInterface
     remarks: tuple[str, ...]
+    messages: "DescribedMessages | None" = None
+
+    @property
+    def interface(self) -> str:
+        """Return `rest` or `soap`."""
+        return "rest" if self.messages is None else "soap"
 
     @property
     def statement(self) -> Statement:
@@ -115,15 +145,60 @@ class Device:
                 taken: dict[str, Any] = {**options, **own, "out": Path(folder)}
                 statement, contract = what_is_judged(named.source, named.statement, taken)
                 run = Run(statement=statement, contract=contract, allow_motion=bool(options["allow_motion"]))
-                connection = connection_of(statement.endpoints)
-                connection.permit, connection.endless = Permission(run).refusal, True
-                api = RestInterface(run, HttpClient(statement.endpoints.rest or "", connection))
-                operations_of(contract)  # read while the folder is there
-        except (StatementError, ContractError, DescriptionError, OSError) as error:
+                return cls._opened(run, connection_of(statement.endpoints), taken.get("remarks", ()))
+        except (StatementError, ContractError, DescriptionError, NotPossibleError, OSError) as error:
             raise SettingsError(str(error)) from None
-        except UnreachableError as error:
+        except (UnreachableError, NoAnswerError) as error:
             raise CallError("refused", str(error)) from None
-        return cls(api, taken.get("remarks", ()))
+
+    @classmethod
+    def _opened(cls, run: Run, connection: Connection, remarks: tuple[str, ...]) -> Self:
+        """Return a device while the folder of its contract is there."""
+        # xmlschema and lxml take a third of a second, which the paper's robot need not pay.
+        from conformance.scenarios.described_messages import DescribedMessages  # noqa: PLC0415
+
+        permission = Permission(run)
+        connection.permit, connection.endless = permission.refusal, True
+        api = RestInterface(run, HttpClient(run.statement.endpoints.rest or "", connection))
+        permission.may_call_ports(api.client.base_url)
+        operations_of(run.contract)  # kept from now on
+        return cls(api, remarks, DescribedMessages.of(api))
+
+    def beside(self, wsdl: str) -> Self:
+        """Return the same device by its WSDL, with the same statement and credentials.
+
+        Raises:
+            SettingsError: the WSDL cannot be used.
+            CallError: its server does not respond.
+        """
+        said, connection = self.statement, replace(self.api.client.connection, permit=lambda *_: "")
+        where = msgspec.structs.replace(said.endpoints, rest=None)
+        try:
+            with TemporaryDirectory(prefix="roaas-load-") as folder:
+                contract, where, remarks = soap_contract(wsdl, None, where, connection, Path(folder))
+                statement = msgspec.structs.replace(said, endpoints=where, motion_map=None)
+                run = Run(statement=statement, contract=contract, allow_motion=self.api.run.allow_motion)
+                return self._opened(run, connection, remarks)
+        except (ContractError, DescriptionError, NotPossibleError, OSError) as error:
+            raise SettingsError(str(error)) from None
+        except (UnreachableError, NoAnswerError) as error:
+            raise CallError("refused", str(error)) from None
+
+    def name_of(self, operation: Operation) -> str:
+        """Return what the result calls an operation: method and path, or the name of a WSDL's if one port has it."""
+        if self.messages is None or sum(each.id == operation.id for each in operations_of(self.contract)) > 1:
+            return operation.label
+        return operation.id
+
+    def is_moved_by(self, operation: Operation) -> bool:
+        """Return whether the motion map of the statement commands the device by an operation."""
+        motion = self.statement.motion_map
+        return motion is not None and shape_of(operation.label) in {shape_of(call) for call, _ in motion.bodies}
+
+    def half(self, name: str) -> str:
+        """Return this device's operation of a pair in the statement's [load.pairs]; any other name as it is."""
+        pair = self.statement.load.pairs.get(name)
+        return name if pair is None else pair.rest if self.messages is None else pair.soap
 
     @property
     def contract(self) -> Contract:

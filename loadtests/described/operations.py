@@ -5,10 +5,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from conformance.api.call_rules import is_literal, matches
+from conformance.api.call_rules import Reason, is_literal, matches
 from conformance.documents.openapi import Operation, operations_of
 from conformance.statement.load import ServiceLevel
 from loadtests.described.device import Device
+from loadtests.described.messages import at_hand
 from loadtests.settings.errors import SettingsError
 
 _WEIGHTED = re.compile(r"(?P<name>.*?)(?:=(?P<weight>[1-9]\d{0,2}|1000))?", re.DOTALL)
@@ -42,20 +43,21 @@ def chosen(device: Device, named: Iterable[str]) -> Chosen:
         SettingsError: a name means no operation, an operation may not be called, or nothing is named.
     """
     statement, known = device.statement, operations_of(device.contract)
-    wanted = _read(named) or statement.load.operations or _by_rates(statement.slo)
+    wanted = wanted_of(named, statement.load.operations, statement.slo)
     if not wanted:
-        listed = ", ".join(f"'{each.label}'" for each in known[:_SHOWN])
+        listed = ", ".join(f"'{device.name_of(each)}'" for each in known[:_SHOWN])
         more = f" and {len(known) - _SHOWN} more" if len(known) > _SHOWN else ""
         raise SettingsError(f"name the operations to measure with --operation; the description has {listed}{more}")
     weights: dict[Operation, int] = {}
     notes = []
     for name, weight in wanted.items():
-        for operation in _meant(name, known):
+        meant = _meant(device.half(name), known)
+        for operation in meant:
             why = refused(device, operation)
-            if why and is_literal(name, operation):
-                raise SettingsError(f"{operation.label} is not called: {why}")
+            if why and meant == [operation] and is_literal(device.half(name), operation):
+                raise SettingsError(f"{device.name_of(operation)} is not called: {why}")
             if why:
-                notes.append(f"{operation.label} is not called: {why}")
+                notes.append(f"{device.name_of(operation)} is not called: {why}")
             else:
                 weights[operation] = weight
     if not weights:
@@ -66,15 +68,22 @@ def chosen(device: Device, named: Iterable[str]) -> Chosen:
 
 
 def named_alike(name: str, device: Device) -> str:
-    """Return the label of the operation that a name in the statement's [slo] means.
+    """Return what the result calls the operation that a name in the statement's [slo] means.
 
     Raises:
         SettingsError: it means none, or several.
     """
-    found = _meant(name, operations_of(device.contract))
+    found = _meant(device.half(name), operations_of(device.contract))
     if len(found) > 1:
         raise SettingsError(f"[slo] {name!r} means {len(found)} operations: name one, as in 'GET /state'")
-    return found[0].label
+    return device.name_of(found[0])
+
+
+def wanted_of(
+    named: Iterable[str], operations: Mapping[str, int], levels: Mapping[str, ServiceLevel]
+) -> dict[str, int]:
+    """Return names with weights: those of the options, or else the statement's [load], or else its [slo]."""
+    return _read(named) or dict(operations) or _by_rates(levels)
 
 
 def _read(named: Iterable[str]) -> dict[str, int]:
@@ -116,6 +125,10 @@ def refused(device: Device, operation: Operation) -> str:
     reason = device.api.call_rules.decide(operation)
     if not reason.may:
         return str(reason)
+    if device.is_moved_by(operation) and not device.api.run.allow_motion:
+        return str(Reason.MOVES)
+    if device.messages is not None and not at_hand(device.messages, operation):
+        return "its port is at another server"
     if operation.method in {"HEAD", "TRACE"}:
         return f"{operation.method} is not measured, because its response has no content"
     if not operation.label.isprintable() or len(operation.label) > _LONGEST:

@@ -8,11 +8,11 @@ from conformance.api.rest.variations import Kind, Variation
 from conformance.documents.openapi import Operation, operations_of
 from conformance.scenarios.scenario import PartialTraceError
 from conformance.scenarios.survey import Probe, Surveyor, order_of
-from conformance.transport.exchange import Request
 from loadtests.clients.described import Described
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Robot
 from loadtests.described.device import Device
+from loadtests.described.messages import bytes_of, described_message
 from loadtests.settings.errors import SettingsError
 
 _STREAM = "its response does not end, as that of a stream"
@@ -23,12 +23,37 @@ _ANY_SUCCESS = range(200, 300)
 def robot_of(device: Device, operations: Collection[Operation]) -> Robot:
     """Return the robot with the operations to measure, after finding values that it accepts.
 
-    Each operation is called up to four times, and before it what lists the things that its path names.
+    Each operation is called up to four times, and before it what lists the things that its path names. An operation of
+    a WSDL is called with each of the statement's values.
 
     Raises:
-        SettingsError: the response of an operation does not end.
+        SettingsError: the response of an operation does not end, or no message of it can be made.
         CallError: the device does not respond.
     """
+    return robot_at(device, _described_of(device, operations))
+
+
+def robot_at(device: Device, described: tuple[Described, ...]) -> Robot:
+    """Return the robot with operations, by the device's address and credentials."""
+    where, connection = device.statement.endpoints, device.api.client.connection
+    certificate = connection.certificate
+    return Robot(
+        rest=where.rest if device.interface == "rest" else None,
+        publishers=None,
+        subscribers=None,
+        ca_file=where.ca_file,
+        timeout_s=where.timeout_s,
+        described=described,
+        credentials=connection.credentials.items,
+        username_token=device.messages.token if device.messages is not None else None,
+        certificate=None if certificate is None else (str(certificate[0]), str(certificate[1] or "") or None),
+    )
+
+
+def _described_of(device: Device, operations: Collection[Operation]) -> tuple[Described, ...]:
+    """Return the operations with their requests; see robot_of()."""
+    if device.messages is not None:
+        return tuple(described_message(device, device.messages, operation) for operation in operations)
     values = Values(device.statement.values)
     device.api.values = values
     surveyor = Surveyor(device.api, values)
@@ -37,23 +62,7 @@ def robot_of(device: Device, operations: Collection[Operation]) -> Robot:
             surveyor.begin(operation)
     except PartialTraceError:
         raise CallError("closed", f"{device.api.client.base_url}: the device stopped responding") from None
-    return robot_at(device, tuple(_described(surveyor, operation) for operation in operations))
-
-
-def robot_at(device: Device, described: tuple[Described, ...]) -> Robot:
-    """Return the robot with operations, by the device's address and credentials."""
-    where, connection = device.statement.endpoints, device.api.client.connection
-    certificate = connection.certificate
-    return Robot(
-        rest=where.rest,
-        publishers=None,
-        subscribers=None,
-        ca_file=where.ca_file,
-        timeout_s=where.timeout_s,
-        described=described,
-        credentials=connection.credentials.items,
-        certificate=None if certificate is None else (str(certificate[0]), str(certificate[1] or "") or None),
-    )
+    return tuple(_described(surveyor, operation) for operation in operations)
 
 
 def _listing(device: Device, operations: Collection[Operation]) -> list[Operation]:
@@ -92,14 +101,8 @@ def _described(surveyor: Surveyor, operation: Operation) -> Described:
 
 
 def octets_of(probe: Probe) -> bytes:
-    """Return the bytes of a request that was sent, with variables in place of credentials."""
-    request: Request = probe.attempt.request
-    fields = [pair for pair in request.headers if pair[0] != "Connection"]
-    lines = [
-        f"{request.method} {request.target}{request.query} HTTP/1.1",
-        *(f"{name}: {text}" for name, text in fields),
-    ]
-    return "\r\n".join([*lines, "", ""]).encode() + request.body
+    """Return the bytes of the request of a probe; see bytes_of()."""
+    return bytes_of(probe.attempt.request)
 
 
 def declared_good(operation: Operation) -> tuple[tuple[int, tuple[str, ...]], ...]:

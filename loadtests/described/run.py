@@ -1,32 +1,31 @@
 """A run on a device with a description: its settings, and the stop at its end."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Self
 
-from conformance.api.rest.stops import send_stops
 from conformance.documents.description import is_url
-from conformance.documents.openapi import operations_of
+from conformance.engine.describing import is_wsdl
 from conformance.packs.table1.statement import Load, Statement
-from conformance.statement.load import ServiceLevel
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
-from loadtests.described.operations import chosen, named_alike
-from loadtests.described.requests import robot_of
+from loadtests.described.operations import named_alike
+from loadtests.described.pairs import Choice
 from loadtests.described.scenario import callable_robot, scenario_of
+from loadtests.described.stopping import Stopping
 from loadtests.described.streams import streams_to_hear
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.errors import SettingsError
 from loadtests.settings.settings import Selection, Settings
 from loadtests.settings.settle import settle
 from loadtests.settings.target import Target
+from loadtests.statistics.steps import step_operation
 
 _PAPERS_ONLY = (
     "publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint", "rosbridge", "end_to_end",
     "ros_domain_id", "thresholds", "against_publishers_wsdl", "against_subscribers_wsdl",
     "against_publishers_endpoint", "against_subscribers_endpoint",
 )  # fmt: skip
-_DESCRIPTIONS = (".json", ".yaml", ".yml")
+_DESCRIPTIONS = (".json", ".yaml", ".yml", ".wsdl")
 
 
 @dataclass
@@ -34,17 +33,17 @@ class Described:
     """A run on a device with a description.
 
     Attributes:
-        source: URL or file of the description.
+        named: the descriptions and the statement.
         options: of the command.
-        device: the device.
-        other: the device to compare with, or None.
+        devices: the device by its OpenAPI description, by its WSDL, or by both; all of them are stopped at the end.
+        others: the device to compare with, likewise; empty: none.
     """
 
-    source: str
+    named: Named
     options: Mapping[str, Any]
-    device: Device
-    other: Device | None = None
-    _acts: bool = False
+    devices: tuple[Device, ...]
+    others: tuple[Device, ...] = ()
+    _stopping: tuple[Stopping, ...] = ()
 
     @classmethod
     def of(cls, named: Named, options: Mapping[str, Any]) -> Self:
@@ -60,10 +59,10 @@ class Described:
             raise SettingsError(
                 f"--{alien[0].replace('_', '-')} is for the paper's robot, not for a device with a description{hint}"
             )
-        if set(options["interfaces"]) - {"rest"} or set(options["clients"]) - {"wire"}:
-            raise SettingsError("a device with a description is measured over REST, with the client wire")
-        device, against = Device.at(named, options), options["against"]
-        return cls(named.source or "", options, device, _other(named, options, against) if against else None)
+        if set(options["interfaces"]) - {"rest", "soap"} or set(options["clients"]) - {"wire"}:
+            raise SettingsError("a device with a description is measured over REST or SOAP, with the client wire")
+        devices, against = _opened(named, options), options["against"]
+        return cls(named, options, devices, _other(named, options, against) if against else ())
 
     def settings(self, command: str) -> Settings:
         """Return the settings of the run, after finding values that the device accepts.
@@ -73,98 +72,114 @@ class Described:
             CallError: the device does not respond.
         """
         options, scenario = self.options, self.options["scenario"]
-        target = self._target() if scenario is None else self._of_scenario(scenario)
+        target = self._of_choice() if scenario is None else self._of_scenario(scenario)
         taken = {
             name: value for name, value in options.items() if name not in {*DESCRIBED_ONLY, *_PAPERS_ONLY, "against"}
         }
         if scenario is not None:
             taken["users"] = options["users"] or 1
-        other = None if self.other is None else _statement(self.other)
-        return settle(CliOptions.of(**taken, against=other, command=command), _statement(self.device), target)
+        other = _statement(self.others[0]) if self.others else None
+        return settle(CliOptions.of(**taken, against=other, command=command), _statement(self.devices[0]), target)
 
-    def _target(self) -> Target:
+    def _of_choice(self) -> Target:
         """Return the operations that the options name."""
-        options, device = self.options, self.device
-        operations = chosen(device, options["operations"])
-        names, weights = [each.label for each in operations.weights], tuple(operations.weights.values())
-        changing = [each.label for each in operations.weights if not each.safe or each.motion]
-        self._acts = bool(changing)
-        robot = robot_of(device, operations.weights)
-        slo, unmeasured = self._levels(names)
+        options = self.options
+        devices, others = (_selected(each, options["interfaces"]) for each in (self.devices, self.others))
+        choice = Choice.of(devices, options["operations"])
+        names, weights, changing = tuple(choice.weights), tuple(choice.weights.values()), choice.changing
+        if changing:
+            self._stopping = tuple(map(Stopping.of, (*self.devices, *self.others)))
+        robot = choice.robot()
+        levels = choice.levels(partial=self.named.wsdl is not None)
         return Target(
             robot,
-            Selection(tuple(names), ("rest",), ("wire",), weights if len(set(weights)) > 1 else ()),
+            Selection(
+                names, tuple(each.interface for each in devices), ("wire",), weights if len(set(weights)) > 1 else ()
+            ),
             moves=bool(changing),
-            steps_move=names[0] in changing,
-            other=None if self.other is None else robot_of(self.other, _same(self.other, operations.weights)),
-            description=self._description,
-            slo=slo,
-            notes=(*device.remarks, *operations.notes, *unmeasured),
-            streams=streams_to_hear(device, options),
+            steps_move=names[step_operation(names)] in changing,
+            other=choice.same(others).robot() if others else None,
+            description=self.named.shown,
+            slo={name: level for name, level in levels.items() if name in names},
+            notes=(
+                *(remark for each in devices for remark in each.remarks),
+                *choice.notes,
+                *_unmeasured(levels, names),
+            ),
+            streams=streams_to_hear(self.devices[0], options),
         )
-
-    def _levels(self, names: list[str]) -> tuple[dict[str, ServiceLevel], list[str]]:
-        """Return the service levels of operations, and a note on those of others."""
-        levels = {named_alike(name, self.device): level for name, level in self.device.statement.slo.items()}
-        others = [name for name in levels if name not in names]
-        notes = [f"not measured, so not judged: [slo] {', '.join(others)}"] if others else []
-        return {name: level for name, level in levels.items() if name in names}, notes
 
     def _of_scenario(self, file: str) -> Target:
         """Return the operations that a scenario may call."""
-        options, device = self.options, self.device
-        scenario = scenario_of(file, options)
-        robot = callable_robot(device)
-        names = [each.name for each in robot.described if not each.refused]
-        slo, unmeasured = self._levels(names)
-        moves = self._acts = any(
-            each.label in names and (not each.safe or each.motion) for each in operations_of(device.contract)
-        )
+        device, scenario = self.devices[0], scenario_of(file, self.options)
+        if device.interface != "rest":
+            raise SettingsError("--scenario needs an OpenAPI description: name it with --openapi, or in [api] openapi")
+        allowed, robot = callable_robot(device)
+        names = [each.label for each in allowed]
+        moves = any(not each.safe or each.motion for each in allowed)
+        if moves:
+            self._stopping = tuple(map(Stopping.of, self.devices))
+        levels = {named_alike(name, device): level for name, level in device.statement.slo.items()}
         return Target(
             robot,
             Selection(tuple(names), ("rest",), ("wire",)),
             moves=moves,
             steps_move=moves,
-            description=self._description,
-            slo=slo,
-            notes=(*device.remarks, *unmeasured),
-            streams=streams_to_hear(device, options),
+            description=self.named.shown,
+            slo={name: level for name, level in levels.items() if name in names},
+            notes=(*device.remarks, *_unmeasured(levels, names)),
+            streams=streams_to_hear(device, self.options),
             scenario=scenario,
         )
 
-    @property
-    def _description(self) -> str:
-        """Return the description's URL, or the name of its file."""
-        return self.source if is_url(self.source) else Path(self.source).name
-
-    def stop(self) -> None:
-        """Send what the description marks as a stop (x-roaas-stop), if the run called what may change something."""
-        for device in (self.device, self.other):
-            if device is not None and self._acts:
-                device.api.client.connection.note("POST")  # the run sent it, over connections of its own
-                send_stops(device.api)
+    def stop(self) -> list[str]:
+        """Stop each device if the run called what may change something; return why one may still move."""
+        return [problem for each in self._stopping if (problem := each.stop())]
 
 
-def _other(named: Named, options: Mapping[str, Any], against: str) -> Device:
-    """Return the device to compare with: at another URL, or with its own statement or description."""
-    if against.endswith(_DESCRIPTIONS):
-        return Device.at(Named(against, named.statement), {**options, "base_url": None, "rest": None})
-    if is_url(against):
-        return Device.at(named, {**options, "base_url": against, "rest": None})
-    own = Named.of((against,), {"openapi": None, "wsdl": None})
-    return Device.at(Named(own.source or named.source, own.statement), {**options, "base_url": None, "rest": None})
+def _unmeasured(levels: Collection[str], names: Collection[str]) -> list[str]:
+    """Return a note on the service levels of operations that are not measured."""
+    others = [name for name in levels if name not in names]
+    return [f"not measured, so not judged: [slo] {', '.join(others)}"] if others else []
 
 
-def _same(other: Device, weights: Mapping[Any, int]) -> dict[Any, int]:
-    """Return the other device's operations of the same names.
+def _opened(named: Named, options: Mapping[str, Any]) -> tuple[Device, ...]:
+    """Return a device by its descriptions; without its WSDL if the options select REST alone.
 
     Raises:
-        SettingsError: it lacks one, or does not allow it.
+        SettingsError: a description cannot be used, or none has an interface that the options select.
+        CallError: the device does not respond.
     """
-    try:
-        return chosen(other, [f"{each.label}={weight}" for each, weight in weights.items()]).weights
-    except SettingsError as error:
-        raise SettingsError(f"--against: {error}") from None
+    first, wanted = Device.at(named, options), set(options["interfaces"])
+    both = (first,) if named.wsdl is None or wanted == {"rest"} else (first, first.beside(named.wsdl))
+    lacking = wanted - {each.interface for each in both}
+    if lacking:
+        kind, option = ("a WSDL", "wsdl") if "soap" in lacking else ("an OpenAPI description", "openapi")
+        raise SettingsError(f"--interface {min(lacking)} needs {kind}: name it with --{option}, or in [api] {option}")
+    return both
+
+
+def _selected(devices: tuple[Device, ...], interfaces: Collection[str]) -> tuple[Device, ...]:
+    """Return those with a selected interface; all if none is selected."""
+    return tuple(each for each in devices if not interfaces or each.interface in interfaces)
+
+
+def _other(named: Named, options: Mapping[str, Any], against: str) -> tuple[Device, ...]:
+    """Return the device to compare with: at another URL, or with its own statement or description.
+
+    Raises:
+        SettingsError: a description cannot be used, or one URL is to stand for two descriptions.
+        CallError: the device does not respond.
+    """
+    elsewhere = {**options, "base_url": None, "rest": None}
+    if not is_url(against) and not against.endswith(_DESCRIPTIONS):
+        own = Named.of((against,), {"openapi": None, "wsdl": None})
+        return _opened(own if own.source else Named(named.source, own.statement, named.wsdl), elsewhere)
+    if named.wsdl is not None and set(options["interfaces"]) != {"rest"}:
+        raise SettingsError(f"--against {against}: to compare REST and SOAP, name the other device's statement")
+    if against.endswith(_DESCRIPTIONS) or is_wsdl(against):
+        return _opened(Named(against, named.statement), elsewhere)
+    return _opened(named, {**elsewhere, "base_url": against})
 
 
 def _statement(device: Device) -> Statement:

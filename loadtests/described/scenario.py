@@ -5,7 +5,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from conformance.documents.openapi import operations_of
+from conformance.documents.openapi import Operation, operations_of
 from loadtests.clients.described import Described
 from loadtests.clients.robot import Robot
 from loadtests.described.device import Device
@@ -38,19 +38,20 @@ def scenario_of(file: str, options: Mapping[str, Any]) -> Scenario:
         raise SettingsError(f"--scenario {file!r}: {error.strerror or error}") from None
 
 
-def callable_robot(device: Device) -> Robot:
-    """Return the robot with all operations of its description, and why some may not be called. Nothing is sent.
+def callable_robot(device: Device) -> tuple[list[Operation], Robot]:
+    """Return the operations that may be called, and the robot with all, and why the others may not. Nothing is sent.
 
     Raises:
         SettingsError: there are too many operations, or none may be called.
     """
-    base = device.api.client.base_url
+    base, known = device.api.client.base_url, operations_of(device.contract)
     found = tuple(
-        Described(each.label, each.method, base, (), declared_good(each), refused(device, each))
-        for each in operations_of(device.contract)
+        Described(each.label, each.method, base, (), declared_good(each), refused=refused(device, each))
+        for each in known
     )
-    if not 0 < sum(not each.refused for each in found) <= MOST_OPERATIONS:
+    allowed = [each for each, told in zip(known, found, strict=True) if not told.refused]
+    if not 0 < len(allowed) <= MOST_OPERATIONS:
         raise SettingsError(
             f"of the description's {len(found)} operations, --scenario needs 1 to {MOST_OPERATIONS} that may be called"
         )
-    return robot_at(device, found)
+    return allowed, robot_at(device, found)

@@ -13,7 +13,7 @@ from locust.exception import RPCError
 from locust.runners import STATE_MISSING, STATE_RUNNING, MasterRunner
 
 from loadtests.clients.library import LIBRARY
-from loadtests.clients.robot import Robot, Secrets
+from loadtests.clients.robot import Robot, Secrets, without_secrets
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import Clocks, WorkerClock, clock_id
 from loadtests.measuring.errors import GeneratorError
@@ -109,7 +109,7 @@ class DistributedExecutor:
         self._wait(lambda: sum(map(self._is_there, self._listening)) >= self._expected, "workers connected")
         job = {
             # Secrets do not travel: each worker has its own.
-            "robots": [msgspec.to_builtins(replace(robot, token=None, credentials=())) for robot in robots],
+            "robots": [msgspec.to_builtins(without_secrets(robot)) for robot in robots],
             "operations": list(plan.operations),
             "seed": plan.load.seed,
             "library": LIBRARY in plan.clients,

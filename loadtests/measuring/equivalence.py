@@ -67,6 +67,27 @@ def pose_difference(rest: bytes, soap: bytes) -> str | None:
     return None
 
 
+def values_difference(rest: bytes, soap: bytes) -> str | None:
+    """Return how many values two responses have if not equally many; None if they have, or if one cannot be counted."""
+    try:
+        over_rest = sum(1 for _ in _json_leaves(json.loads(rest)))
+        body = parse_xml(soap).find("{*}Body")
+    except (XmlError, ValueError):
+        return None
+    leaves = () if body is None else (each for each in body.iter() if isinstance(each.tag, str))
+    over_soap = sum(len(each.attrib) + (0 if len(each) else _values_in(each.text or "")) for each in leaves)
+    return None if over_rest == over_soap else f"{over_rest} values over REST and {over_soap} over SOAP"
+
+
+def _values_in(text: str) -> int:
+    """Return how many values a text is: numbers in a row are a list (xs:list), anything else is one."""
+    words = text.split()
+    try:
+        return len([float(word) for word in words])
+    except ValueError:
+        return 1
+
+
 def deliveries_missing(listed: list[Any], operation: str, sent: Values) -> list[str]:
     """Return the deliveries that were sent and are missing from the robot's list of accepted requests."""
     return [

@@ -39,7 +39,7 @@ class RobotProcess:
         """Find the robot's process; return None if the robot is on another machine, or permission is missing."""
         if not same_machine(robot):
             return None
-        port = Endpoint.parse(_addresses(robot)[0]).port
+        port = Endpoint.parse(robot.addresses[0]).port
         try:
             for connection in psutil.net_connections("tcp"):
                 here = connection.laddr
@@ -65,14 +65,9 @@ def _cpu_s(process: psutil.Process) -> float:
     return float(times.user + times.system)
 
 
-def _addresses(robot: Robot) -> list[str]:
-    return [address for address in (robot.rest, robot.publishers, robot.subscribers) if address]
-
-
 def same_machine(robot: Robot) -> bool:
     """Return whether all of a robot's addresses are this machine's, as far as can be known without DNS."""
-    addresses = _addresses(robot)
-    return bool(addresses) and all(is_here(Endpoint.parse(address).host) for address in addresses)
+    return bool(robot.addresses) and all(is_here(Endpoint.parse(address).host) for address in robot.addresses)
 
 
 def is_here(host: str) -> bool:

@@ -175,9 +175,7 @@ def _against(outcome: Outcome, measured: Measured, controls: list[AaControl]) ->
     settings = outcome.settings.against
     if settings is None:
         return None
-    other = outcome.robots[1]
-    addresses = {"rest": other.rest, "publishers": other.publishers, "subscribers": other.subscribers}
-    return against(measured, controls, settings.tolerance, addresses)
+    return against(measured, controls, settings.tolerance, outcome.robots[1].shown)
 
 
 def _end_to_end(outcome: Outcome) -> dict[str, Any]:

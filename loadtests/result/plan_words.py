@@ -40,7 +40,9 @@ def plan_words(settings: Settings, plan: Plan, pacing: str) -> dict[str, Any]:
         "zeep_rate": load.rate if plan.open_model and LIBRARY in plan.clients else None,
         "repeats": settings.repeats.number,
         "restart_command": without_folders(settings.repeats.restart_command or "") or None,
-        "methods": {name: CATALOGUE[name].element for name in plan.operations if name in CATALOGUE},
+        "methods": {
+            name: CATALOGUE[name].element for name in plan.operations if not settings.description and name in CATALOGUE
+        },
         "weights": dict(zip(plan.operations, plan.weights, strict=True)) if plan.weights else {},
         "description": settings.description and without_folders(settings.description),
         "scenario": settings.scenario

@@ -36,8 +36,9 @@ def papers_robot(options: CliOptions, statement: Statement) -> Target:
         interfaces, clients = _shared(options.against.endpoints, interfaces), clients[:1]
         _check_endpoints(options.against.endpoints)
         other = _robot(options.against.endpoints, interfaces)
-    if statement.load.operations:
-        raise SettingsError("[load] operations is for a device with a description: see [api]; here, use --operation")
+    for key in ("operations", "pairs"):
+        if getattr(statement.load, key):
+            raise SettingsError(f"[load] {key} is for a device with a description: see [api]; here, use --operation")
     unknown = [name for name in statement.slo if name not in OPERATIONS]
     if unknown:
         raise SettingsError(f"[slo] {unknown[0]!r} is no operation: it has to be one of {', '.join(OPERATIONS)}")

@@ -39,7 +39,7 @@ def latency_junit(result: Mapping[str, Any]) -> str:
     cases = list(_cases(result))
     counts = {kind: str(sum(case.element == kind for case in cases)) for kind in ("failure", "error")}
     robot = result["environment"].get("robot") or {}
-    name = excerpt(f"RoAAS latency: {robot.get('name') or robot.get('rest') or 'robot'}", 200)
+    name = excerpt(f"RoAAS latency: {robot.get('name') or robot.get('rest') or robot.get('soap') or 'robot'}", 200)
     totals = {"tests": str(len(cases)), "failures": counts["failure"], "errors": counts["error"]}
     root = etree.Element("testsuites", {"name": name, **totals})
     suite = etree.SubElement(root, "testsuite", {"name": "latency", **totals})

@@ -148,6 +148,8 @@ def _pictures(result: Mapping[str, Any], series: AllSeries) -> dict[str, Picture
 
 
 def _ratio_picture(result: Mapping[str, Any]) -> Picture | None:
+    mark = None if result["plan"].get("description") else (PAPER["ratio"], f"the paper's {PAPER['ratio']}")
+    line = " The dashed line is the ratio of the paper's two means."
     rows = [
         Ratio(
             f"{c['operation']}, {c['client']}, {QUANTILE_WORDS[c['quantile']]}",
@@ -163,6 +165,6 @@ def _ratio_picture(result: Mapping[str, Any]) -> Picture | None:
         "SOAP's service time over REST's",
         rows,
         "SOAP's service time divided by REST's, at the median (50 %) and at the 99th percentile, with 95 % intervals. "
-        "Right of 1 SOAP is slower. The dashed line is the ratio of the paper's two means.",
-        mark=(PAPER["ratio"], f"the paper's {PAPER['ratio']}"),
+        f"Right of 1 SOAP is slower.{'' if mark is None else line}",
+        mark=mark,
     )

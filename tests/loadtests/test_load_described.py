@@ -5,6 +5,7 @@ import urllib.request
 
 import pytest
 from lxml import etree
+from toy_api import LOGIN, TOKEN
 
 from reports.latency.junit import latency_junit
 from reports.latency.noticed import noticed
@@ -121,6 +122,102 @@ def test_a_slower_device_takes_turns_with_it(device, load):
     assert heard["clock"] == "shared"
     assert "GET /events, streamed: the data is" in latency_html(result)
     assert "GET /events (sse)" in latency_markdown(result)
+
+
+def test_https_with_its_own_authority_and_a_login(started, load, certificate, tmp_path):
+    cert, key = certificate
+    _, port = started("toy_api.py", "--auth", "bearer", "--tls", str(cert), str(key))
+    url, statement = f"https://localhost:{port}", tmp_path / "robot.toml"
+    (tmp_path / "login.json").write_text(LOGIN)
+    (tmp_path / "ca.pem").write_bytes(cert.read_bytes())
+    statement.write_text(
+        f'[api]\nopenapi = "{url}/openapi.json"\n[endpoints]\nrest = "{url}"\nca_file = "ca.pem"\n'
+        '[auth]\nlogin = "POST /login"\nbody_file = "login.json"\ntoken = "/session/token"\n'
+    )
+    run = load(str(statement), SHORT, "--operation 'GET /state' --processes 2")
+    series = run.series("GET /state", "rest")
+    assert (series["count"] > 50, series["errors"]) == (True, 0), run.out + run.err
+    assert run.result["environment"]["robot"]["rest"] == url
+    assert TOKEN not in run.out + run.err + json.dumps(run.result)
+    untrusted = load(f"{url}/openapi.json", SHORT, "--operation 'GET /state'")
+    assert (untrusted.code, "certificate" in untrusted.err) == (3, True), untrusted.err
+    (tmp_path / "login.json").write_text("{}")
+    refused = load(str(statement), SHORT, "--operation 'GET /state'")
+    assert (refused.code, "[auth] login = 'POST /login': the device responded 403" in refused.err) == (2, True)
+
+
+def test_the_knee_of_a_device_that_answers_one_request_after_the_other(device, load, tmp_path):
+    url, statement = device("--serial", "--slow", "0.004"), tmp_path / "robot.toml"  # at most 250 a second
+    statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n[slo]\n"GET /state" = {{ p50_ms = 400 }}\n')
+    run = load(
+        str(statement),
+        "--rate 40 --duration 1 --warmup 0.1",
+        "--steps --step-rates 20,1000 --knee --knee-searches 2 --step-duration 1",
+    )
+    (knee,), (search,) = run.result["knee"], run.result["knee_search"]
+    assert (knee["interface"], knee["first_rate_missed"]) == ("rest", 1000)
+    assert (knee["highest_rate"], knee["limited_by"]) == (20, "robot")
+    assert knee["criterion"].startswith("p50 response time below 400 ms")
+    assert search["interface"] == "rest"
+    assert all(met is None or met < 270 for met, _ in search["brackets"]), "no more than it can answer"
+    assert all(missed is not None and missed <= 400 for _, missed in search["brackets"])
+    assert "Under rising load" in latency_html(run.result)
+
+
+MAP = """
+[values]
+speed = [0.5]
+[motion.state]
+read = "GET /where"
+[motion.state.axes]
+x = { at = "/x", limits = [-1000, 1000], tolerance = 0.001 }
+[motion.velocity]
+send = "POST /drive"
+body = { speed = "{speed}" }
+tolerance = 0.1
+axes = { speed = { limits = [-1, 1], at = "/speed" } }
+[motion.stop]
+send = "POST /halt"
+"""
+
+
+@pytest.fixture
+def driven(device, load, tmp_path):
+    """Drive a device that coasts for so long after a halt; gives the run and the device's URL."""
+
+    def drive(coast, *options):
+        url, statement = device("--coast", str(coast)), tmp_path / "robot.toml"
+        statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n{MAP}')
+        return load(str(statement), SHORT, "--operation 'POST /drive' --call 'POST /drive'", *options), url
+
+    return drive
+
+
+def where(url):
+    with urllib.request.urlopen(f"{url}/where", timeout=5) as answer:  # noqa: S310 -- http
+        return json.load(answer)
+
+
+def test_after_a_load_that_moves_a_device_it_is_stopped_and_its_rest_is_awaited(driven):
+    run, url = driven(1.5, "--allow-motion")
+    assert where(url)["speed"] == 0, "it has come to rest when the command ends"
+    assert (run.series("POST /drive", "rest")["errors"], run.result["plan"]["limits"]["max_rate"]) == (0, 500)
+    assert calls(url)["POST /halt"] >= 1
+    assert "may still move" not in run.err
+    assert where(url)["x"] > 0, "it was moved"
+
+
+def test_a_device_that_does_not_come_to_rest_is_named(driven):
+    run, url = driven(60, "--allow-motion")
+    assert where(url)["speed"] == 0.5
+    assert "told to stop after the load, but may still move: the device does not come to rest" in run.err
+
+
+def test_what_the_motion_map_moves_needs_permission_to_move(driven):
+    run, url = driven(0)
+    assert run.code == 2
+    assert "POST /drive is not called: it moves the device: --allow-motion allows it" in run.err
+    assert "POST /drive" not in calls(url)
 
 
 def test_nobody_there_is_said_before_the_run(load, free_port):

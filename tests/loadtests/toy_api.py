@@ -1,7 +1,7 @@
-"""A device with an OpenAPI description of its own: `python toy_api.py [--auth KIND] [--fail-every N] [--slow S]
-[--ahead S] [--age S]`.
+"""A device with an OpenAPI description of its own: `python toy_api.py [--auth KIND] [--fail-every N] [--slow S] …`.
 
-Prints `ready PORT`. GET /calls says what was called, and is not in the description.
+Prints `ready PORT`. GET /calls says what was called, and is not in the description. POST /drive makes it move, and it
+coasts after POST /halt.
 """
 
 import argparse
@@ -9,15 +9,20 @@ import base64
 import hashlib
 import json
 import re
+import ssl
 import sys
+import threading
 import time
 from collections import Counter
+from contextlib import nullcontext
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from types import SimpleNamespace
 from typing import ClassVar
 
 OK = {"description": "good", "content": {"application/json": {"schema": {"type": "object"}}}}
 ITEM = {"name": "item_id", "in": "path", "required": True, "schema": {"type": "string"}}
-BODY = {"content": {"application/json": {"schema": {"type": "object", "properties": {"speed": {"type": "number"}}}}}}
+SPEED = {"type": "object", "properties": {"speed": {"type": "number"}}, "required": ["speed"]}
+BODY = {"required": True, "content": {"application/json": {"schema": SPEED}}}
 DESCRIPTION = {
     "openapi": "3.1.0",
     "info": {"title": "toy", "version": "1"},
@@ -28,12 +33,14 @@ DESCRIPTION = {
         "/text": {"get": {"responses": {"200": OK}}},
         "/made": {"get": {"responses": {"200": OK}}},
         "/drive": {"post": {"requestBody": BODY, "responses": {"200": OK}}},
+        "/where": {"get": {"responses": {"200": OK}}},
         "/halt": {"post": {"x-roaas-stop": True, "responses": {"200": OK}}},
         "/reset": {"get": {"responses": {"200": OK}}},
         "/events": {"get": {"responses": {"200": {"description": "events", "content": {"text/event-stream": {}}}}}},
     },
 }
 USER, PASSWORD, TOKEN = "robot", "s3same-robot", "t0ken-of-robot"
+LOGIN = json.dumps({"user": USER, "password": PASSWORD})
 
 
 def md5(text):
@@ -45,6 +52,8 @@ class Handler(BaseHTTPRequestHandler):
     disable_nagle_algorithm = True
     calls: ClassVar = Counter()
     nonces = 0
+    one_at_a_time = threading.Lock()
+    body = SimpleNamespace(x=0.0, speed=0.0, since=0.0, until=0.0)
 
     def setup(self):
         super().setup()
@@ -92,20 +101,32 @@ class Handler(BaseHTTPRequestHandler):
         wanted = md5(f"{first}:{parts['nonce']}:{parts['nc']}:{parts['cnonce']}:auth:{second}")
         return parts["response"] == wanted and parts["uri"] == self.path
 
-    def do_GET(self):  # noqa: PLR0911 -- one for each resource
+    def do_GET(self):
         path = self.path.partition("?")[0]
         if path == "/openapi.json":
             return self.send(200, DESCRIPTION)
         if path == "/calls":
             return self.send(200, self.calls)
         length = int(self.headers.get("Content-Length") or 0)
-        self.rfile.read(length)
+        content = self.rfile.read(length)
+        if path == "/login":
+            good = content == LOGIN.encode()
+            return self.send(200 if good else 403, {"session": {"token": TOKEN}} if good else {})
         if self.refused():
             return None
         self.calls[f"{self.command} {path}"] += 1
+        return self.resource(path, content)
+
+    do_POST = do_GET  # noqa: N815 -- http.server's name
+
+    def resource(self, path, content):  # noqa: PLR0911 -- one for each resource
+        """Answer a request for a resource of the description."""
         options = self.server.options
+        if path in {"/drive", "/halt", "/where"}:
+            return self.send(200, self.moved(path, content))
         if path == "/state":
-            time.sleep(options.slow)
+            with self.one_at_a_time if options.serial else nullcontext():
+                time.sleep(options.slow)
             failing = options.fail_every and not self.calls["GET /state"] % options.fail_every
             now = time.time() + options.ahead
             return self.send(503 if failing else 200, {"stamp": now - options.age, "now": now})
@@ -119,7 +140,16 @@ class Handler(BaseHTTPRequestHandler):
             return self.send(200 if path in {"/items/left", "/items/right"} else 404, {})
         return self.send(200, [{"id": "left"}, {"id": "right"}] if path == "/items" else {})
 
-    do_POST = do_GET  # noqa: N815 -- http.server's name
+    def moved(self, path, content):
+        """Drive, or halt after coasting; say where it is."""
+        now, body = time.monotonic(), self.body
+        body.x += body.speed * max(0.0, min(now, body.until) - body.since)
+        body.speed, body.since = body.speed if now < body.until else 0.0, now
+        if path == "/drive":
+            body.speed, body.until = json.loads(content)["speed"], now + 3600
+        elif path == "/halt":
+            body.until = now + self.server.options.coast
+        return {"x": body.x, "speed": body.speed}
 
     def events(self, options):
         self.send_response(200)
@@ -147,9 +177,16 @@ if __name__ == "__main__":
     parser.add_argument("--host", default="127.0.0.1")
     parser.add_argument("--ahead", type=float, default=0.0, help="how far its clock is ahead, s")
     parser.add_argument("--age", type=float, default=0.0, help="how old its state is, s")
+    parser.add_argument("--serial", action="store_true", help="answer GET /state one after the other")
+    parser.add_argument("--coast", type=float, default=0.0, help="move on for so long after a halt, s")
+    parser.add_argument("--tls", nargs=2, metavar=("CERT", "KEY"))
     server = ThreadingHTTPServer((parser.parse_known_args()[0].host, 0), Handler)
     server.daemon_threads = True
     server.options = parser.parse_args()
+    if server.options.tls:
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.load_cert_chain(*server.options.tls)
+        server.socket = context.wrap_socket(server.socket, server_side=True)
     sys.stdout.write(f"ready {server.server_port}\n")
     sys.stdout.flush()
     server.serve_forever()

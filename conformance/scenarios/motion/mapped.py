@@ -281,14 +281,15 @@ class MappedDevice:
         if not self.is_near(self.where(), self.home):
             raise NotPossibleError("the device does not come back to the position from which the suite begins")
 
-    def come_to_rest(self) -> None:
-        """Stop what goes on, and wait until the device rests.
+    def come_to_rest(self, *, stop: bool = True) -> None:
+        """Stop what goes on, unless that is done already, and wait until the device rests.
 
         Raises:
             NotPossibleError: it does not.
             NoAnswerError: there is no response.
         """
-        self.stop()
+        if stop:
+            self.stop()
         until = self.clock.now() + _RESTS_S
         while True:
             before = self.where()

@@ -7,9 +7,9 @@ from body import Body
 from lxml import etree
 from soap_devices import PASSWORD, SOAP_12, USER, Device, abstract, messages, operation, wsdl
 
-from conformance.api.soap.username_token import UsernameToken
 from conformance.documents.soap_services import read_services
 from conformance.scenarios.described_messages import DescribedMessages
+from conformance.transport.username_token import UsernameToken
 
 LIMITS = {"pan": (-1.0, 1.0), "tilt": (-0.5, 0.5)}
 # How fast it moves to a position, and at velocity 1, per second; so long after a velocity it moves on, s.

@@ -115,7 +115,7 @@ def test_a_full_statement(tmp_path):
         ("[ros]\ndomain_id = 500", "[ros] domain_id = 500 must be a whole number from 0 to 232"),
         (
             "[load]\nmax_rates = 3",
-            "[load] unknown key 'max_rates'; known are max_duration_s, max_rate, operations, thresholds",
+            "[load] unknown key 'max_rates'; known are max_duration_s, max_rate, operations, pairs, thresholds",
         ),
         ("[load]\nmax_rate = 'fast'", "[load] max_rate = 'fast' must be a positive number"),
         (

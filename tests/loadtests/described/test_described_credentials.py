@@ -2,13 +2,16 @@
 
 import json
 import urllib.request
+from dataclasses import replace
+from datetime import timedelta
 
 import msgspec
 import pytest
+import soap_devices
 from toy_api import PASSWORD, TOKEN, USER
 
 from loadtests.clients.endpoint import Endpoint
-from loadtests.clients.robot import Robot
+from loadtests.clients.robot import Robot, Secrets, with_secrets, without_secrets
 from loadtests.clients.wire import Connection
 from loadtests.described.device import CREDENTIALS, Device, Named, secrets_of
 from loadtests.described.operations import chosen
@@ -19,10 +22,12 @@ from loadtests.settings.errors import SettingsError
 NAMES = [("GET /state", "rest", "wire")]
 
 
+OPTIONS = {"overlays": (), "allow": (), "never": (), "allow_motion": False, "openapi": None, "wsdl": None}
+OPTIONS |= {"base_url": None, "rest": None, "timeout_s": None}
+
+
 def robot_at(port, options):
-    given = {"overlays": (), "allow": (), "never": (), "allow_motion": False, "openapi": None, "wsdl": None}
-    given |= {"base_url": None, "rest": None, "timeout_s": None}
-    device = Device.at(Named(f"http://127.0.0.1:{port}/openapi.json", None), given | options)
+    device = Device.at(Named(f"http://127.0.0.1:{port}/openapi.json", None), OPTIONS | options)
     return robot_of(device, list(chosen(device, ["GET /state"]).weights))
 
 
@@ -72,6 +77,28 @@ def test_a_challenge_of_digest_authentication_is_answered_once_for_all_connectio
 def refusals(port):
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/calls", timeout=5) as answer:
         return json.load(answer).get("refused", 0)
+
+
+@pytest.mark.parametrize("clock", [timedelta(), timedelta(hours=1)])
+def test_each_message_has_a_username_token_of_its_own(tmp_path, clock):
+    file = tmp_path / "user"
+    file.write_text(f"{soap_devices.USER}:{soap_devices.PASSWORD}")
+    (names, device) = [("GetAngle", "soap", "wire")] * 3, soap_devices.table()
+    with soap_devices.serving(device) as url:
+        opened = Device.at(Named(f"{url}/table.wsdl", None), OPTIONS | {"username_token_file": str(file)})
+        robot = robot_of(opened, list(chosen(opened, ["GetAngle"]).weights))
+        robot = replace(robot, username_token=replace(robot.username_token, ahead=clock))
+        assert soap_devices.PASSWORD not in repr(robot)
+        assert b"$WSSE_NONCE<" in robot.described[0].octets[0]
+        assert preflight(as_another_process_has_it(robot), names, 1).failures == {}
+        assert len(device.seen) == 1 + len(names), "the device refuses a nonce that it has seen"
+        given = secrets_of(dict.fromkeys(CREDENTIALS) | {"username_token_file": str(file)})
+        assert soap_devices.PASSWORD not in json.dumps(msgspec.to_builtins(without_secrets(robot)))
+        worker = with_secrets(without_secrets(robot), given)
+        assert worker.username_token == robot.username_token, "with the device's clock, which the master has read"
+        assert preflight(worker, names[:1], 1).failures == {}
+        with pytest.raises(ValueError, match="credentials that this worker lacks"):
+            with_secrets(without_secrets(robot), Secrets())
 
 
 def test_credentials_that_cannot_be_used_are_refused(tmp_path):

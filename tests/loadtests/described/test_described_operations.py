@@ -97,7 +97,7 @@ def test_the_statement_names_operations_and_service_levels(device, tmp_path):
     opened = device(statement=statement)
     assert labels(chosen(opened, ())) == {"GET /state": 1}
     assert named_alike("readState", opened) == "GET /state"
-    with pytest.raises(SettingsError, match=re.escape("[slo] '/*' means 9 operations: name one")):
+    with pytest.raises(SettingsError, match=re.escape("[slo] '/*' means 10 operations: name one")):
         named_alike("/*", opened)
     statement.write_text('[load]\noperations = { "GET /text" = 2 }\n[slo]\n"GET /state" = { p99_ms = 5 }\n')
     assert labels(chosen(device(statement=statement), ())) == {"GET /text": 2}
@@ -238,10 +238,11 @@ def test_a_rotation_spreads_the_calls_of_each_operation():
         ("--basic-file {0} --rest http://127.0.0.1:9", "--basic-file is for a device with a description"),
         ("--stream ws://127.0.0.1:9 --rest http://127.0.0.1:9", "--stream is for a device with a description"),
         ("--operation x --rest http://127.0.0.1:9", "--operation 'x' is not one of delivery, coffee, pose"),
-        ("http://127.0.0.1:9/a.json --client zeep", "measured over REST, with the client wire"),
+        ("http://127.0.0.1:9/a.json --client zeep", "measured over REST or SOAP, with the client wire"),
         ("http://127.0.0.1:9/a.json --thresholds {0}", "its service levels are in the statement's [slo]"),
         ("http://127.0.0.1:9/a.json http://127.0.0.1:9/b.json", "are several descriptions: name one"),
-        ("--wsdl http://127.0.0.1:9/a?wsdl", "is a WSDL"),
+        ("http://127.0.0.1:9/a.json --interface rosbridge", "measured over REST or SOAP, with the client wire"),
+        ("http://127.0.0.1:9/a?wsdl --wsdl http://127.0.0.1:9/b?wsdl", "are several WSDLs: name one"),
         ("{0}.json", "cannot be read"),
     ],
 )
