@@ -114,6 +114,7 @@ class DistributedExecutor:
             "seed": plan.load.seed,
             "library": LIBRARY in plan.clients,
             "scenario": None if scenario is None else scenario.sha256,
+            "credentials": [credential.variable for credential in robots[0].credentials],
         }
         self._dealt_out = True
         self.runner.send_message("roaas_prepare", job)

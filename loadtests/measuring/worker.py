@@ -102,7 +102,7 @@ class Worker:
                 tuple(job["operations"]),
                 job["seed"],
                 library=job["library"],
-                scenario=self._scenario(job["scenario"]),
+                scenario=self._scenario(job, robots[0]),
             )
             self.session.after_segment = self._pack
             environment.roaas_session = self.session
@@ -111,13 +111,15 @@ class Worker:
         pacing = self.session.pacing if self.session else ""
         self.runner.send_message("roaas_ready", self._about | {"error": error, "pacing": pacing})
 
-    def _scenario(self, sha256: str | None) -> Scenario | None:
+    def _scenario(self, job: dict[str, Any], robot: Robot) -> Scenario | None:
         """Return this machine's copy of the master's scenario; code is never taken from the network."""
-        if sha256 is None:
+        if job["scenario"] is None:
             return None
+        if [credential.variable for credential in robot.credentials] != job["credentials"]:
+            raise GeneratorError("the scenario needs credentials that this worker lacks: give it the master's options")
         if self.scenario is None:
             raise GeneratorError("the master runs a scenario: start this worker with --scenario FILE as well")
-        return Scenario(self.scenario, sha256)
+        return Scenario(self.scenario, job["scenario"])
 
     def _on_begin(self, environment: Any, msg: Any) -> None:
         del environment

@@ -176,23 +176,24 @@ def test_any_number_of_workers_measures_a_described_device_alike(device, worker,
     token.write_text("t0ken-of-robot")
     for number in (1, 2, 4):
         _, finish, join = begin(
-            "--operation 'GET /state=2' --operation 'GET /items/{item_id}' --rate 60 --duration 3 --warmup 0",
+            "--operation 'GET /state=2' --operation 'GET /items/{item_id}' --rate 30 --duration 3 --warmup 0",
             f"--processes 0 --expect-workers {number}",
-            target=[device("--auth", "bearer", "--slow", "0.05")],
+            target=[device("--auth", "bearer", "--slow", "0.15")],
             shared=f"--token-file {token}",
         )
         join(*(worker(own_clock=place % 2 == 1) for place in range(number)))
         run = finish()
         told = run.result["generator"]
-        assert told["scheduled"] == told["started"] == told["completed"], run.err
         requests = [entry["requests"] for entry in run.result["workers"]]
-        assert (len(requests), sum(requests)) == (number, told["completed"])
-        assert max(requests) - min(requests) <= 4, "each has its share"
-        assert told["asked_rate"] == pytest.approx(60, rel=0.03)
+        missing = told["dropped"] + sum(entry["arrivals_lost"] for entry in run.result["workers"])
+        assert (len(requests), sum(requests)) == (number, told["started"])
+        assert told["scheduled"] == told["started"] + missing, run.err
+        assert max(requests) - min(requests) <= 4 + missing, "each has its share"
+        assert (told["asked_rate"], told["errors"]) == (pytest.approx(30, rel=0.03), 0)
         medians[number] = run.series("GET /state", "rest")["service_ms"]["p50"]
         state, item = (run.series(name, "rest")["count"] for name in ("GET /state", "GET /items/{item_id}"))
-        assert state == pytest.approx(2 * item, rel=0.1)
-    assert all(50 <= median < 1.5 * min(medians.values()) for median in medians.values()), medians
+        assert state == pytest.approx(2 * item, abs=4 + missing)
+    assert all(150 <= median < 2 * min(medians.values()) for median in medians.values()), medians
 
 
 SCENARIO = """
@@ -224,14 +225,21 @@ def test_workers_run_their_own_copy_of_a_scenario(device, worker, begin, tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("theirs", "told"), [(None, "start this worker with --scenario"), ("# other", "differs from the master's")]
+    ("theirs", "options", "told"),
+    [
+        (None, "", "start this worker with --scenario"),
+        ("# other", "", "differs from the master's"),
+        ("", "--token-file", "credentials that this worker lacks"),
+    ],
 )
-def test_a_worker_without_the_masters_scenario_is_refused(device, worker, begin, tmp_path, theirs, told):
-    mine, other = tmp_path / "display.py", tmp_path / "other.py"
+def test_a_worker_that_cannot_do_as_its_master_is_refused(device, worker, begin, tmp_path, theirs, options, told):
+    mine, other, token = tmp_path / "display.py", tmp_path / "other.py", tmp_path / "token"
     mine.write_text(SCENARIO)
     other.write_text(SCENARIO + (theirs or ""))
+    token.write_text("t0ken-of-robot")
     _, finish, join = begin(
-        f"--scenario {mine} --users 3 --duration 2 --processes 0 --expect-workers 1", target=[device()]
+        f"--scenario {mine} --users 3 --duration 2 --processes 0 --expect-workers 1 {options and f'{options} {token}'}",
+        target=[device()],
     )
     join(worker(), options="" if theirs is None else f"--scenario {other}")
     run = finish()
