@@ -1,22 +1,25 @@
 """Nothing is lost and nothing counted twice with several workers: `python benchmarks/scale.py`.
 
-It has two parts. Recorders: processes record a million requests, fixed by a seed, and report them each second as
+It has three parts. Recorders: processes record a million requests, fixed by a seed, and report them each second as
 workers do; the merged result is compared with one recorder of all requests, histogram by histogram. A run: `roaas load`
-with workers and closed-model users against a bare server that counts its requests; all counts must agree exactly. The
-exit code is 1 where anything differs.
+with workers and closed-model users against a bare server that counts its requests; all counts must agree exactly.
+Alike: runs on a described device with 1, 2 and 4 workers at one rate; the 95 % intervals of their medians must overlap,
+and each count agree. The exit code is 1 where anything differs.
 """
 
 import argparse
+import json
 import multiprocessing
 import signal
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import msgpack
 import numpy as np
-from fixed import POSE, running_bare
+from fixed import POSE, Answer, running_bare
 from programs import machine, roaas_load
 
 from loadtests.statistics.recorder import Recorder
@@ -24,6 +27,11 @@ from loadtests.statistics.recorder import Recorder
 _SEGMENTS = 600
 _REPORTED = 4000  # requests in a report: what a worker at 4,000/s has to tell after a second
 _BLOCKS = 10  # that it tells of
+_OPERATION = {"get": {"responses": {"200": {"description": "state", "content": {"application/json": {}}}}}}
+_TEXT = json.dumps({"openapi": "3.1.0", "info": {"title": "bare", "version": "1"}, "paths": {"/state": _OPERATION}})
+_DESCRIPTION = Answer(
+    "/openapi.json", 200, [("content-type", "application/json"), ("content-length", str(len(_TEXT)))], _TEXT
+)
 _SERIES = {segment: 4 + 2 * (segment % 2) for segment in range(_SEGMENTS)}
 
 
@@ -124,6 +132,30 @@ def run(seconds: float, workers: int, users: int) -> bool:
         return balance(found, int(server.stdout.readline() if server.stdout else 0))
 
 
+def alike(seconds: float, rate: float) -> bool:
+    """Measure a described device with 1, 2 and 4 workers, and compare the counts and the medians."""
+    medians, balanced = [], True
+    with running_bare([replace(POSE, target="/state"), _DESCRIPTION]) as (port, _):
+        for workers in (1, 2, 4):
+            found = roaas_load(
+                f"http://127.0.0.1:{port}/openapi.json",
+                *("--operation", "GET /state", "--rate", f"{rate:g}", "--duration", f"{seconds:g}"),
+                *("--processes", workers, "--expect-workers", workers),
+            )
+            told, series = found["generator"], found["series"][0]
+            reported = sum(worker["requests"] for worker in found["workers"])
+            balanced = balanced and told["scheduled"] == told["completed"] and len(found["workers"]) == workers
+            medians.append(series["ci95_ms"]["p50"])
+            print(
+                f"alike: {workers} workers, {told['scheduled']:,} due, {told['completed']:,} answered, {reported:,} "
+                f"reported; median {series['service_ms']['p50']:.3f} ms (95 % {medians[-1][0]:.3f} to "
+                f"{medians[-1][1]:.3f}), lag {told['lag_ms']['p50']:.3f} ms"
+            )
+    overlap = max(low for low, _ in medians) <= min(high for _, high in medians)
+    print(f"alike: the medians' intervals {'overlap' if overlap else 'do NOT overlap'}")
+    return balanced and overlap
+
+
 def balance(found: dict[str, Any], reached: int) -> bool:
     """Return whether the counts agree: what was due, what workers reported, and what the server received."""
     told = found["generator"]
@@ -156,14 +188,17 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=150.0, help="of the run [150]")
     parser.add_argument("--users", type=int, default=16, help="of the run, each with one request under way [16]")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", choices=["recorders", "run"], help="one part alone")
+    parser.add_argument("--only", choices=["recorders", "run", "alike"], help="one part alone")
+    parser.add_argument("--rate", type=float, default=200.0, help="of the runs that have to be alike [200]")
     options = parser.parse_args()
     print(machine())
     met = []
-    if options.only != "run":
+    if options.only in {None, "recorders"}:
         met.append(recorders(options.requests, options.workers, options.seed))
-    if options.only != "recorders":
+    if options.only in {None, "run"}:
         met.append(run(options.seconds, options.workers, options.users))
+    if options.only in {None, "alike"}:
+        met.append(alike(options.seconds / 5, options.rate))
     return 0 if all(met) else 1
 
 

@@ -10,5 +10,5 @@ The packages from the lowest layer up; none imports a package above it:
 - `result` makes latency.json;
 - `engine` runs a load test in its own process, which `cli` starts.
 
-Locust loads `locustfile`, and its Kubernetes operator starts `node`.
+Locust loads `locustfile`, a scenario imports `scenario`, and its Kubernetes operator starts `node`.
 """

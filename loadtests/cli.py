@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -27,6 +26,7 @@ from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest,
 from loadtests.schedule.plan import CLIENTS, INTERFACES
 from loadtests.settings.cli_options import KNEE_SEARCHES, CliOptions
 from loadtests.settings.errors import SettingsError
+from loadtests.settings.option_types import COUNTS, RATES, SHARE
 from loadtests.settings.settings import STEP_S, Settings
 from loadtests.settings.settle import DEFAULT_DURATION_S, DEFAULT_RATE, DEFAULT_WARMUP_S, settle
 
@@ -68,28 +68,6 @@ def _run_load(settings: Settings, written: Path) -> CommandResult:
     return CommandResult(code, Path(written.read_text(encoding="utf-8")) if written.exists() else None)
 
 
-def _parsed(read: Callable[[str], Any], expected: str) -> Callable[[click.Context, click.Parameter, str | None], Any]:
-    """Return a callback that parses an option's text with `read`, or raises a usage error with `expected`."""
-
-    def callback(_: click.Context, __: click.Parameter, value: str | None) -> Any:
-        try:
-            return read(value or "")
-        except ValueError:
-            raise click.BadParameter(f"{value!r} is not {expected}") from None
-
-    return callback
-
-
-_RATES = _parsed(
-    lambda text: tuple(float(part) for part in text.split(",")) if text else (), "a list of rates such as 100,200,400"
-)
-_COUNTS = _parsed(
-    lambda text: tuple(sorted({int(part) for part in text.split(",")})) if text else (),
-    "a list of numbers such as 1,8,32,128,512",
-)
-_SHARE = _parsed(lambda text: float(text.removesuffix("%")) / 100, "a percentage such as 5%")
-
-
 def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
     """Return the statement of the robot to compare with; without a file, one with this robot's credentials.
 
@@ -121,6 +99,9 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
     multiple=True,
     metavar="NAME[=WEIGHT]",
     help="Call this operation: 'GET /state' or GetPose of a description, or delivery, coffee or pose; repeatable.",
+)
+@click.option(
+    "--scenario", type=click.Path(exists=True, dir_okay=False), help="Locust file with what the users (--users) do."
 )
 @click.option("--interface", "interfaces", multiple=True, type=click.Choice(INTERFACES), help="Only this interface.")
 @click.option("--client", "clients", multiple=True, type=click.Choice(CLIENTS), help="Only this client.")
@@ -158,19 +139,21 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
 @click.option("--web-host", default="127.0.0.1", help="Where the web UI and the metrics listen.")
 @click.option("--metrics-port", type=click.IntRange(1, 65535), help="Serve the histograms to Prometheus on this port.")
 @click.option("--steps", is_flag=True, help="Then raise the rate in steps until the robot breaks down.")
-@click.option("--step-rates", callback=_RATES, metavar="R,R,…", help="The rates of these steps.")
+@click.option("--step-rates", callback=RATES, metavar="R,R,…", help="The rates of these steps.")
 @click.option("--knee", is_flag=True, help="Find the highest rate of REST, SOAP and both together, by bisection.")
 @click.option("--knee-searches", type=click.IntRange(1, 50), default=KNEE_SEARCHES, help="How often to search for it.")
-@click.option("--connections", callback=_COUNTS, metavar="N,N,…", help="Then keep this many connections busy.")
+@click.option("--connections", callback=COUNTS, metavar="N,N,…", help="Then keep this many connections busy.")
 @click.option("--step-duration", "step_s", type=float, default=STEP_S, help="Seconds of each step, for each interface.")
 @click.option(
     "--stream",
     "streams",
     multiple=True,
     metavar="NAME|URL",
-    help="Also listen to this stream: an operation that sends events, or a WebSocket (ws://…); repeatable.",
+    help="Also listen to this stream: an operation that sends events, a WebSocket (ws://…), or a topic of a rosbridge "
+    "(ws://…#/odom); repeatable.",
 )
 @click.option("--stamp-field", metavar="POINTER", help="Where a message has its time, such as /header/stamp.")
+@click.option("--clock-field", metavar="POINTER", help="Where the polled response has the robot's time, such as /now.")
 @click.option("--end-to-end", is_flag=True, help="Also measure the time until the robot's application has a delivery.")
 @click.option("--ros-domain-id", type=click.IntRange(0, 232), help="The robot's ROS domain, for --end-to-end.")
 @click.option("--thresholds", type=_FILE, help="TOML file of [[threshold]] tables.")
@@ -182,7 +165,7 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
 @click.option("--against-subscribers-wsdl", metavar="URL|FILE", help="WSDL of its subscribers service.")
 @click.option("--against-publishers-endpoint", metavar="URL", help="Address of that service, when no WSDL says.")
 @click.option("--against-subscribers-endpoint", metavar="URL", help="Address of that service, when no WSDL says.")
-@click.option("--tolerance", callback=_SHARE, default="5%", help="How much slower than the other it may be.")
+@click.option("--tolerance", callback=SHARE, default="5%", help="How much slower than the other it may be.")
 @click.option("--allow-motion", is_flag=True, help="The robot may drive: measure deliveries too.")
 @click.option("--save", metavar="NAME", help="Store the result as a baseline of this name.")
 @click.option("--baseline", metavar="NAME", help="Compare with the latest result stored under this name.")
@@ -192,7 +175,7 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     """Measure how fast a robot responds, and compare SOAP with REST.
 
     DESCRIPTION is the URL or file of an OpenAPI or Swagger description, or of a WSDL: the operations that --operation
-    names are measured. Only those that read are called, unless --call allows more.
+    names are measured, or those that a --scenario calls. Only those that read are called, unless --call allows more.
 
     With --against, two robots take turns, and the result says whether this one is slower than the other.
 
@@ -288,7 +271,9 @@ class _Baselines:
 
 def _command_line() -> str:
     """Return the command line without the folders of this machine."""
-    return command_without_folders(sys.argv[1:], ("--operation", "--call", "--never", "--stream", "--stamp-field"))
+    return command_without_folders(
+        sys.argv[1:], ("--operation", "--call", "--never", "--stream", "--stamp-field", "--clock-field")
+    )
 
 
 def _make_folder(folder: Path) -> None:

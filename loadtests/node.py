@@ -45,7 +45,8 @@ def _work(words: list[str]) -> None:
     from loadtests.measuring.worker import serve  # noqa: PLC0415 -- imports Locust, which patches the process
 
     both = [secrets, secrets]  # the same for both robots of --against
-    serve(host, int(_value(words, "--master-port") or PORT), both, Path(_value(words, "--out") or DEFAULT_OUT))
+    port, folder = int(_value(words, "--master-port") or PORT), Path(_value(words, "--out") or DEFAULT_OUT)
+    serve(host, port, both, folder, scenario=_value(words, "--scenario"))
 
 
 def _value(words: list[str], option: str) -> str | None:

@@ -17,10 +17,12 @@ class Described:
         name: what the result calls it: method and path, an operation of a WSDL, or a pair's name.
         method: HTTP method.
         base_url: where it is.
-        octets: one request for each set of values; shell variables stand where credentials go (`Credentials`).
+        octets: one request for each set of values; shell variables stand where credentials go (`Credentials`). None
+            where a scenario makes the requests.
         responses: status and media types of each good response over REST.
         interface: `rest` or `soap`.
         reply: local name of the element in the Body of a good response over SOAP; empty if there is none.
+        refused: why a scenario may not call it; empty where it may.
     """
 
     name: str
@@ -30,6 +32,7 @@ class Described:
     responses: tuple[tuple[int, tuple[str, ...]], ...] = ()
     interface: str = "rest"
     reply: str = ""
+    refused: str = ""
 
     def requests(self, credentials: Credentials, number: int) -> list[Request]:
         """Return `number` requests, the sets of values in rotation.
@@ -49,8 +52,8 @@ class Stream:
 
     Attributes:
         name: method and path of the operation, or the WebSocket's URL.
-        kind: `sse` or `websocket`.
-        url: where it is.
+        kind: `sse`, `websocket` or `rosbridge`.
+        url: where it is; that of a rosbridge has the topic as its fragment.
         octets: the request, with shell variables for credentials; empty for a WebSocket.
     """
 

@@ -13,7 +13,7 @@ from loadtests.described.messages import at_hand
 from loadtests.settings.errors import SettingsError
 
 _WEIGHTED = re.compile(r"(?P<name>.*?)(?:=(?P<weight>[1-9]\d{0,2}|1000))?", re.DOTALL)
-#: The recorder numbers operations with four bits.
+#: Each operation gets its share of the requests: of more, none would have enough.
 MOST = 16
 _SHOWN = 12
 _LONGEST = 300
@@ -53,11 +53,11 @@ def chosen(device: Device, named: Iterable[str]) -> Chosen:
     for name, weight in wanted.items():
         meant = _meant(device.half(name), known)
         for operation in meant:
-            refused = _refused(device, operation)
-            if refused and meant == [operation] and is_literal(device.half(name), operation):
-                raise SettingsError(f"{device.name_of(operation)} is not called: {refused}")
-            if refused:
-                notes.append(f"{device.name_of(operation)} is not called: {refused}")
+            why = refused(device, operation)
+            if why and meant == [operation] and is_literal(device.half(name), operation):
+                raise SettingsError(f"{device.name_of(operation)} is not called: {why}")
+            if why:
+                notes.append(f"{device.name_of(operation)} is not called: {why}")
             else:
                 weights[operation] = weight
     if not weights:
@@ -120,7 +120,7 @@ def _meant(name: str, known: tuple[Operation, ...]) -> list[Operation]:
     raise SettingsError(f"the description has no operation {name!r}: {hint}")
 
 
-def _refused(device: Device, operation: Operation) -> str:
+def refused(device: Device, operation: Operation) -> str:
     """Return why an operation is not measured; empty if it is."""
     reason = device.api.call_rules.decide(operation)
     if not reason.may:

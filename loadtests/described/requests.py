@@ -30,6 +30,11 @@ def robot_of(device: Device, operations: Collection[Operation]) -> Robot:
         SettingsError: the response of an operation does not end, or no message of it can be made.
         CallError: the device does not respond.
     """
+    return robot_at(device, _described_of(device, operations))
+
+
+def robot_at(device: Device, described: tuple[Described, ...]) -> Robot:
+    """Return the robot with operations, by the device's address and credentials."""
     where, connection = device.statement.endpoints, device.api.client.connection
     certificate = connection.certificate
     return Robot(
@@ -38,7 +43,7 @@ def robot_of(device: Device, operations: Collection[Operation]) -> Robot:
         subscribers=None,
         ca_file=where.ca_file,
         timeout_s=where.timeout_s,
-        described=_described_of(device, operations),
+        described=described,
         credentials=connection.credentials.items,
         username_token=device.messages.token if device.messages is not None else None,
         certificate=None if certificate is None else (str(certificate[0]), str(certificate[1] or "") or None),
@@ -91,7 +96,7 @@ def _described(surveyor: Surveyor, operation: Operation) -> Described:
         method=operation.method,
         base_url=surveyor.api.client.base_url,
         octets=tuple(octets),
-        responses=_responses(operation),
+        responses=declared_good(operation),
     )
 
 
@@ -100,7 +105,7 @@ def octets_of(probe: Probe) -> bytes:
     return bytes_of(probe.attempt.request)
 
 
-def _responses(operation: Operation) -> tuple[tuple[int, tuple[str, ...]], ...]:
+def declared_good(operation: Operation) -> tuple[tuple[int, tuple[str, ...]], ...]:
     """Return the declared responses that are no errors; if none is, each 2xx with any media type."""
     explicit = any(key.startswith(("2", "3")) for key in operation.responses)
     found = []

@@ -1,22 +1,24 @@
 """A run on a device with a description: its settings, and the stop at its end."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
 from conformance.documents.description import is_url
 from conformance.engine.describing import is_wsdl
 from conformance.packs.table1.statement import Load, Statement
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
+from loadtests.described.operations import named_alike
 from loadtests.described.pairs import Choice
+from loadtests.described.scenario import callable_robot, scenario_of
 from loadtests.described.stopping import Stopping
-from loadtests.described.streams import checked_pointer, streams_of
-from loadtests.schedule.plan import step_operation
+from loadtests.described.streams import streams_to_hear
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.errors import SettingsError
-from loadtests.settings.settings import Selection, Settings, Streams
+from loadtests.settings.settings import Selection, Settings
 from loadtests.settings.settle import settle
 from loadtests.settings.target import Target
+from loadtests.statistics.steps import step_operation
 
 _PAPERS_ONLY = (
     "publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint", "rosbridge", "end_to_end",
@@ -69,7 +71,19 @@ class Described:
             SettingsError: the operations or options do not make a run.
             CallError: the device does not respond.
         """
-        options, device = self.options, self.devices[0]
+        options, scenario = self.options, self.options["scenario"]
+        target = self._of_choice() if scenario is None else self._of_scenario(scenario)
+        taken = {
+            name: value for name, value in options.items() if name not in {*DESCRIBED_ONLY, *_PAPERS_ONLY, "against"}
+        }
+        if scenario is not None:
+            taken["users"] = options["users"] or 1
+        other = _statement(self.others[0]) if self.others else None
+        return settle(CliOptions.of(**taken, against=other, command=command), _statement(self.devices[0]), target)
+
+    def _of_choice(self) -> Target:
+        """Return the operations that the options name."""
+        options = self.options
         devices, others = (_selected(each, options["interfaces"]) for each in (self.devices, self.others))
         choice = Choice.of(devices, options["operations"])
         names, weights, changing = tuple(choice.weights), tuple(choice.weights.values()), choice.changing
@@ -77,7 +91,7 @@ class Described:
             self._stopping = tuple(map(Stopping.of, (*self.devices, *self.others)))
         robot = choice.robot()
         levels = choice.levels(partial=self.named.wsdl is not None)
-        target = Target(
+        return Target(
             robot,
             Selection(
                 names, tuple(each.interface for each in devices), ("wire",), weights if len(set(weights)) > 1 else ()
@@ -87,23 +101,46 @@ class Described:
             other=choice.same(others).robot() if others else None,
             description=self.named.shown,
             slo={name: level for name, level in levels.items() if name in names},
-            notes=(*(remark for each in devices for remark in each.remarks), *choice.notes),
-            streams=Streams(streams_of(device, options["streams"]), checked_pointer(options["stamp_field"])),
+            notes=(
+                *(remark for each in devices for remark in each.remarks),
+                *choice.notes,
+                *_unmeasured(levels, names),
+            ),
+            streams=streams_to_hear(self.devices[0], options),
         )
-        unmeasured = [name for name in levels if name not in names]
-        if unmeasured:
-            target = replace(
-                target, notes=(*target.notes, f"not measured, so not judged: [slo] {', '.join(unmeasured)}")
-            )
-        taken = {
-            name: value for name, value in options.items() if name not in {*DESCRIBED_ONLY, *_PAPERS_ONLY, "against"}
-        }
-        other = _statement(self.others[0]) if self.others else None
-        return settle(CliOptions.of(**taken, against=other, command=command), _statement(device), target)
+
+    def _of_scenario(self, file: str) -> Target:
+        """Return the operations that a scenario may call."""
+        device, scenario = self.devices[0], scenario_of(file, self.options)
+        if device.interface != "rest":
+            raise SettingsError("--scenario needs an OpenAPI description: name it with --openapi, or in [api] openapi")
+        allowed, robot = callable_robot(device)
+        names = [each.label for each in allowed]
+        moves = any(not each.safe or each.motion for each in allowed)
+        if moves:
+            self._stopping = tuple(map(Stopping.of, self.devices))
+        levels = {named_alike(name, device): level for name, level in device.statement.slo.items()}
+        return Target(
+            robot,
+            Selection(tuple(names), ("rest",), ("wire",)),
+            moves=moves,
+            steps_move=moves,
+            description=self.named.shown,
+            slo={name: level for name, level in levels.items() if name in names},
+            notes=(*device.remarks, *_unmeasured(levels, names)),
+            streams=streams_to_hear(device, self.options),
+            scenario=scenario,
+        )
 
     def stop(self) -> list[str]:
         """Stop each device if the run called what may change something; return why one may still move."""
         return [problem for each in self._stopping if (problem := each.stop())]
+
+
+def _unmeasured(levels: Collection[str], names: Collection[str]) -> list[str]:
+    """Return a note on the service levels of operations that are not measured."""
+    others = [name for name in levels if name not in names]
+    return [f"not measured, so not judged: [slo] {', '.join(others)}"] if others else []
 
 
 def _opened(named: Named, options: Mapping[str, Any]) -> tuple[Device, ...]:

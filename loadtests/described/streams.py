@@ -1,6 +1,8 @@
-"""The streams of a device to listen to: operations that send events, and WebSockets."""
+"""The streams of a device to listen to: operations that send events, WebSockets, and topics of a rosbridge."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
+from urllib.parse import urldefrag
 
 from jsonpath import JSONPointer
 from jsonpath.exceptions import JSONPointerError
@@ -15,37 +17,43 @@ from loadtests.described.device import Device
 from loadtests.described.operations import chosen
 from loadtests.described.requests import octets_of
 from loadtests.settings.errors import SettingsError
+from loadtests.settings.settings import Streams
 
 
-def streams_of(device: Device, names: Iterable[str]) -> tuple[Stream, ...]:
-    """Return what the options name: URLs of WebSockets, and operations of the description.
+def streams_to_hear(device: Device, options: Mapping[str, Any]) -> Streams:
+    """Return the streams that the options of a command name.
 
     Raises:
-        SettingsError: a URL cannot be used, or an operation is unknown or may not be called.
+        SettingsError: a stream or a pointer cannot be used.
     """
+    pointers = (_checked_pointer(name, options[name]) for name in ("stamp_field", "clock_field"))
+    return Streams(_streams_of(device, options["streams"]), *pointers)
+
+
+def _streams_of(device: Device, names: Iterable[str]) -> tuple[Stream, ...]:
+    """Return what --stream names: URLs of WebSockets, with a topic those of a rosbridge; and operations."""
     found = []
     for name in names:
         if name.startswith(("ws://", "wss://")):
+            where, topic = urldefrag(name)
             try:
-                bridge_endpoint(name)
+                bridge_endpoint(where)
             except EndpointError as error:
                 raise SettingsError(f"--stream: {error}") from None
-            found.append(Stream(name, "websocket", name))
+            found.append(Stream(name, "rosbridge" if topic else "websocket", name))
         else:
             found += [_events(device, operation) for operation in chosen(device, [name]).weights]
     return tuple(found)
 
 
-def checked_pointer(pointer: str | None) -> str | None:
-    """Return a JSON pointer (RFC 6901).
-
-    Raises:
-        SettingsError: it is none.
-    """
+def _checked_pointer(option: str, pointer: str | None) -> str | None:
+    """Return a JSON pointer (RFC 6901)."""
     try:
         JSONPointer(pointer or "")
     except JSONPointerError as error:
-        raise SettingsError(f"--stamp-field {pointer!r}: {error}; a pointer is written /header/stamp") from None
+        raise SettingsError(
+            f"--{option.replace('_', '-')} {pointer!r}: {error}; a pointer is written /header/stamp"
+        ) from None
     return pointer
 
 

@@ -15,7 +15,7 @@ class Liveness:
     def __init__(self, report_s: float) -> None:
         self._silence_s = _DEAD_S + report_s
         self._looked_s = 0.0
-        self._alive = (0.0, 0)  # when something had last succeeded, and how much in all
+        self._alive = (0.0, 0, 0)  # when something had last succeeded; successes and failures until then
 
     def is_due(self, elapsed_s: float) -> bool:
         """Return whether the next count is due; counting costs the load generator time."""
@@ -24,8 +24,8 @@ class Liveness:
     def dead_since(self, elapsed_s: float, succeeded: int, failed: int) -> float | None:
         """Return since when the robot has been silent, in seconds from the start; None unless that is long enough."""
         self._looked_s = elapsed_s
-        since, before = self._alive
-        if succeeded > before or failed < _DEAD_REQUESTS:
-            self._alive = (elapsed_s, succeeded)
+        since, before, failed_before = self._alive
+        if succeeded > before or failed - failed_before < _DEAD_REQUESTS:
+            self._alive = (elapsed_s, succeeded, failed if succeeded > before else failed_before)
             return None
         return since if elapsed_s - since > self._silence_s else None

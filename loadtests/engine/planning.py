@@ -3,7 +3,7 @@
 from conformance.packs.table1.thresholds import ApiStyle
 from loadtests.clients.library import LIBRARY
 from loadtests.clients.robot import Robot
-from loadtests.schedule.plan import LIBRARY_RATE, Plan
+from loadtests.schedule.plan import BLOCK_S, LIBRARY_RATE, Plan
 from loadtests.settings.settings import Settings
 
 ROSBRIDGE = ApiStyle.ROSBRIDGE
@@ -14,6 +14,7 @@ _BRIDGE_NOTE = (
     "and a pose from subscribing until the robot's next odometry"
 )
 _LEAST_USERS, _MOST_USERS = 32, 512
+_LONG_BLOCK_S, _SCENARIO_BLOCKS = 1.0, 60  # fifteen quartets, of which six are the A/A control
 _STALL_S = 3.0  # users of an open model suffice for a stall of this length before arrivals wait for a user
 
 
@@ -63,11 +64,18 @@ def duel_plan(settings: Settings, *robots: Robot) -> tuple[Plan, list[str]]:
         offers=offers,
         robots=len(robots),
         weights=wanted.weights,
+        scenario=settings.scenario is not None,
+        least_block_s=BLOCK_S if settings.scenario is None else _scenario_block_s(settings.load.duration_s),
     )
     notes = sorted(missing)
     if ROSBRIDGE in interfaces:
         notes.append(_BRIDGE_NOTE)
     return plan, notes
+
+
+def _scenario_block_s(duration_s: float) -> float:
+    """Return the length of a scenario's blocks: users that wait between tasks leave short ones empty, in step."""
+    return min(_LONG_BLOCK_S, max(BLOCK_S, duration_s / _SCENARIO_BLOCKS))
 
 
 def users(settings: Settings, workers: int) -> int:

@@ -19,15 +19,15 @@ from conformance.packs.table1.ros_process import ProbeError
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Robot
 from loadtests.clients.wsdl import WsdlError, with_addresses
-from loadtests.engine.liveness import Liveness
 from loadtests.engine.planning import duel_plan
+from loadtests.engine.watching import Watch, tell, tell_plan
 from loadtests.measuring.distributed_executor import DistributedExecutor, Executor
 from loadtests.measuring.end_to_end import end_to_end
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import REPORT_S, LocalExecutor, busiest
 from loadtests.measuring.metrics import Collector, serve
 from loadtests.measuring.pauses import after_pauses
-from loadtests.measuring.preflight import preflight
+from loadtests.measuring.preflight import preflight, reach
 from loadtests.measuring.restart import start_anew
 from loadtests.measuring.rising_load import RisingLoad
 from loadtests.measuring.robot_process import RobotProcess
@@ -38,13 +38,6 @@ from loadtests.result.outcome import Carried, Outcome, RunAborted
 from loadtests.result.terminal import summary
 from loadtests.schedule.plan import QUICK_ANSWER_S, SHORT_BLOCK_S, Plan
 from loadtests.settings.settings import Settings
-from loadtests.statistics.recorder import Recorder
-
-
-def tell(message: str) -> None:
-    """Write a line of progress to standard error."""
-    sys.stderr.write(message + "\n")
-    sys.stderr.flush()
 
 
 class Run:
@@ -57,9 +50,7 @@ class Run:
         self.outcome = Outcome(settings, self.robots, datetime.now(UTC))
         self.plan, _ = duel_plan(settings, *self.robots)  # preliminary: the WSDLs have not been read
         self.collector: Collector | None = None
-        self._liveness = Liveness(REPORT_S if settings.generator.expect else 0.0)
-        self._told = 0.0
-        self._parent = os.getppid()
+        self._watch = Watch(self.outcome, REPORT_S if settings.generator.expect else 0.0)
 
     @property
     def _promise(self) -> str:
@@ -98,6 +89,9 @@ class Run:
         names = self.plan.series_names()
         if not names:
             raise RunAborted(ExitCode.USAGE, "no operation can be measured with these endpoints")
+        if self.settings.scenario is not None:
+            self._reach()
+            return
         slowest_s = 0.0
         for robot, whose in zip(self.robots, ("the robot", "the robot of --against"), strict=False):
             findings = preflight(robot, names, self.settings.load.seed)
@@ -118,6 +112,31 @@ class Run:
         if self.plan.open_model and self.plan.workers == 1 and slowest_s <= QUICK_ANSWER_S:
             self.plan = replace(self.plan, least_block_s=SHORT_BLOCK_S)
 
+    def _reach(self) -> None:
+        """Open a connection to the robot: what else to send, the scenario alone knows.
+
+        Raises:
+            RunAborted: nothing listens there.
+        """
+        try:
+            reach(self.robots[0])
+        except CallError as error:
+            raise RunAborted(ExitCode.UNREACHABLE, f"the robot cannot be reached: {error}") from None
+
+    def name_called(self) -> None:
+        """Limit the plans to the operations that a scenario has called: which, only the run shows."""
+        executor = self.outcome.executor
+        if self.settings.scenario is None or executor is None:
+            return
+        executor.recorder.flush()
+        called = sorted({operation for _, operation in executor.recorder.cells}) or [0]
+        for carried in self.outcome.carried:
+            carried.plan = replace(carried.plan, offers={"rest/wire": called})
+        self.plan = replace(self.plan, offers={"rest/wire": called})
+        unjudged = set(self.settings.slo) - {self.plan.operations[number] for number in called}
+        if unjudged:
+            self.outcome.notes.append(f"not called, so not judged: [slo] {', '.join(sorted(unjudged))}")
+
     # The measurement.
 
     def measure(self) -> None:
@@ -136,29 +155,35 @@ class Run:
                     stack.callback(serve(self.collector, generator.web_host, generator.metrics_port).stop)
                 if generator.web_port is not None:
                     self._web(executor, generator.web_host, generator.web_port)
-                executor.prepare(self.robots, plan)
+                executor.prepare(self.robots, plan, settings.scenario)
             except GeneratorError as error:
                 raise RunAborted(
                     ExitCode.INTERRUPTED if self.outcome.interrupted else ExitCode.USAGE, str(error)
                 ) from None
-            self._tell_plan(plan, executor)
+            tell_plan(plan, executor.pacing)
             self.outcome.robot_process = RobotProcess.find(self.robots[0])
             plan = self._repeat(plan, executor)
             if self._over:
                 return
-            tell("measuring requests after a pause")
-            self.outcome.paused = after_pauses(
-                self.robots[0],
-                plan.series_names(),
-                settings.load.seed,
-                settings.load.duration_s,
-                settings.limits.max_rate,
-                lambda: self.outcome.interrupted,
-            )
+            if settings.scenario is None:
+                self._pause(plan)
             self._follow_deliveries()
             self.outcome.heard = hear(self.robots[0], settings, lambda: self._over, tell)
             if settings.steps.asked and not self._over:
                 self._load_more(plan, executor)
+
+    def _pause(self, plan: Plan) -> None:
+        """Measure requests after a pause."""
+        tell("measuring requests after a pause")
+        settings = self.settings
+        self.outcome.paused = after_pauses(
+            self.robots[0],
+            plan.series_names(),
+            settings.load.seed,
+            settings.load.duration_s,
+            settings.limits.max_rate,
+            lambda: self.outcome.interrupted,
+        )
 
     def _load_more(self, plan: Plan, executor: Executor) -> None:
         """Carry out the load steps, the searches for the knee, and the steps with more connections."""
@@ -171,7 +196,9 @@ class Run:
     @property
     def _over(self) -> bool:
         """Return whether the measurement has to end."""
-        return self.outcome.interrupted or self.outcome.dead_at is not None
+        executor = self.outcome.executor
+        faults = executor is not None and bool(executor.recorder.faults)
+        return self.outcome.interrupted or self.outcome.dead_at is not None or faults
 
     def _repeat(self, plan: Plan, executor: Executor) -> Plan:
         """Carry out the comparison as often as the settings say; return the last plan."""
@@ -234,40 +261,12 @@ class Run:
         carried = Carried(plan)
         self.outcome.carried.append(carried)
         ceiling = self.settings.limits.max_rate if not plan.open_model else None
-        executor.run(plan, ceiling, lambda elapsed: self._watch(carried, executor.recorder, elapsed))
-
-    def _watch(self, carried: Carried, recorder: Recorder, elapsed: float) -> bool:
-        """Report progress; returns whether to end now."""
-        plan = carried.plan
-        carried.elapsed_s = max(0.0, min(elapsed, plan.length_s))
-        elapsed += plan.offset_s
-        if os.getppid() != self._parent:  # the parent process has ended
-            self.outcome.interrupted = True
-        if self.outcome.dead_at is None and self._liveness.is_due(elapsed):
-            succeeded = sum(cell.service.total for cell in recorder.cells.values())
-            failed = sum(failure.count for failure in recorder.failures.values())
-            self.outcome.dead_at = self._liveness.dead_since(elapsed, succeeded, failed)
-            if self.outcome.dead_at is not None:
-                tell(f"no request has succeeded since {self.outcome.dead_at:.1f} s: ending the run")
-        if elapsed - self._told >= 1.0:
-            self._told = elapsed
-            done = sum(cell.service.total for cell in recorder.cells.values())
-            tell(f"{elapsed:6.1f} s of {plan.offset_s + plan.length_s:.0f} s: {done} requests answered")
-        return self.outcome.interrupted or self.outcome.dead_at is not None
+        executor.run(plan, ceiling, lambda elapsed: self._watch.look(carried, executor.recorder, elapsed))
 
     def _number(self, plan: Plan) -> None:
         """Register the series of a plan's segments in the metrics."""
         if self.collector is not None:
             self.collector.series_of.update(plan.series_of())
-
-    @staticmethod
-    def _tell_plan(plan: Plan, executor: Executor) -> None:
-        load = f"{plan.load.rate:g} requests/s" if plan.open_model else f"{plan.load.users} users"
-        tell(
-            f"measuring {', '.join(plan.operations)} over {' and '.join(plan.interfaces)} at {load} "
-            f"for {plan.load.duration_s:g} s after {plan.load.warmup_s:g} s of warm-up, {plan.blocks} blocks, "
-            f"paced by {executor.pacing}"
-        )
 
 
 def carry_out(settings: Settings) -> CommandResult:
@@ -287,6 +286,7 @@ def carry_out(settings: Settings) -> CommandResult:
     except Exception as trouble:  # noqa: BLE001 -- our own fault: what was measured is kept, and called invalid
         traceback.print_exc()
         aborted = RunAborted(ExitCode.INCONCLUSIVE, f"the load generator failed: {type(trouble).__name__}: {trouble}")
+    run.name_called()
     code, document = compose(run.outcome, run.plan, aborted)
     path: Path | None = None
     if aborted is None or aborted.code != ExitCode.USAGE:

@@ -20,7 +20,7 @@ from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import LEAD_S, LocalExecutor, Member, new_environment
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Plan
-from loadtests.settings.settings import Generator
+from loadtests.settings.settings import Generator, Scenario
 from loadtests.statistics.recorder import Recorder
 
 _NS = 1_000_000_000
@@ -85,20 +85,21 @@ class DistributedExecutor:
         self._clocks = Clocks(self.runner)
         self.environment.events.worker_report.add_listener(self._on_report)
 
-    def prepare(self, robots: Sequence[Robot], plan: Plan) -> None:
+    def prepare(self, robots: Sequence[Robot], plan: Plan, scenario: Scenario | None = None) -> None:
         """Start the workers of this machine, wait for all workers, and start their users.
 
         Raises:
             GeneratorError: a worker could not get ready.
         """
         here = "127.0.0.1" if self._host in {"*", "0.0.0.0"} else self._host  # noqa: S104 -- compared with, not bound to
+        file = None if scenario is None else scenario.file
         for _ in range(self._processes):
             child = subprocess.Popen(  # noqa: S603 -- this very program
                 [sys.executable, "-m", "loadtests.measuring.worker", here, str(self._port)], stdin=subprocess.PIPE
             )
             self._children[child.pid] = child
             if child.stdin is not None:
-                told = {"secrets": [Secrets.of(robot) for robot in robots], "folder": self._folder}
+                told = {"secrets": [Secrets.of(robot) for robot in robots], "folder": self._folder, "scenario": file}
                 child.stdin.write(msgspec.json.encode(told) + b"\n")
                 child.stdin.close()
         if self._expected > self._processes:
@@ -112,6 +113,8 @@ class DistributedExecutor:
             "operations": list(plan.operations),
             "seed": plan.load.seed,
             "library": LIBRARY in plan.clients,
+            "scenario": None if scenario is None else scenario.sha256,
+            "credentials": [credential.variable for credential in robots[0].credentials],
         }
         self._dealt_out = True
         self.runner.send_message("roaas_prepare", job)

@@ -19,8 +19,11 @@ from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import WorkerClock
 from loadtests.measuring.errors import GeneratorError
+from loadtests.measuring.scenario import ScenarioSession
+from loadtests.measuring.sessions import new_session
 from loadtests.measuring.user_session import Session
 from loadtests.schedule.plan import Plan
+from loadtests.settings.settings import Scenario
 from loadtests.statistics.recorder import Recorder
 
 _NS = 1_000_000_000
@@ -82,17 +85,24 @@ class LocalExecutor:
         self.recorder = Recorder()
         self.members = [Member("1", host="localhost")]
         self.pacing = ""
-        self._session: Session | None = None
+        self._session: Session | ScenarioSession | None = None
 
-    def prepare(self, robots: Sequence[Robot], plan: Plan) -> None:
-        """Build the clients and start the users."""
-        session = Session(self.environment, robots, plan.operations, plan.load.seed, library=LIBRARY in plan.clients)
+    def prepare(self, robots: Sequence[Robot], plan: Plan, scenario: Scenario | None = None) -> None:
+        """Build the clients and start the users.
+
+        Raises:
+            GeneratorError: the scenario cannot be used, or the users do not start.
+        """
+        library = LIBRARY in plan.clients
+        session = new_session(
+            self.environment, robots, plan.operations, plan.load.seed, library=library, scenario=scenario
+        )
         self._session = self.environment.roaas_session = session
-        self.recorder, self.pacing = session.recorder, session.pacer.pacing
+        self.recorder, self.pacing = session.recorder, session.pacing
         users = plan.connections
         self.runner.start(users, spawn_rate=users)
-        with gevent.Timeout(30, GeneratorError(f"only {session.pacer.waiting} of {users} users started within 30 s")):
-            while session.pacer.waiting < users:
+        with gevent.Timeout(30, GeneratorError(f"only {session.waiting} of {users} users started within 30 s")):
+            while session.waiting < users:
                 gevent.sleep(0.01)
 
     def run(self, plan: Plan, ceiling: float | None, watch: Callable[[float], bool]) -> None:
@@ -120,5 +130,5 @@ class LocalExecutor:
     def close(self) -> None:
         """Stop the users."""
         if self._session is not None:
-            self._session.pacer.close()
+            self._session.close()
         self.runner.quit()

@@ -3,9 +3,11 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+import gevent.socket
 import requests
 
-from loadtests.clients.failures import UNREACHABLE, CallError
+from loadtests.clients.endpoint import Endpoint
+from loadtests.clients.failures import UNREACHABLE, CallError, connect_error
 from loadtests.clients.library import LibraryRest, LibrarySoap, Sent, new_session, read_document
 from loadtests.clients.payloads import CATALOGUE, variants
 from loadtests.clients.robot import Robot
@@ -62,6 +64,19 @@ def preflight(robot: Robot, names: list[SeriesName], seed: int) -> Findings:
                 break  # each further call would wait for the same deadline
     _compare(robot, answers, list(dict.fromkeys(name[0] for name in names)), seed, findings)
     return findings
+
+
+def reach(robot: Robot) -> None:
+    """Open a connection to a robot, and close it.
+
+    Raises:
+        CallError: nothing listens there.
+    """
+    endpoint = Endpoint.parse(robot.rest or "")
+    try:
+        gevent.socket.create_connection((endpoint.host, endpoint.port), robot.timeout_s).close()
+    except OSError as error:
+        raise connect_error(error, endpoint.url) from None
 
 
 def _compare(

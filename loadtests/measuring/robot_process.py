@@ -67,10 +67,11 @@ def _cpu_s(process: psutil.Process) -> float:
 
 def same_machine(robot: Robot) -> bool:
     """Return whether all of a robot's addresses are this machine's, as far as can be known without DNS."""
-    return bool(robot.addresses) and all(_is_here(Endpoint.parse(address).host) for address in robot.addresses)
+    return bool(robot.addresses) and all(is_here(Endpoint.parse(address).host) for address in robot.addresses)
 
 
-def _is_here(host: str) -> bool:
+def is_here(host: str) -> bool:
+    """Return whether a host is this machine, as far as can be known without DNS."""
     if host == "localhost":
         return True
     try:

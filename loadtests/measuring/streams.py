@@ -1,16 +1,17 @@
 """Listen to streams of a robot's state, and poll beside them: rate, jitter, gaps, and the age of the data on arrival.
 
-Streams are server-sent events (HTML Living Standard, section 9.2) and WebSocket messages (RFC 6455). The age is this
-machine's clock less the stamp in a message. It includes what the clocks of two machines differ by.
+Streams are server-sent events (HTML Living Standard, section 9.2), WebSocket messages (RFC 6455), and topics of a
+rosbridge (its protocol v2, section 3.4). The age is this machine's clock less the stamp in a message. The polls show
+what the robot's clock differs by from this machine's.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from http import HTTPStatus
 from typing import Any
+from urllib.parse import urldefrag
 
 import gevent
 import gevent.socket
@@ -20,22 +21,24 @@ from jsonpath import JSONPointer
 from websockets.client import ClientProtocol
 from websockets.exceptions import InvalidHandshake
 from websockets.frames import Frame, Opcode
+from websockets.http11 import Response
 from websockets.uri import parse_uri
 
 from loadtests.clients.described import Stream
 from loadtests.clients.endpoint import Endpoint
-from loadtests.clients.failures import CallError, connect_error
+from loadtests.clients.failures import CallError, connect_error, shown
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import bridge_endpoint
 from loadtests.clients.wire import now_ns
-from loadtests.settings.settings import Settings
+from loadtests.measuring.robot_clock import RobotClock
+from loadtests.measuring.robot_process import is_here, same_machine
+from loadtests.measuring.stamps import stamp_of
+from loadtests.settings.settings import Settings, Streams
 
 _CHUNK = 65_536
 _MOST_MESSAGES = 200_000
 _MOST_BYTES = 16 * 1024 * 1024
 _POLLS = 20.0
-#: Numbers from these on are Unix time in nanoseconds, microseconds and milliseconds: as seconds they lie after 5000.
-_UNITS = ((1e17, 1e9), (1e14, 1e6), (1e11, 1e3))
 
 
 @dataclass
@@ -43,15 +46,17 @@ class Heard:
     """What came over one stream, or by polling one operation.
 
     Attributes:
-        kind: `sse`, `websocket` or `polling`.
+        kind: `sse`, `websocket`, `rosbridge` or `polling`.
         moments_ns: when each message came, monotonic.
-        ages_ms: how old the data of each message with a stamp was.
+        ages_ms: our clock less the stamp of each message that had one.
         listened_s: for how long.
         error: why it ended before its time, or None.
+        clock: the robot's clock; None where the stream comes from another host than the polls.
     """
 
     name: str
     kind: str
+    clock: RobotClock | None = None
     moments_ns: list[int] = field(default_factory=list)
     ages_ms: list[float] = field(default_factory=list)
     listened_s: float = 0.0
@@ -62,26 +67,12 @@ class Heard:
         if len(self.moments_ns) >= _MOST_MESSAGES:
             return
         self.moments_ns.append(now_ns())
-        stamp = None if pointer is None else stamp_s(message, pointer)
+        received_s = time.time()
+        stamp = None if pointer is None else stamp_of(message, pointer)
         if stamp is not None:
-            self.ages_ms.append((time.time() - stamp) * 1e3)
-
-
-def stamp_s(message: bytes, pointer: JSONPointer) -> float | None:
-    """Return the stamp in a JSON message as Unix time: a number, an ISO 8601 text, or ROS's sec and nanosec."""
-    try:
-        value: Any = pointer.resolve(msgspec.json.decode(message), default=None)
-        if isinstance(value, dict):
-            whole: Any = value.get("sec", value.get("secs"))
-            part: Any = value.get("nanosec", value.get("nsecs", 0))
-            return float(whole) + float(part) / 1e9
-        if isinstance(value, str) and not value.replace(".", "", 1).isdigit():
-            moment = datetime.fromisoformat(value)
-            return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
-        number = float(value)
-    except (msgspec.DecodeError, ValueError, TypeError):
-        return None
-    return number / next((unit for least, unit in _UNITS if number >= least), 1.0)
+            self.ages_ms.append((received_s - stamp.seconds) * 1e3)
+            if self.clock is not None:
+                self.clock.data(stamp, received_s)
 
 
 def hear(robot: Robot, settings: Settings, stopped: Callable[[], bool], tell: Callable[[str], None]) -> list[Heard]:
@@ -90,38 +81,35 @@ def hear(robot: Robot, settings: Settings, stopped: Callable[[], bool], tell: Ca
     if not (wanted.listen or wanted.stamp) or stopped():
         return []
     tell(f"listening to {', '.join(each.name for each in wanted.listen) or 'polls'} for {load.duration_s:g} s")
-    polled = next((each.name for each in robot.described if each.method == "GET"), None)
-    return listen(robot, wanted.listen, polled, wanted.stamp, load.duration_s, settings.limits.max_rate, stopped)
+    polled = next((each.name for each in robot.described if each.method == "GET" and each.octets), None)
+    return listen(robot, wanted, polled, load.duration_s, settings.limits.max_rate, stopped)
 
 
 def listen(
-    robot: Robot,
-    streams: Sequence[Stream],
-    polled: str | None,
-    pointer: str | None,
-    seconds: float,
-    rate: float | None,
-    stopped: Callable[[], bool],
+    robot: Robot, wanted: Streams, polled: str | None, seconds: float, rate: float | None, stopped: Callable[[], bool]
 ) -> list[Heard]:
     """Listen to all streams at once, and poll an operation meanwhile; never raises for what the robot does.
 
     Args:
         robot: addresses and credentials.
-        streams: what to listen to.
+        wanted: what to listen to, and where messages have their stamps.
         polled: the operation to poll, or None.
-        pointer: JSON pointer (RFC 6901) to the stamp in each message.
         seconds: for how long.
         rate: the highest rate of the polls, per second.
         stopped: returns whether to end.
     """
-    stamp = None if pointer is None else JSONPointer(pointer)
+    stamp, told = (None if pointer is None else JSONPointer(pointer) for pointer in (wanted.stamp, wanted.clock))
+    clock, here = RobotClock(), same_machine(robot)
     jobs: list[tuple[Heard, Callable[[Heard], None]]] = [
-        (Heard(each.name, each.kind), lambda one, each=each: _HEAR[each.kind](robot, each, one, stamp))  # type: ignore[misc]
-        for each in streams
+        (
+            Heard(each.name, each.kind, clock if _same_host(robot, each) or (here and is_here(_host(each))) else None),
+            lambda one, each=each: _HEAR[each.kind](robot, each, one, stamp),  # type: ignore[misc]
+        )
+        for each in wanted.listen
     ]
     if polled is not None:
         polls = min(rate or _POLLS, _POLLS)
-        jobs.append((Heard(polled, "polling"), lambda one: _poll(robot, one, stamp, polls)))
+        jobs.append((Heard(polled, "polling", clock), lambda one: _poll(robot, one, stamp, told, polls)))
     work = [gevent.spawn(_guarded, run, one) for one, run in jobs]
     until = time.monotonic() + seconds
     while time.monotonic() < until and not stopped() and not all(job.ready() for job in work):
@@ -141,16 +129,31 @@ def _guarded(run: Callable[[Heard], None], one: Heard) -> None:
         one.listened_s = time.monotonic() - began
 
 
-def _poll(robot: Robot, one: Heard, pointer: JSONPointer | None, rate: float) -> None:
+def _same_host(robot: Robot, stream: Stream) -> bool:
+    """Return whether a stream comes from the robot's own host."""
+    return robot.rest is not None and Endpoint.parse(robot.rest).host == _host(stream)
+
+
+def _host(stream: Stream) -> str:
+    return Endpoint.parse(stream.url, {"http": 80, "https": 443, "ws": 80, "wss": 443}).host
+
+
+def _poll(robot: Robot, one: Heard, pointer: JSONPointer | None, told: JSONPointer | None, rate: float) -> None:
     request = robot.requests("rest", one.name, 0)[0]
     with closing(robot.http("rest", one.name)) as connection:
         due = time.monotonic()
         while True:
             gevent.sleep(max(0.0, due - time.monotonic()))
             due += 1 / rate
+            sent_s = time.time()
             answer = connection.call(request)
+            received_s = time.time()
             answer.require_good(request.expects)
             one.take(answer.body, pointer)
+            if one.clock is not None:
+                one.clock.dated(answer.headers.get(b"date"), sent_s, received_s)
+                if told is not None and (stamp := stamp_of(answer.body, told)) is not None:
+                    one.clock.told(stamp, sent_s, received_s)
 
 
 def _connect(endpoint: Endpoint, robot: Robot, url: str) -> Any:
@@ -207,27 +210,75 @@ def _hear_events(robot: Robot, stream: Stream, one: Heard, pointer: JSONPointer 
 
 
 def _hear_messages(robot: Robot, stream: Stream, one: Heard, pointer: JSONPointer | None) -> None:
-    protocol, pieces = ClientProtocol(parse_uri(stream.url), max_size=_MOST_BYTES), list[bytes]()
-    endpoint = bridge_endpoint(stream.url)
+    where, topic = urldefrag(stream.url)
+    protocol, endpoint = ClientProtocol(parse_uri(where), max_size=_MOST_BYTES), bridge_endpoint(where)
+    messages = _Messages(protocol, lambda message: one.take(message, pointer), topic)
     handshake = protocol.connect()
-    if robot.rest and Endpoint.parse(robot.rest).host == endpoint.host:  # no other host gets them
+    if _same_host(robot, stream):  # no other host gets them
         for name, value in robot.fixed.fields("GET", handshake.path):
             handshake.headers[name] = value
     protocol.send_request(handshake)
-    with closing(_connect(endpoint, robot, stream.url)) as plain:
+    with closing(_connect(endpoint, robot, where)) as plain:
         plain.sendall(b"".join(protocol.data_to_send()))
         while data := plain.recv(_CHUNK):
             protocol.receive_data(data)
-            for event in protocol.events_received():
-                if isinstance(event, Frame) and event.opcode in {Opcode.TEXT, Opcode.BINARY, Opcode.CONT}:
-                    pieces.append(bytes(event.data))
-                    if event.fin:
-                        one.take(b"".join(pieces), pointer)
-                        pieces.clear()
             if protocol.handshake_exc is not None:
                 words = "it does not speak WebSocket" if isinstance(protocol.handshake_exc, InvalidHandshake) else ""
                 raise CallError("status", f"{words}: {protocol.handshake_exc}".lstrip(": "))
-            plain.sendall(b"".join(protocol.data_to_send()))  # answers to pings
+            for event in protocol.events_received():
+                messages.receive(event)
+            plain.sendall(b"".join(protocol.data_to_send()))  # answers to pings, and the subscription
 
 
-_HEAR = {"sse": _hear_events, "websocket": _hear_messages}
+class _Messages:
+    """The messages of a WebSocket; of a rosbridge, the ROS messages of one topic."""
+
+    def __init__(self, protocol: ClientProtocol, take: Callable[[bytes], None], topic: str) -> None:
+        self._protocol = protocol
+        self._take = take
+        self._topic = topic
+        self._pieces: list[bytes] = []
+
+    def receive(self, event: object) -> None:
+        """Take what the protocol has received: subscribe once it is open, then collect messages."""
+        if isinstance(event, Response) and self._topic:
+            subscribe = {"op": "subscribe", "id": "roaas", "topic": self._topic}
+            self._protocol.send_text(msgspec.json.encode(subscribe))
+        if not isinstance(event, Frame) or event.opcode not in {Opcode.TEXT, Opcode.BINARY, Opcode.CONT}:
+            return
+        self._pieces.append(bytes(event.data))
+        if not event.fin:
+            return
+        message = b"".join(self._pieces)
+        self._pieces.clear()
+        if self._topic:
+            message = _published(message, self._topic)
+        if message:
+            self._take(message)
+
+
+class _Bridged(msgspec.Struct):
+    """A message of the rosbridge protocol."""
+
+    op: str
+    topic: str = ""
+    msg: msgspec.Raw = msgspec.Raw(b"null")
+    level: str = ""
+
+
+def _published(octets: bytes, topic: str) -> bytes:
+    """Return the ROS message that a rosbridge has sent for a topic; empty for anything else.
+
+    Raises:
+        CallError: rosbridge reports an error, or it is no message of its protocol.
+    """
+    try:
+        message = msgspec.json.decode(octets, type=_Bridged)
+    except msgspec.DecodeError:
+        raise CallError("malformed", f"not a message of the rosbridge protocol: {shown(octets)}") from None
+    if message.op == "status" and message.level == "error":
+        raise CallError("fault", f"rosbridge: {shown(bytes(message.msg))}")
+    return bytes(message.msg) if (message.op, message.topic) == ("publish", topic) else b""
+
+
+_HEAR = {"sse": _hear_events, "websocket": _hear_messages, "rosbridge": _hear_messages}

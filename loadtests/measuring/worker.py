@@ -24,10 +24,14 @@ from conformance.commandline.exit_codes import ExitCode
 from loadtests.clients.robot import Robot, Secrets, with_secrets
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import answer_clock, clock_id
+from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import REPORT_S, new_environment
 from loadtests.measuring.left_behind import LeftBehind
+from loadtests.measuring.scenario import ScenarioSession
+from loadtests.measuring.sessions import new_session
 from loadtests.measuring.user_session import Session
 from loadtests.schedule.plan import Plan
+from loadtests.settings.settings import Scenario
 
 #: The master answers a heartbeat each second. If it is silent for this long, it is dead, or the network to it is.
 MASTER_SILENT_S = 20.0
@@ -39,6 +43,7 @@ class _Told(msgspec.Struct, frozen=True):
 
     secrets: tuple[Secrets, ...] = ()
     folder: str = "."
+    scenario: str | None = None
 
 
 def _say(message: str) -> None:
@@ -55,11 +60,14 @@ def _leave(code: int, message: str) -> NoReturn:
 class Worker:
     """A Locust worker that carries out the plans of its master."""
 
-    def __init__(self, environment: Any, host: str, port: int, secrets: Sequence[Secrets], folder: Path) -> None:
+    def __init__(
+        self, environment: Any, host: str, port: int, secrets: Sequence[Secrets], folder: Path, scenario: str | None
+    ) -> None:
         locust.runners.WORKER_REPORT_INTERVAL = REPORT_S
         self.environment = environment
         self.secrets = secrets
-        self.session: Session | None = None
+        self.scenario = scenario
+        self.session: Session | ScenarioSession | None = None
         self.master = f"{host}:{port}"
         self.left = LeftBehind(folder)
         self._idle = Event()
@@ -88,13 +96,30 @@ class Worker:
                 with_secrets(msgspec.convert(robot, Robot), secrets)
                 for robot, secrets in zip_longest(job["robots"], self.secrets[: len(job["robots"])])
             ]
-            self.session = Session(environment, robots, tuple(job["operations"]), job["seed"], library=job["library"])
+            self.session = new_session(
+                environment,
+                robots,
+                tuple(job["operations"]),
+                job["seed"],
+                library=job["library"],
+                scenario=self._scenario(job, robots[0]),
+            )
             self.session.after_segment = self._pack
             environment.roaas_session = self.session
         except Exception as trouble:  # noqa: BLE001 -- whatever it is, the master has to hear of it
-            error = f"{type(trouble).__name__}: {trouble}"
-        pacing = self.session.pacer.pacing if self.session else ""
+            error = str(trouble) if isinstance(trouble, GeneratorError) else f"{type(trouble).__name__}: {trouble}"
+        pacing = self.session.pacing if self.session else ""
         self.runner.send_message("roaas_ready", self._about | {"error": error, "pacing": pacing})
+
+    def _scenario(self, job: dict[str, Any], robot: Robot) -> Scenario | None:
+        """Return this machine's copy of the master's scenario; code is never taken from the network."""
+        if job["scenario"] is None:
+            return None
+        if [credential.variable for credential in robot.credentials] != job["credentials"]:
+            raise GeneratorError("the scenario needs credentials that this worker lacks: give it the master's options")
+        if self.scenario is None:
+            raise GeneratorError("the master runs a scenario: start this worker with --scenario FILE as well")
+        return Scenario(self.scenario, job["scenario"])
 
     def _on_begin(self, environment: Any, msg: Any) -> None:
         del environment
@@ -168,7 +193,14 @@ class Worker:
             self._reported = time.monotonic()
 
 
-def serve(host: str, port: int, secrets: Sequence[Secrets], folder: Path, parent: int | None = None) -> None:
+def serve(
+    host: str,
+    port: int,
+    secrets: Sequence[Secrets],
+    folder: Path,
+    parent: int | None = None,
+    scenario: str | None = None,
+) -> None:
     """Run a worker until the master quits or is gone.
 
     Args:
@@ -177,10 +209,11 @@ def serve(host: str, port: int, secrets: Sequence[Secrets], folder: Path, parent
         secrets: those of each robot.
         folder: for what was recorded if the master dies.
         parent: the master's process id, if it started this process.
+        scenario: the file of the scenario, if the master runs one.
     """
     logging.getLogger("locust").setLevel(logging.ERROR)
     try:
-        worker = Worker(new_environment(), host, port, secrets, folder)
+        worker = Worker(new_environment(), host, port, secrets, folder, scenario)
     except ConnectionError:
         _leave(
             ExitCode.UNREACHABLE,
@@ -195,7 +228,7 @@ def main() -> None:
     parent = os.getppid()
     told = msgspec.json.decode(sys.stdin.readline() or "{}", type=_Told)
     gevent.signal_handler(signal.SIGINT, lambda: None)  # the master says when to stop
-    serve(sys.argv[1], int(sys.argv[2]), told.secrets, Path(told.folder), parent)
+    serve(sys.argv[1], int(sys.argv[2]), told.secrets, Path(told.folder), parent, told.scenario)
 
 
 if __name__ == "__main__":

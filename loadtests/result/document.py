@@ -7,9 +7,6 @@ from typing import Any, NamedTuple
 import msgspec
 
 from conformance.commandline.exit_codes import ExitCode
-from conformance.commandline.without_folders import without_folders
-from loadtests.clients.library import LIBRARY
-from loadtests.clients.payloads import CATALOGUE
 from loadtests.measuring.end_to_end import LOST_S
 from loadtests.measuring.environment import describe
 from loadtests.measuring.machine import Moment, conditions
@@ -18,9 +15,10 @@ from loadtests.measuring.preflight import Findings
 from loadtests.measuring.robot_process import same_machine
 from loadtests.result.files import FORMAT
 from loadtests.result.outcome import Outcome, RunAborted
+from loadtests.result.plan_words import plan_words
 from loadtests.result.processes import process_figures
 from loadtests.schedule.arrivals import arrivals_due
-from loadtests.schedule.plan import GAP_S, Plan, step_operation
+from loadtests.schedule.plan import Plan
 from loadtests.settings.settings import Settings
 from loadtests.statistics import (
     end_to_end,
@@ -35,17 +33,12 @@ from loadtests.statistics import (
 )
 from loadtests.statistics.against import EXIT_CODES, Against, against
 from loadtests.statistics.between_runs import between_runs
+from loadtests.statistics.clock_offset import SHARED
 from loadtests.statistics.comparisons import AaControl, aa_controls, further_interfaces, soap_over_rest
 from loadtests.statistics.headline import Found, headline
 from loadtests.statistics.intervals import order_interval_ms
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Recorder
-
-CLIENT_WORDS = {
-    "wire": "our own HTTP/1.1 client on gevent and llhttp, the same for both interfaces; requests are built "
-    "beforehand and each is sent once",
-    "zeep": "what an ordinary user's program calls: zeep over SOAP, the requests library over REST",
-}
 
 
 def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[int, dict[str, Any]]:
@@ -108,7 +101,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "finished": _stamp(datetime.now(UTC)),
         "environment": describe(outcome.robots[0], settings.output, outcome.findings.servers, outcome.robot_process)
         | {"machine": machine},
-        "plan": _plan_words(settings, plan, pacing),
+        "plan": plan_words(settings, plan, pacing),
         "generator": generator,
         "workers": workers,
         "series": series,
@@ -166,7 +159,8 @@ def _after_pause(paused: Paused | None) -> dict[str, Any] | None:
 
 def _endings(outcome: Outcome, plan: Plan) -> list[str]:
     """Return why the plan was not carried out to its end."""
-    found = []
+    faults = outcome.executor.recorder.faults if outcome.executor else []
+    found = [f"the scenario failed: {fault}" for fault in faults]
     if outcome.dead_at is not None:
         found.append(f"no request succeeded from {outcome.dead_at:.1f} s on")
     if outcome.interrupted:
@@ -200,12 +194,13 @@ def _end_to_end(outcome: Outcome) -> dict[str, Any]:
 
 def _streams(outcome: Outcome) -> list[dict[str, Any]]:
     """Return the `streams`: what came over each stream, and by polling beside them."""
-    clock = "shared" if same_machine(outcome.robots[0]) else "not known"
-    return [
-        {"name": one.name, "kind": one.kind, "clock": clock, "error": one.error}
-        | streams.stream_figures(one.moments_ns, one.ages_ms, one.listened_s)
-        for one in outcome.heard
-    ]
+    here, found = same_machine(outcome.robots[0]), []
+    for one in outcome.heard:
+        offset = None if one.clock is None else SHARED if here else one.clock.offset
+        clock = "not known" if offset is None else "shared" if here else "estimated"
+        figures_of = streams.stream_figures(one.moments_ns, one.ages_ms, one.listened_s, offset)
+        found.append({"name": one.name, "kind": one.kind, "clock": clock, "error": one.error} | figures_of)
+    return found
 
 
 def _silent(outcome: Outcome) -> list[str]:
@@ -254,45 +249,10 @@ def _early_errors(findings: Findings) -> list[dict[str, Any]]:
 def _knee(outcome: Outcome, plan: Plan) -> list[dict[str, Any]]:
     if not outcome.steps:
         return []
-    operation = plan.operations[step_operation(plan.operations)]
+    operation = plan.operations[steps.step_operation(plan.operations)]
     settings = outcome.settings
     criterion = steps.Criterion.of(settings.thresholds, operation, settings.slo.get(operation))
     return steps.knee(outcome.steps, plan.interfaces, criterion)
-
-
-def _plan_words(settings: Settings, plan: Plan, pacing: str) -> dict[str, Any]:
-    load, after = plan.load, settings.steps
-    return {
-        "model": "open" if plan.open_model else "closed",
-        "arrivals": load.arrivals if plan.open_model else None,
-        "rate": load.rate,
-        "users": load.users,
-        "duration_s": load.duration_s,
-        "warmup_s": load.warmup_s,
-        "block_s": round(plan.block_s, 6),
-        "gap_s": GAP_S,
-        "blocks": plan.blocks,
-        "seed": load.seed,
-        "timeout_s": plan.timeout_s,
-        "operations": list(plan.operations),
-        "interfaces": list(plan.interfaces),
-        "clients": {name: CLIENT_WORDS[name] for name in plan.clients},
-        "zeep_rate": load.rate if plan.open_model and LIBRARY in plan.clients else None,
-        "repeats": settings.repeats.number,
-        "restart_command": without_folders(settings.repeats.restart_command or "") or None,
-        "methods": {
-            name: CATALOGUE[name].element for name in plan.operations if not settings.description and name in CATALOGUE
-        },
-        "weights": dict(zip(plan.operations, plan.weights, strict=True)) if plan.weights else {},
-        "description": settings.description and without_folders(settings.description),
-        "processes": plan.workers,
-        "connections": plan.connections,
-        "pacing": pacing,
-        "connection_steps": list(after.connections),
-        "limits": {"max_rate": settings.limits.max_rate, "max_duration_s": settings.limits.max_duration_s},
-        "step_rates": list(after.rates),
-        "step_s": after.step_s if after.rates else None,
-    }
 
 
 def _stamp(moment: datetime) -> str:

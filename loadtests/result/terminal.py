@@ -119,8 +119,17 @@ def _streams(found: list[dict[str, Any]]) -> list[str]:
             else "too few for intervals"
         )
         old = f"; data {ages['p50']:.3f} ms old at the median, {ages['max']:.3f} at most" if ages else ""
+        if entry["stamped"]:
+            old += _sure(entry["age_error_ms"])
         lines.append(f"{entry['name']} ({entry['kind']}): {entry['messages']} messages, {often}{old}")
     return lines
+
+
+def _sure(error_ms: float | None) -> str:
+    """Return how well the age of data is known, by the error of the robot's clock."""
+    if error_ms is None:
+        return "; the age of the data is not known, because the robot's clock is not"
+    return f" (± {error_ms:.3f} ms: the robot's clock)" if error_ms else ""
 
 
 def _end_to_end(found: dict[str, Any] | None) -> list[str]:

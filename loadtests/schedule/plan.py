@@ -56,6 +56,7 @@ class Segment:
         pair: neighbours that are compared with one another share a number.
         rate: arrivals per second over all workers; 0 in the closed model.
         robot: 0, or 1 for the robot that it is compared with.
+        gap: whether it begins with a gap in which no request starts.
     """
 
     start_ns: int
@@ -67,11 +68,12 @@ class Segment:
     pair: int
     rate: float
     robot: int = 0
+    gap: bool = True
 
     @property
     def opens_ns(self) -> int:
-        """Return the offset at which its requests may start: after the quiet gap."""
-        return self.start_ns + min(int(GAP_S * _NS), (self.end_ns - self.start_ns) // 8)
+        """Return the offset at which its requests may start: after the quiet gap, if it has one."""
+        return self.start_ns + self.gap * min(int(GAP_S * _NS), (self.end_ns - self.start_ns) // 8)
 
     @property
     def active_s(self) -> float:
@@ -112,6 +114,7 @@ class Plan:
         offset_s: when it starts, in seconds of load since the first one's start.
         least_block_s: BLOCK_S, or SHORT_BLOCK_S where the robot is known to be quick.
         weights: how often each operation is called; empty: all equally often.
+        scenario: users send what a scenario says, and when it says so, without gaps between blocks.
     """
 
     operations: tuple[str, ...]
@@ -130,6 +133,7 @@ class Plan:
     offset_s: float = 0.0
     least_block_s: float = BLOCK_S
     weights: tuple[int, ...] = ()
+    scenario: bool = False
 
     def as_message(self) -> dict[str, Any]:
         """Return the plan in a form that msgpack carries."""
@@ -188,7 +192,8 @@ class Plan:
     @cached_property
     def segments(self) -> list[Segment]:
         """Return all segments in order; their numbers begin at `first_segment`."""
-        return self._steps() if self.step_rate is not None else [*self._warmup(), *self._duel()]
+        made = self._steps() if self.step_rate is not None else [*self._warmup(), *self._duel()]
+        return [replace(segment, gap=False) for segment in made] if self.scenario else made
 
     def active_s(self, elapsed_s: float, phases: tuple[str, ...]) -> float:
         """Return for how long requests of some phases could start in the segments that had ended by then."""
@@ -292,9 +297,3 @@ SERIES = [
     for interface in (*INTERFACES, BOTH)
     for client in CLIENTS
 ]
-
-
-def step_operation(operations: tuple[str, ...]) -> int:
-    """Return the operation of the steps: a read where there is one, because their rates are unusually high."""
-    reads = [number for number, name in enumerate(operations) if name not in MOVES]
-    return reads[0] if reads else 0

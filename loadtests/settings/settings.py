@@ -115,10 +115,24 @@ class EndToEnd:
 
 @dataclass(frozen=True)
 class Streams:
-    """The streams to listen to after the comparison, and the JSON pointer to the stamp in a message (RFC 6901)."""
+    """The streams to listen to after the comparison, and JSON pointers (RFC 6901) into messages.
+
+    Attributes:
+        stamp: to the time of the data in a message.
+        clock: to the time, in the response that is polled, at which the robot made that response.
+    """
 
     listen: tuple[Stream, ...] = ()
     stamp: str | None = None
+    clock: str | None = None
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A Locust file with the tasks of the users, and the digest of its content, by which workers know it."""
+
+    file: str
+    sha256: str
 
 
 @dataclass(frozen=True)
@@ -142,6 +156,7 @@ class Settings:
         description: URL or name of the description that the operations come from; None for the paper's robot.
         notes: what the result should say of the choice of operations.
         streams: what to listen to.
+        scenario: what the users do; None where requests come at set times, or one after the other.
     """
 
     robot: Robot
@@ -159,6 +174,7 @@ class Settings:
     description: str | None = None
     notes: tuple[str, ...] = ()
     streams: Streams = field(default_factory=Streams)
+    scenario: Scenario | None = None
 
     def to_json(self) -> str:
         """Return the settings for the process that measures."""

@@ -70,6 +70,7 @@ def settle(options: CliOptions, statement: Statement, target: Target | None = No
         description=target.description,
         notes=target.notes,
         streams=target.streams,
+        scenario=target.scenario,
     )
     return settings if options.against is None else _compared(settings, options.against, target, options.tolerance)
 

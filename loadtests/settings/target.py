@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from conformance.statement.load import ServiceLevel
 from loadtests.clients.robot import Robot
-from loadtests.settings.settings import Selection, Streams
+from loadtests.settings.settings import Scenario, Selection, Streams
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,7 @@ class Target:
         slo: the service levels of the operations, by their names.
         notes: what the result should say of the choice.
         streams: what to listen to.
+        scenario: what the users do, if a scenario says that.
     """
 
     robot: Robot
@@ -32,6 +33,7 @@ class Target:
     slo: dict[str, ServiceLevel] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     streams: Streams = field(default_factory=Streams)
+    scenario: Scenario | None = None
 
     @property
     def rate_of_levels(self) -> float | None:

@@ -111,6 +111,8 @@ def _how(entry: SoapOverRest | Series | Change, found: Found) -> str:
     if load.users is None:
         return f"{entry.client} client, {load.rate:g} requests/s"
     users = f"{entry.client} client, {load.users} user{'' if load.users == 1 else 's'}"
+    if found.plan.scenario:
+        users += " of a scenario in the closed model"
     if found.most_rate is None:
         return users
     return f"{users} under a cap of {found.most_rate:g} requests/s, which is part of the figures"

@@ -20,6 +20,8 @@ from loadtests.statistics.histogram import Histogram, Ints
 LATE_NS = 1_000_000
 _FIELDS = 8
 _BUFFERED = 4096 * _FIELDS
+#: How many operations a plan may have.
+MOST_OPERATIONS = 1024
 _MAX_KINDS = 100  # error messages kept apart; further ones are counted under their kind's first
 
 
@@ -126,6 +128,7 @@ class Recorder:
         self.failures: dict[FailureKey, Failure] = {}
         self.counters: Counter[str] = Counter()
         self.busy: dict[int, float] = {}
+        self.faults: list[str] = []
 
     def record(
         self,
@@ -179,6 +182,11 @@ class Recorder:
         cell.failed_service.record(age)
         cell.failed_response.record(age)
 
+    def fault(self, message: str) -> None:
+        """Record that the scenario itself failed, which ends the run."""
+        if message not in self.faults:
+            self.faults.append(message)
+
     def was_busy(self, segment: int, share: float) -> None:
         """Record the share of a core that a generator process used during a segment; the highest share is kept."""
         self.busy[segment] = max(share, self.busy.get(segment, 0.0))
@@ -195,10 +203,10 @@ class Recorder:
         self._buffer = array("q")
         queued = rows[:, 1] < 0
         operations = np.where(queued, -1 - rows[:, 1], rows[:, 1])
-        keys = rows[:, 0] * 16 + operations
+        keys = rows[:, 0] * MOST_OPERATIONS + operations
         for key in np.unique(keys).tolist():
             chosen = keys == key
-            self._bin(key // 16, key % 16, rows[chosen], queued[chosen])
+            self._bin(key // MOST_OPERATIONS, key % MOST_OPERATIONS, rows[chosen], queued[chosen])
 
     def _bin(self, segment: int, operation: int, rows: Ints, queued: Ints) -> None:
         due, start, built, received, done, server = (rows[:, column] for column in range(2, _FIELDS))
@@ -230,6 +238,8 @@ class Recorder:
         self.counters.update(other.counters)
         for segment, share in other.busy.items():
             self.was_busy(segment, share)
+        for message in other.faults:
+            self.fault(message)
 
     def take(self) -> dict[str, Any]:
         """Return everything in a form that msgpack carries, and begin again."""
@@ -254,6 +264,7 @@ class Recorder:
             ],
             "counters": dict(self.counters),
             "busy": list(self.busy.items()),
+            "faults": self.faults,
         }
         self._begin()
         return packed
@@ -271,4 +282,5 @@ class Recorder:
             made.failures[series, operation, kind] = Failure(message, count, first, last)
         made.counters.update(packed["counters"])
         made.busy.update(packed["busy"])
+        made.faults = packed["faults"]
         return made

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from loadtests.statistics.clock_offset import Offset
 from loadtests.statistics.figures import rounded
 from loadtests.statistics.histogram import SHARES
 from loadtests.statistics.intervals import samples_for_point
@@ -13,15 +14,18 @@ _GAP = 2.0
 _ENOUGH = 3
 
 
-def stream_figures(moments_ns: Sequence[int], ages_ms: Sequence[float], listened_s: float) -> dict[str, Any]:
+def stream_figures(
+    moments_ns: Sequence[int], ages_ms: Sequence[float], listened_s: float, offset: Offset | None
+) -> dict[str, Any]:
     """Return figures on the messages of a stream; None where there are too few.
 
     A gap is an interval of more than twice the median; the jitter is the intervals' standard deviation.
 
     Args:
         moments_ns: when each came.
-        ages_ms: of those with a stamp.
+        ages_ms: our clock less the stamp, of those with a stamp.
         listened_s: for how long they were waited for.
+        offset: of the robot's clock; None where it is not known, so that the ages are not known either.
     """
     intervals = np.diff(np.array(moments_ns, dtype=np.float64)) / 1e6
     found: dict[str, Any] = {
@@ -32,7 +36,9 @@ def stream_figures(moments_ns: Sequence[int], ages_ms: Sequence[float], listened
         "jitter_ms": None,
         "gaps": None,
         "stamped": len(ages_ms),
-        "age_ms": _spread(ages_ms),
+        "clock_offset_ms": None if offset is None else rounded(offset.middle_s * 1e3),
+        "age_ms": None if offset is None else _spread([age + offset.middle_s * 1e3 for age in ages_ms]),
+        "age_error_ms": None if offset is None else rounded(offset.error_s * 1e3),
     }
     if len(intervals) >= _ENOUGH:
         limit = _GAP * float(np.median(intervals))

@@ -137,6 +137,9 @@ def _same_load(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str,
             f"{names[0]} was measured with {old.get('users')} users and {names[1]} with {new.get('users')}"
         )
     _same_cap(old, new, names)
+    scenarios = [plan.get("scenario") for plan in (old, new)]
+    if scenarios[0] != scenarios[1]:
+        raise ResultsIncompatibleError(f"{names[0]} and {names[1]} were measured with different scenarios (--scenario)")
     before, after = old.get("rate"), new.get("rate")
     if (before is None) != (after is None) or (
         before is not None and after is not None and abs(after - before) > _SAME_RATE * max(before, after)

@@ -75,12 +75,21 @@ def _of_streams(result: Mapping[str, Any]) -> Iterator[str]:
     """Yield how old the data is that a display shows, for each stream and for polling beside it."""
     for one in result.get("streams", []):
         ages, intervals = one["age_ms"], one["interval_ms"]
-        if ages and intervals:
-            how = "polled" if one["kind"] == "polling" else "streamed"
+        name = f"{excerpt(one['name'], 100)}, {'polled' if one['kind'] == 'polling' else 'streamed'}"
+        if one.get("stamped") and one.get("clock") == "not known":
+            yield f"{name}: the age of the data is not known, because the robot's clock is not."
+        elif ages and intervals:
+            error = one.get("age_error_ms") or 0.0
+            old = f"{ms(ages['p50'])} ms old when it comes ({ms(ages['max'])} ms at most)"
+            if error:
+                least = max(0.0, ages["p50"] - error)
+                old = (
+                    f"{ms(least)} to {ms(ages['p50'] + error)} ms old when it comes (the robot's clock is known to "
+                    f"± {ms(error)} ms only)"
+                )
             yield (
-                f"{excerpt(one['name'], 100)}, {how}: the data is {ms(ages['p50'])} ms old when it comes "
-                f"({ms(ages['max'])} ms at most), and a display that shows it until the next shows data that is up to "
-                f"{ms(ages['max'] + intervals['max'])} ms old."
+                f"{name}: the data is {old}, and a display that shows it until the next shows data that is up to "
+                f"{ms(ages['max'] + error + intervals['max'])} ms old."
             )
 
 
@@ -102,7 +111,14 @@ def _how_often(share: float, result: Mapping[str, Any], one: Mapping[str, Any]) 
 
 def _limits(result: Mapping[str, Any], failed: bool) -> Iterator[str]:  # noqa: FBT001 -- whether any request failed
     plan = result["plan"]
-    load = f"{rate(plan['rate'])} requests/s" if plan.get("rate") else f"{plan.get('users')} users"
+    users = f"{plan.get('users')} user{'' if plan.get('users') == 1 else 's'}"
+    load = f"at {rate(plan['rate'])} requests/s" if plan.get("rate") else f"with {users}"
     near = (result["environment"].get("robot") or {}).get("same_machine")
     network = " on the robot's own machine: a network adds its delay" if near else ""
-    yield f"{'' if failed else 'No request failed. '}Measured at {load} for {plan['duration_s']:g} s{network}."
+    yield f"{'' if failed else 'No request failed. '}Measured {load} for {plan['duration_s']:g} s{network}."
+    if plan["model"] == "closed":
+        whose = "The scenario's users wait" if plan.get("scenario") else "Each user waits"
+        yield (
+            f"{whose} for a response before the next request (closed model): a slow robot gets fewer requests. "
+            "Requests at a fixed rate, as with --rate, may take longer than these."
+        )

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -102,9 +103,10 @@ def test_the_web_ui_shows_the_runs_numbers(toy, load, free_port):
     assert 0 < counts[-1] <= 180
 
 
-def test_the_kubernetes_manifest_is_one_and_gives_options_that_there_are():
+@pytest.mark.parametrize("name", ["loadtest.yaml", "described.yaml", "scenario.yaml"])
+def test_a_kubernetes_manifest_is_one_and_gives_options_that_there_are(name):
     folder = ROOT / "deploy" / "kubernetes"
-    manifest = yaml.safe_load((folder / "loadtest.yaml").read_text())
+    manifest = yaml.safe_load((folder / name).read_text())
     schema = json.loads((folder / "locusttest.schema.json").read_text())
     operators = jsonschema.Draft202012Validator(schema)
     operators.validate(manifest)
@@ -118,7 +120,11 @@ def test_the_kubernetes_manifest_is_one_and_gives_options_that_there_are():
     version = re.search(r"chart ([\d.]+)", schema["title"])[1]
     assert f"--version {version} " in (folder / "README.md").read_text(), "the operator is pinned"
     assert f"chart {version}" in (folder / "loadtest.yaml").read_text()
-    words = manifest["spec"]["args"].split()
+    words = shlex.split(manifest["spec"]["args"])  # as the operator does
+    if "--scenario" in words:  # where the operator mounts the file of the ConfigMap
+        place = words.index("--scenario") + 1
+        assert (manifest["spec"]["locustfile"].keys(), Path(words[place]).parent.name) == ({"configMap"}, "locust")
+        words[place] = str(ROOT / "examples" / "scenario" / Path(words[place]).name)
     load_command.make_context("load", list(words), resilient_parsing=False)
     assert words[words.index("--expect-workers") + 1] == str(manifest["spec"]["workers"])
     worker = manifest["spec"]["worker"]

@@ -54,19 +54,33 @@ def worker(network):
 
 
 @pytest.fixture
+def device(network, started):
+    """Start a device with a description in the middle; returns the description's URL."""
+
+    def start(*options):
+        host = network.address("middle")
+        port = started("toy_api.py", "--host", host, *options, on=network.on("middle"))[1]
+        return f"http://{host}:{port}/openapi.json"
+
+    return start
+
+
+@pytest.fixture
 def begin(network, toy, load, wait_for, tmp_path):
     """Begin a run on the master's machine, with a robot and a relay in the middle.
 
-    Gives the run's process, what waits for it, and what has a worker join.
+    Gives the run's process, what waits for it, and what has a worker join, with the options that it shares with the
+    master. Without a target, the robot is a toy.
     """
     with ExitStack() as stack:
 
-        def run(*options):
-            robot = toy(host=network.address("middle"), on=network.on("middle"))
+        def run(*options, target=None, shared=""):
+            robot = target or toy(host=network.address("middle"), on=network.on("middle")).both()
             process, finish = load.begin(
-                *robot.both(),
+                *robot,
                 *options,
                 f"--client wire --master-host {network.address('master')}",
+                shared,
                 on=network.on("master"),
             )
             port = wait_for(process, r"master on [\d.]+:(\d+)")[1]
@@ -77,9 +91,9 @@ def begin(network, toy, load, wait_for, tmp_path):
                 f"--worker --master-host {near} --master-port {relay.stdout.readline().strip()} --out {tmp_path}/left"
             )
 
-            def join(*workers):
+            def join(*workers, options=shared):
                 for one in workers:
-                    one.stdin.write(told + "\n")
+                    one.stdin.write(f"{told} {options}\n")
                     one.stdin.flush()
 
             return process, finish, join
@@ -155,3 +169,98 @@ def test_workers_outlive_no_master_and_leave_what_they_recorded(worker, begin, w
         assert left["why"] in told
         assert left["workers"] == 2
         assert left["requests"] >= sum(entry["count"] + entry["errors"] for entry in left["series"]) > 20
+
+
+def test_any_number_of_workers_measures_a_described_device_alike(device, worker, begin, tmp_path):
+    token, medians = tmp_path / "token", {}
+    token.write_text("t0ken-of-robot")
+    for number in (1, 2, 4):
+        _, finish, join = begin(
+            "--operation 'GET /state=2' --operation 'GET /items/{item_id}' --rate 30 --duration 3 --warmup 0",
+            f"--processes 0 --expect-workers {number}",
+            target=[device("--auth", "bearer", "--slow", "0.15")],
+            shared=f"--token-file {token}",
+        )
+        join(*(worker(own_clock=place % 2 == 1) for place in range(number)))
+        run = finish()
+        told = run.result["generator"]
+        requests = [entry["requests"] for entry in run.result["workers"]]
+        missing = told["dropped"] + sum(entry["arrivals_lost"] for entry in run.result["workers"])
+        assert (len(requests), sum(requests)) == (number, told["started"])
+        assert told["scheduled"] == told["started"] + missing, run.err
+        assert max(requests) - min(requests) <= 4 + missing, "each has its share"
+        assert (told["asked_rate"], told["errors"]) == (pytest.approx(30, rel=0.03), 0)
+        medians[number] = run.series("GET /state", "rest")["service_ms"]["p50"]
+        state, item = (run.series(name, "rest")["count"] for name in ("GET /state", "GET /items/{item_id}"))
+        assert state == pytest.approx(2 * item, abs=4 + missing)
+    assert all(150 <= median < 2 * min(medians.values()) for median in medians.values()), medians
+
+
+SCENARIO = """
+from locust import constant_pacing, task
+from loadtests.scenario import RobotUser
+
+class Display(RobotUser):
+    wait_time = constant_pacing(0.1)
+
+    @task
+    def refresh(self):
+        self.client.get("/state")
+"""
+
+
+def test_workers_run_their_own_copy_of_a_scenario(device, worker, begin, tmp_path):
+    mine = tmp_path / "display.py"
+    mine.write_text(SCENARIO)
+    _, finish, join = begin(
+        "--users 3 --duration 2 --warmup 0.2 --processes 0 --expect-workers 2",
+        target=[device()],
+        shared=f"--scenario {mine}",
+    )
+    join(worker(own_clock=True), worker())
+    run = finish()
+    assert [entry["state"] for entry in run.result["workers"]] == ["finished"] * 2
+    assert run.result["generator"]["achieved_rate"] == pytest.approx(30, rel=0.35)
+    assert run.result["generator"]["errors"] == 0
+
+
+@pytest.mark.parametrize(
+    ("theirs", "options", "told"),
+    [
+        (None, "", "start this worker with --scenario"),
+        ("# other", "", "differs from the master's"),
+        ("", "--token-file", "credentials that this worker lacks"),
+    ],
+)
+def test_a_worker_that_cannot_do_as_its_master_is_refused(device, worker, begin, tmp_path, theirs, options, told):
+    mine, other, token = tmp_path / "display.py", tmp_path / "other.py", tmp_path / "token"
+    mine.write_text(SCENARIO)
+    other.write_text(SCENARIO + (theirs or ""))
+    token.write_text("t0ken-of-robot")
+    _, finish, join = begin(
+        f"--scenario {mine} --users 3 --duration 2 --processes 0 --expect-workers 1 {options and f'{options} {token}'}",
+        target=[device()],
+    )
+    join(worker(), options="" if theirs is None else f"--scenario {other}")
+    run = finish()
+    assert (run.code, told in run.err) == (2, True), run.err
+
+
+def test_the_age_of_data_from_another_machine_has_the_error_of_its_clock(network, device, load):
+    _, finish = load.begin(
+        device("--ahead", "100", "--age", "0.5"),
+        "--operation 'GET /state' --rate 30 --duration 2 --warmup 0.1 --clock-field /now --stamp-field /stamp",
+        "--stream 'GET /events'",
+        on=network.on("master"),
+    )
+    run = finish()
+    heard, polled = run.result["streams"]
+    if network.clock_ahead_s:
+        assert (heard["clock"], polled["clock"]) == ("estimated", "estimated")
+        assert polled["clock_offset_ms"] == pytest.approx(100_000, abs=polled["age_error_ms"] + 0.01)
+        assert 0 < polled["age_error_ms"] < 250
+        assert polled["age_ms"]["p50"] >= 500 - polled["age_error_ms"]
+        assert heard["age_ms"]["p50"] < polled["age_ms"]["p50"]
+        assert "the robot's clock)" in run.out
+    else:
+        assert polled["clock"] == "shared"

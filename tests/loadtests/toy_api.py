@@ -71,6 +71,9 @@ class Handler(BaseHTTPRequestHandler):
         self.wfile.write(body)
         self.wfile.flush()
 
+    def date_time_string(self, timestamp=None):
+        return super().date_time_string(timestamp or time.time() + self.server.options.ahead)
+
     def refused(self):
         """Answer a request without the right credential; say whether it was one."""
         kind, given = self.server.options.auth, self.headers.get("Authorization", "")
@@ -125,13 +128,14 @@ class Handler(BaseHTTPRequestHandler):
             with self.one_at_a_time if options.serial else nullcontext():
                 time.sleep(options.slow)
             failing = options.fail_every and not self.calls["GET /state"] % options.fail_every
-            return self.send(503 if failing else 200, {"stamp": time.time()})
+            now = time.time() + options.ahead
+            return self.send(503 if failing else 200, {"stamp": now - options.age, "now": now})
         if path == "/text":
             return self.send(200, b"not JSON", "text/plain")
         if path == "/made":
             return self.send(201, {})
         if path == "/events":
-            return self.events(options.events)
+            return self.events(options)
         if path.startswith("/items/"):
             return self.send(200 if path in {"/items/left", "/items/right"} else 404, {})
         return self.send(200, [{"id": "left"}, {"id": "right"}] if path == "/items" else {})
@@ -147,7 +151,7 @@ class Handler(BaseHTTPRequestHandler):
             body.until = now + self.server.options.coast
         return {"x": body.x, "speed": body.speed}
 
-    def events(self, rate):
+    def events(self, options):
         self.send_response(200)
         self.send_header("Content-Type", "text/event-stream")
         self.send_header("Connection", "close")
@@ -156,9 +160,10 @@ class Handler(BaseHTTPRequestHandler):
         try:
             while True:
                 number += 1
-                self.wfile.write(f"id: {number}\ndata: {json.dumps({'stamp': time.time(), 'n': number})}\n\n".encode())
+                event = json.dumps({"stamp": time.time() + options.ahead, "n": number})
+                self.wfile.write(f"id: {number}\ndata: {event}\n\n".encode())
                 self.wfile.flush()
-                time.sleep(1 / rate)
+                time.sleep(1 / options.events)
         except OSError:
             self.close_connection = True
 
@@ -169,11 +174,13 @@ if __name__ == "__main__":
     parser.add_argument("--fail-every", type=int, default=0)
     parser.add_argument("--slow", type=float, default=0.0)
     parser.add_argument("--events", type=float, default=50.0)
-    parser.add_argument("--host")
+    parser.add_argument("--host", default="127.0.0.1")
+    parser.add_argument("--ahead", type=float, default=0.0, help="how far its clock is ahead, s")
+    parser.add_argument("--age", type=float, default=0.0, help="how old its state is, s")
     parser.add_argument("--serial", action="store_true", help="answer GET /state one after the other")
     parser.add_argument("--coast", type=float, default=0.0, help="move on for so long after a halt, s")
     parser.add_argument("--tls", nargs=2, metavar=("CERT", "KEY"))
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    server = ThreadingHTTPServer((parser.parse_known_args()[0].host, 0), Handler)
     server.daemon_threads = True
     server.options = parser.parse_args()
     if server.options.tls:

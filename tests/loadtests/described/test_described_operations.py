@@ -14,7 +14,7 @@ from loadtests.described import operations, run
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
 from loadtests.described.operations import chosen, named_alike
 from loadtests.described.requests import robot_of
-from loadtests.described.streams import checked_pointer, streams_of
+from loadtests.described.streams import streams_to_hear
 from loadtests.schedule.rotation import rotation, turns_of_all
 from loadtests.settings.errors import SettingsError
 from loadtests.settings.settings import Selection
@@ -170,19 +170,26 @@ def test_a_stream_is_no_request(device):
 
 
 def test_streams_are_operations_and_websockets(device):
+    def hear(*names, **pointers):
+        return streams_to_hear(opened, {"streams": names, "stamp_field": None, "clock_field": None, **pointers})
+
     opened = device()
-    found = streams_of(opened, ["GET /events", "ws://127.0.0.1:9/state"])
+    wanted = hear("GET /events", "ws://127.0.0.1:9/state", "ws://127.0.0.1:9#/odom", clock_field="/now")
+    found = wanted.listen
+    assert (wanted.stamp, wanted.clock) == (None, "/now")
     assert [(each.name, each.kind) for each in found] == [
         ("GET /events", "sse"),
         ("ws://127.0.0.1:9/state", "websocket"),
+        ("ws://127.0.0.1:9#/odom", "rosbridge"),
     ]
     assert found[0].octets.startswith(b"GET /events HTTP/1.1\r\n")
     with pytest.raises(SettingsError, match="no operation 'GET /event'"):
-        streams_of(opened, ["GET /event"])
+        hear("GET /event")
     with pytest.raises(SettingsError, match="--stream: 'ws://' names no host"):
-        streams_of(opened, ["ws://"])
-    with pytest.raises(SettingsError, match="a pointer is written /header/stamp"):
-        checked_pointer("header.stamp")
+        hear("ws://")
+    for option in ("stamp_field", "clock_field"):
+        with pytest.raises(SettingsError, match=r"--(stamp|clock)-field .* a pointer is written /header/stamp"):
+            hear(**{option: "header.stamp"})
 
 
 def test_secrets_stand_in_requests_only_where_they_are_sent(device, tmp_path):

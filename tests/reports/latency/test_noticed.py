@@ -61,6 +61,39 @@ def test_delays_are_named_as_people_and_programs_notice_them(described):
     assert "too few to say more" in told(described, p50=2.0)[0]
 
 
+def test_the_closed_model_is_explained(described):
+    described["plan"] |= {"model": "closed", "rate": None, "users": 3}
+    *_, load, model = told(described, p50=2.0, p99=12.5)
+    assert load.startswith("No request failed. Measured with 3 users for")
+    assert model.startswith("Each user waits for a response before the next request (closed model): a slow robot gets")
+    described["plan"]["scenario"] = {"file": "operators.py", "sha256": "0" * 64}
+    assert told(described, p50=2.0, p99=12.5)[-1].startswith("The scenario's users wait for a response")
+
+
+@pytest.mark.parametrize(
+    ("clock", "error_ms", "words"),
+    [
+        ("shared", 0.0, "the data is 30.0 ms old when it comes (40.0 ms at most), and a display that"),
+        (
+            "estimated",
+            5.0,
+            "the data is 25.0 to 35.0 ms old when it comes (the robot's clock is known to ± 5.000 ms only)",
+        ),
+        ("estimated", 500.0, "the data is 0.000 to 530.0 ms old when it comes"),
+        ("not known", None, "GET /a, polled: the age of the data is not known, because the robot's clock is not."),
+    ],
+)
+def test_the_age_of_data_comes_with_its_error(described, clock, error_ms, words):
+    ages = {"min": 20.0, "p50": 30.0, "p90": None, "p99": None, "max": 40.0} if error_ms is not None else None
+    heard = {"name": "GET /a", "kind": "polling", "messages": 9, "stamped": 9, "clock": clock, "age_error_ms": error_ms}
+    described["streams"] = [heard | {"age_ms": ages, "interval_ms": {"p50": 50.0, "max": 60.0}, "gaps": None}]
+    assert any(words in sentence for sentence in told(described, p50=2.0, p99=12.5))
+    page = html.fromstring(latency_html(described)).text_content()
+    assert ("30.0 ± " in page) == bool(error_ms)
+    assert ("the error of the robot's clock" in page) == (clock != "shared")
+    assert "GET /a (polling)" in latency_markdown(described)
+
+
 def test_failures_are_counted_in_time(described):
     described["series"][0] |= {"count": 95, "errors": 3, "dropped": 2}
     assert "5 of 100 requests failed: at this load, one every 0.1 s." in told(described, p50=2.0, p99=3.0)[2]

@@ -1,0 +1,6 @@
+"""What a scenario imports: `from loadtests.scenario import RobotUser` (docs/load.md, "A scenario in Python")."""
+
+from loadtests.clients.scenario import Client, Response, ResponseContext
+from loadtests.measuring.scenario import RobotUser
+
+__all__ = ["Client", "Response", "ResponseContext", "RobotUser"]
