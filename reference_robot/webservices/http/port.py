@@ -9,7 +9,7 @@ from typing import Final, Protocol
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.proxies import TrustedProxies
 
-_AWAKE: Final = 200e-6  # seconds; a client on the same machine needs 20 to 100 µs from a response to its next request
+_AWAKE: Final = 150e-6  # seconds; a client on the same machine needs 20 to 100 µs from a response to its next request
 
 
 class Client(Protocol):
@@ -108,7 +108,7 @@ class Port:
         return self.held.size > self._limits.held
 
     def answered(self, began: float, now: float) -> None:
-        """Poll for 0.2 ms without sleeping if the request came within 0.2 ms of the last response.
+        """Poll for 0.15 ms without sleeping if the request came within 0.15 ms of the last response.
 
         After sleep, a processor runs the same code two to three times as slowly. Clients that send one request after
         the other are therefore served sooner, for no more processor time. Other clients do not cause polling.
