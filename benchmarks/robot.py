@@ -20,6 +20,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from itertools import pairwise
 
+import uvloop
 from fixed import answers_to, running_bare, running_nginx
 from loader import Call, Load, alternately, load
 from programs import Footprint, Robot, report, running_robot
@@ -92,6 +93,8 @@ def main() -> int:
                 met.append(back_to_back(name, call, yardsticks(call), most, chosen.seconds))
             for name, (call, _) in asked.items():
                 met.append(now_and_then(name, call, yardsticks(call), 5 * chosen.seconds))
+        _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))  # after the robot's start, which sets its own limit
         for name, (call, _) in asked.items():
             met.append(many_connections(name, call, yardsticks(call), LEAST_RATES[name], chosen.seconds))
             met.append(beside_idle(name, call, chosen.seconds))
@@ -182,15 +185,17 @@ def beside_idle(name: str, call: Call, seconds: float) -> bool:
 
 
 def crowd(name: str, call: Call) -> bool:
-    """Open 10,000 connections at once, with a request on each; all must be served or refused, and none may hang."""
-    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+    """Open 10,000 connections at once, with a request on each; all must be served or refused, and one later served.
+
+    The robot closes a connection whose request takes 10 s to come, as it may on a busy machine.
+    """
     began = time.monotonic()
-    outcomes = Counter(asyncio.run(_outcomes(call)))
+    outcomes = Counter(uvloop.run(_outcomes(call)))
+    took, later = time.monotonic() - began, uvloop.run(_outcome(call))
     return report(
-        f"{name}, {CROWD:,} connections at once: {dict(outcomes.most_common())} in {time.monotonic() - began:.1f} s",
+        f"{name}, {CROWD:,} connections at once: {dict(outcomes.most_common())} in {took:.1f} s, then {later}",
         # Too many open files, of this process or of the machine, are an OSError.
-        met=outcomes["200"] + outcomes["204"] > 0 and not outcomes["hung"] and not outcomes["OSError"],
+        met=not outcomes["hung"] and not outcomes["OSError"] and later in {"200", "204"},
     )
 
 
