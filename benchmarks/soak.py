@@ -8,6 +8,8 @@ servers, is killed and restarted every minute. The exit code is 1 unless
 - memory stays within 5 % of its size after the first tenth, descriptors and threads where they were;
 - the good clients' p99 at the end is within 20 % of the beginning's, both under the same load. A bare application,
   loaded alternately with the robot, shows how much slower the machine itself has become; that is taken out.
+
+It also prints how p99 and memory change per hour after the first tenth, with 95 % intervals.
 """
 
 import argparse
@@ -22,15 +24,18 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from fixed import answers_to, running_bare
 from programs import HERE, Footprint, report, running_robot, started
 from robot import DELIVERY, ENVELOPE
+from scipy import stats
 
 RATE = 100.0  # good requests a second, and as many to the bare application
+WINDOWS = 30  # of a run, each with a p99 and a size of memory, to which slopes are fitted
 SLICES = 10  # of a window; its p99 is the median of theirs, so that a neighbour's burst is none of the robot's
 MOST_GROWTH, MOST_SLOWER = 0.05, 0.20
 DEADLINE = 10.0  # seconds for an answer
@@ -87,7 +92,7 @@ class Soak:
         self.seconds, self.log, self._domain = seconds, log, f"--domain-id={domain_id}"
         self.good = Good()
         self.warm, self.left = Footprint(0, 0, 0, 0), Footprint(0, 0, 0, 0)
-        self.processor: list[tuple[float, float]] = []  # s since the start, s of processor used by the web services
+        self.used: list[tuple[float, Footprint]] = []  # s since the start, and what the web services use
         self.hostile: dict[str, dict[str, int]] = {}
         self.restarts = 0
 
@@ -118,7 +123,7 @@ class Soak:
                 self._ask(clients, yardstick, asked, now)
                 asked += 1
                 if asked % RATE == 0:
-                    self.processor.append((now, Footprint.of(pid).processor))
+                    self.used.append((now, Footprint.of(pid)))
                 if asked % (10 * RATE) == 0:
                     print(f"{now:5.0f} s: {dict(self.good.statuses)}, {Footprint.of(pid)}", flush=True)
                 time.sleep(max(0.0, began + asked / RATE - time.monotonic()))
@@ -203,10 +208,29 @@ def p99(times: list[tuple[float, float]], start: float, end: float) -> float:
     return statistics.median(found) if found else math.nan
 
 
-def busy(used: list[tuple[float, float]], start: float, end: float) -> float:
+def busy(used: list[tuple[float, Footprint]], start: float, end: float) -> float:
     """Return the share of a processor that was used in a window."""
-    within = [(at, seconds) for at, seconds in used if start <= at < end]
+    within = [(at, footprint.processor) for at, footprint in used if start <= at < end]
     return (within[-1][1] - within[0][1]) / (within[-1][0] - within[0][0]) if len(within) > 1 else math.nan
+
+
+def memory(used: list[tuple[float, Footprint]], start: float, end: float) -> float:
+    """Return the median size of memory in a window, MB; NaN if it was not measured."""
+    within = [footprint.megabytes for at, footprint in used if start <= at < end]
+    return statistics.median(within) if within else math.nan
+
+
+def slope(of: Callable[[float, float], float], seconds: float) -> str:
+    """Return the change per hour of a figure of a window, with its 95 % interval (Theil and Sen's), as a text.
+
+    The estimate is the median of the slopes between all pairs of windows, so that a neighbour's bursts count little.
+    """
+    first, length = seconds / 10, seconds * 9 / 10 / WINDOWS
+    starts = [first + number * length for number in range(WINDOWS)]
+    found = [(start / 3600, value) for start in starts if not math.isnan(value := of(start, start + length))]
+    hours, values = zip(*found, strict=True)
+    fitted = stats.theilslopes(values, hours)
+    return f"{fitted.slope:+.2f} an hour ({fitted.low_slope:+.2f} to {fitted.high_slope:+.2f})"
 
 
 def judged(soak: Soak) -> list[bool]:
@@ -218,9 +242,12 @@ def judged(soak: Soak) -> list[bool]:
     machine = max(1.0, bare[1] / bare[0])
     slower = robot[1] / robot[0] / machine - 1
     # A machine that is overloaded lets those wait longest who ask it for most, which the bare application does not.
-    work = [busy(soak.processor, *window) for window in (first, last)]
+    work = [busy(soak.used, *window) for window in (first, last)]
     log = soak.log.read_text(encoding="utf-8")
     grown = left.megabytes / warm.megabytes - 1
+    slopes = [slope(partial(p99, times), soak.seconds) for times in (good.robot, good.bare)]
+    print(f"p99 of GET pose, ms: {slopes[0]}; of the bare application {slopes[1]}")
+    print(f"memory, MB: {slope(partial(memory, soak.used), soak.seconds)}")
     return [
         report(
             f"good clients: {dict(good.statuses)} over {soak.restarts} restarts, wrong {dict(good.wrong)}",

@@ -157,17 +157,18 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         network's.
         """
         keep_alive = request.keep_alive and not self._port.is_stopping
-        took = (perf_counter() - request.began) * 1000
+        now = perf_counter()
         self._transport.write(
             b"%b%bserver-timing: app;dur=%.3f\r\n%b\r\n%b"
             % (
                 response.head,
                 self._port.date,
-                took,
+                (now - request.began) * 1000,
                 b"" if keep_alive else b"connection: close\r\n",
                 b"" if request.method == "HEAD" else response.body,
             )
         )
+        self._port.answered(request.began, now)
         if not keep_alive:
             self._leave()
         elif not self._has_begun and not self._stalled:

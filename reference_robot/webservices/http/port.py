@@ -4,10 +4,12 @@ import asyncio
 import time
 from dataclasses import dataclass
 from email.utils import formatdate
-from typing import Protocol
+from typing import Final, Protocol
 
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.proxies import TrustedProxies
+
+_AWAKE: Final = 150e-6  # seconds; a client on the same machine needs 20 to 100 µs from a response to its next request
 
 
 class Client(Protocol):
@@ -79,6 +81,8 @@ class Port:
         self.proxies = proxies or TrustedProxies()
         self.date = _date()
         self.is_stopping = False
+        self._answered_at = 0.0
+        self._awake_until = 0.0
         self.is_empty = asyncio.Event()
         self.is_empty.set()
         self._clients: set[Client] = set()
@@ -103,6 +107,22 @@ class Port:
         """Return whether more memory is kept for clients than the limit."""
         return self.held.size > self._limits.held
 
+    def answered(self, began: float, now: float) -> None:
+        """Poll for 0.15 ms without sleeping if the request came within 0.15 ms of the last response.
+
+        After sleep, a processor runs the same code two to three times as slowly. Clients that send one request after
+        the other are therefore served sooner, for no more processor time. Other clients do not cause polling.
+
+        Args:
+            began: When the request began, by ``time.perf_counter``.
+            now: The time of its response, by the same clock.
+        """
+        if began < self._answered_at + _AWAKE:
+            if not self._awake_until:
+                self.loop.call_soon(self._poll)
+            self._awake_until = now + _AWAKE
+        self._answered_at = now
+
     def tick(self) -> None:
         """Update the Date field, and end all connections whose time is over; called every half second."""
         self.date = _date()
@@ -120,6 +140,13 @@ class Port:
         """Drop all remaining connections."""
         for client in list(self._clients):
             client.abort()
+
+    def _poll(self) -> None:
+        """Keep the event loop from sleeping, which it never does while a call is due."""
+        if time.perf_counter() < self._awake_until:
+            self.loop.call_soon(self._poll)
+        else:
+            self._awake_until = 0.0
 
 
 def _date() -> bytes:

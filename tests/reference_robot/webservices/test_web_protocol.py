@@ -2,6 +2,7 @@
 
 import asyncio
 import re
+import time
 
 import pytest
 from web_protocol import closed, request, runs, statuses, until
@@ -128,3 +129,20 @@ async def test_head_has_the_length_and_no_content_and_every_answer_a_date(robot)
     assert b"content-length: 4\r\n" in answer
     assert answer.endswith(b"\r\n\r\n")
     assert re.search(rb"\r\ndate: \w{3}, \d\d \w{3} \d{4} [\d:]{8} GMT\r\n", answer)
+
+
+@runs()
+async def test_the_event_loop_polls_after_requests_that_follow_at_once_and_only_then(robot):
+    async def processor_time(began, answered):
+        """Return the seconds of processor time that the event loop uses after a response, in 0.2 s."""
+        robot.port.answered(began, answered)
+        used = time.thread_time()
+        await asyncio.sleep(0.2)
+        return time.thread_time() - used
+
+    now = time.perf_counter()
+    assert await processor_time(now, now) < 0.01
+    assert await processor_time(now + 1, now + 2) < 0.01  # a second after the last response
+    later = time.perf_counter() + 0.1  # polls until then
+    assert await processor_time(now + 2, later) > 0.01
+    assert await processor_time(later + 1, later + 1) < 0.01
