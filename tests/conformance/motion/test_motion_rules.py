@@ -57,7 +57,7 @@ def test_a_right_device_behind_a_relay_breaks_no_rule(name, seed):
 
 @pytest.mark.parametrize("name", DEVICES)
 def test_mutants_by_rule_are_killed(name):
-    """At least 95 %, on each device; of the camera's, whose messages are SOAP and take ten times as long, every third."""
+    """At least 95 %, on each device; of the camera's, whose SOAP takes ten times as long, every third is tried."""
     tried = dict(list(MUTANTS[name].items())[:: 3 if name == "dome" else 1])
     survivors = [mutant for mutant, change in tried.items() if not _failed(name, change)[0]]
     assert len(MUTANTS[name]) >= 40
