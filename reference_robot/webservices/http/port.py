@@ -1,6 +1,7 @@
 """The state that the connections of one port share, and their limits."""
 
 import asyncio
+import os
 import time
 from dataclasses import dataclass
 from email.utils import formatdate
@@ -10,6 +11,7 @@ from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.proxies import TrustedProxies
 
 _AWAKE: Final = 150e-6  # seconds; a client on the same machine needs 20 to 100 µs from a response to its next request
+_CROWDED: Final = 2.0  # runnable processes for each processor, averaged over a minute
 
 
 class Client(Protocol):
@@ -83,6 +85,7 @@ class Port:
         self.is_stopping = False
         self._answered_at = 0.0
         self._awake_until = 0.0
+        self._may_poll = not _is_crowded()
         self.is_empty = asyncio.Event()
         self.is_empty.set()
         self._clients: set[Client] = set()
@@ -111,21 +114,23 @@ class Port:
         """Poll for 0.15 ms without sleeping if the request came within 0.15 ms of the last response.
 
         After sleep, a processor runs the same code two to three times as slowly. Clients that send one request after
-        the other are therefore served sooner, for no more processor time. Other clients do not cause polling.
+        the other are therefore served sooner, for no more processor time. Other clients do not cause polling, and on a
+        machine whose processors are in demand nothing does: there they do not sleep.
 
         Args:
             began: When the request began, by ``time.perf_counter``.
             now: The time of its response, by the same clock.
         """
-        if began < self._answered_at + _AWAKE:
+        if self._may_poll and began < self._answered_at + _AWAKE:
             if not self._awake_until:
                 self.loop.call_soon(self._poll)
             self._awake_until = now + _AWAKE
         self._answered_at = now
 
     def tick(self) -> None:
-        """Update the Date field, and end all connections whose time is over; called every half second."""
+        """Update the Date field and whether to poll, end connections whose time is over; called every half second."""
         self.date = _date()
+        self._may_poll = not _is_crowded()
         now = self.loop.time()
         for client in [client for client in self._clients if client.due <= now]:
             client.expire()
@@ -147,6 +152,11 @@ class Port:
             self.loop.call_soon(self._poll)
         else:
             self._awake_until = 0.0
+
+
+def _is_crowded() -> bool:
+    """Return whether other programs wait for the machine's processors."""
+    return os.getloadavg()[0] > _CROWDED * (os.cpu_count() or 1)
 
 
 def _date() -> bytes:

@@ -1,6 +1,7 @@
 """The HTTP connection by itself, in front of an interface that a test steers: requests, their order, ends."""
 
 import asyncio
+import os
 import re
 import time
 
@@ -132,7 +133,11 @@ async def test_head_has_the_length_and_no_content_and_every_answer_a_date(robot)
 
 
 @runs()
-async def test_the_event_loop_polls_after_requests_that_follow_at_once_and_only_then(robot):
+async def test_the_event_loop_polls_after_requests_that_follow_at_once_and_only_then(robot, monkeypatch):
+    load = [0.0]
+    monkeypatch.setattr(os, "getloadavg", lambda: (load[0], 0.0, 0.0))
+    robot.port.tick()
+
     async def processor_time(began, answered):
         """Return the seconds of processor time that the event loop uses after a response, in 0.2 s."""
         robot.port.answered(began, answered)
@@ -146,3 +151,7 @@ async def test_the_event_loop_polls_after_requests_that_follow_at_once_and_only_
     later = time.perf_counter() + 0.1  # polls until then
     assert await processor_time(now + 2, later) > 0.01
     assert await processor_time(later + 1, later + 1) < 0.01
+    load[0] = 2.1 * os.cpu_count()
+    robot.port.tick()
+    later = time.perf_counter() + 0.1
+    assert await processor_time(later, later) < 0.01, "polled on a crowded machine"
