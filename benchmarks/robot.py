@@ -46,6 +46,7 @@ MANY_CONNECTIONS = 32
 LEAST_RATES = {"GET pose": 30_000, "PUT delivery": 20_000, "SOAP ExecuteDeliveryRequest": 8_000}
 IDLE_CONNECTIONS, MOST_BESIDE_IDLE = 1000, 1.2  # times p50 without them
 CROWD, HUNG = 10_000, 30.0  # connections at once; seconds without a response
+LINGER = 3.0  # seconds after which refused connections no longer take descriptors of the robot
 REQUESTS_FOR_GROWTH = 200_000
 MORE_TIMES = 3
 MOST_GROWTH = 0.01  # by as many again
@@ -191,7 +192,9 @@ def crowd(name: str, call: Call) -> bool:
     """
     began = time.monotonic()
     outcomes = Counter(uvloop.run(_outcomes(call)))
-    took, later = time.monotonic() - began, uvloop.run(_outcome(call))
+    took = time.monotonic() - began
+    time.sleep(LINGER)
+    later = uvloop.run(_outcome(call))
     return report(
         f"{name}, {CROWD:,} connections at once: {dict(outcomes.most_common())} in {took:.1f} s, then {later}",
         # Too many open files, of this process or of the machine, are an OSError.
