@@ -49,13 +49,14 @@ class Drive:
         self._linear_too = False
         self._crowded = False
 
-    def command(self, velocity: Velocity, *, integers: bool = False, xml: bool = False) -> bool:
+    def command(self, velocity: Velocity, *, integers: bool = False, xml: bool = False, fresh: bool = False) -> bool:
         """PUT a velocity; return whether the response conforms to the contract.
 
         Args:
             velocity: a velocity within the robot's limits.
             integers: write whole numbers without a fraction.
             xml: send it as XML, if the robot sends its own as XML and takes it.
+            fresh: send it on a connection that is closed afterwards.
 
         Raises:
             NotPossibleError: the robot pursues a goal, so that it cannot be driven.
@@ -66,7 +67,7 @@ class Drive:
             exchange = self.robot.put(VELOCITY, whole)
         else:
             as_xml = put_velocity_as_xml(self.robot, velocity) if xml else None
-            exchange = as_xml if as_xml and as_xml.response.ok else self.robot.put_velocity(velocity)
+            exchange = as_xml if as_xml and as_xml.response.ok else self.robot.put_velocity(velocity, fresh=fresh)
         return self._commanded(Command(velocity, sent, self.clock.now(), exchange, integers=integers))
 
     def command_linear(self, velocity: Velocity) -> bool:

@@ -28,8 +28,9 @@ _LATE_S: Final = 0.02
 _GAP: Final = 0.25
 # Where no hold time is declared a velocity has to end within so long, s.
 _ENDS_S: Final = 10.0
-#: How a velocity is commanded last: by both parts, by a PUT of the linear part, or by both as XML.
-Way = Literal["velocity", "linear", "xml"]
+#: How a velocity is commanded last: by both parts, by a PUT of the linear part, by both as XML, or on a connection that
+#: is then closed.
+Way = Literal["velocity", "linear", "xml", "closing"]
 
 
 def certain_s(hold_s: float | None, share: float = _COUNTED_ON) -> float:
@@ -53,7 +54,7 @@ class LetGo:
         turns: the readings since.
         resumed: the first reading after a pause without requests; None: there was no pause.
         due: when the pause was to end, s of the run's clock; None: there was no pause.
-        by: what the last command was: the velocity, its linear part, or the velocity as XML.
+        by: what the last command was.
     """
 
     velocity: Velocity
@@ -67,9 +68,12 @@ class LetGo:
     @property
     def command(self) -> str:
         """Return what commanded the velocity, as a noun phrase."""
-        return {"linear": "a PUT of its linear part", "xml": "a PUT of the velocity as XML"}.get(
-            self.by, "a PUT of the velocity"
-        )
+        return {
+            "velocity": "a PUT of the velocity",
+            "linear": "a PUT of its linear part",
+            "xml": "a PUT of the velocity as XML",
+            "closing": "a PUT of the velocity whose connection was closed",
+        }[self.by]
 
     def holds_by(self, limits: Limits, count: int) -> bool | None:
         """Return whether the first ``count`` readings end with the velocity; None where they are too few to tell."""

@@ -189,15 +189,15 @@ class Robot:
         value, problem = read_as(exchange.response, shape)
         return (None if problem else projected(value, shape.schema)), exchange
 
-    def put(self, path: str, value: Mapping[str, Any]) -> Exchange:
-        """PUT JSON that is valid by the contract's schema.
+    def put(self, path: str, value: Mapping[str, Any], *, fresh: bool = False) -> Exchange:
+        """PUT JSON that is valid by the contract's schema; ``fresh``: on a connection that is closed afterwards.
 
         Raises:
             HarnessError: the value is not valid by the schema.
         """
         body = body_of(value)
         require_valid(self._contract, "PUT", path, JSON, body)
-        return self.rest.send("PUT", path, headers=JSON_BODY, body=body)
+        return self.rest.send("PUT", path, headers=JSON_BODY, body=body, fresh=fresh)
 
     def odometry(self) -> Odometry | None:
         """GET the odometry; None where the response is invalid (the observers have judged it)."""
@@ -225,9 +225,9 @@ class Robot:
         vector, exchange = self.read(LINEAR, VECTOR3)
         return (None if vector is None else Velocity(*(float(vector[axis]) for axis in "xyz"))), exchange
 
-    def put_velocity(self, velocity: Velocity) -> Exchange:
-        """PUT a velocity."""
-        return self.put(VELOCITY, velocity.twist)
+    def put_velocity(self, velocity: Velocity, *, fresh: bool = False) -> Exchange:
+        """PUT a velocity; ``fresh``: on a connection that is closed afterwards."""
+        return self.put(VELOCITY, velocity.twist, fresh=fresh)
 
     def put_linear(self, velocity: Velocity) -> Exchange:
         """PUT the linear part of a velocity."""

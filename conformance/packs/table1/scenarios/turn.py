@@ -67,41 +67,38 @@ def further_axes(robot: Robot) -> Driven:
 
 
 def unrenewed(
-    bent: Velocity, ahead: Velocity, limits: tuple[Velocity, ...], effort: str, seed: int
+    bent: Velocity, ahead: Velocity, others: tuple[Velocity, ...], effort: str, seed: int
 ) -> list[tuple[Velocity, Way]]:
     """Return velocities that are not renewed, and what commands them last.
 
-    A robot may keep a watchdog for each path, one for each sign, and one for velocities at its limits. One at the
-    limits that drives ahead is the one of its path and sign. At the effort "quick" the seed says which is tried.
+    A robot may keep a watchdog for each path, for each sign, for each part, and for small or large velocities. At the
+    effort "quick" the seed says which one is tried.
 
     Args:
         bent: a velocity along an arc.
         ahead: its opposite, or as much of it as the robot can drive.
-        limits: velocities at the limits, of which the seed says one; at the effort "deep" all are tried.
+        others: velocities of another size or with one part alone; the first one's connection is closed.
         effort: quick, standard or deep.
         seed: of the run.
     """
-    chance = random.Random(f"{seed}/ways")  # noqa: S311 - no secret
-    limits = tuple(chance.sample(limits, len(limits)))
     ways: list[tuple[Velocity, Way]] = [
         (bent, "linear" if bent.linear_x else "velocity"),
         (bent, "velocity"),
         (ahead, "linear" if ahead.linear_x else "velocity"),
-        (limits[0], "velocity"),
+        *((one, "velocity" if number else "closing") for number, one in enumerate(others)),
         (ahead, "xml"),
     ]
-    if limits[0].linear_x <= 0:
+    if effort == "deep" or not any(one.linear_x * ahead.linear_x > 0 for one in others):
         ways.append((ahead, "velocity"))
+    ways = [way for way in dict.fromkeys(ways) if any(way[0])]
     if effort == "quick":
-        ways = [chance.choice(ways)]
-    elif effort != "standard":
-        ways += [(one, "velocity") for one in (*limits, ahead)]
-    return [way for way in dict.fromkeys(ways) if any(way[0])]
+        return random.Random(f"{seed}/ways").sample(ways, min(1, len(ways)))  # noqa: S311 - no secret
+    return ways
 
 
 def _slow_part(limit: float, seen_from_rest: float) -> float:
     """Return a slow velocity in one component whose limit is given; one of ``seen_from_rest`` may be taken for rest."""
-    return min(max(0.2 * limit, 4 * seen_from_rest), 0.6 * limit)
+    return min(max(0.1 * limit, 4 * seen_from_rest), 0.6 * limit)
 
 
 @dataclass
@@ -159,16 +156,20 @@ class _Turning:
         if robot.limits.hold_s is None:
             return [(bent, "velocity")]
         ahead = robot.drivable(Velocity(*(-one for one in bent)))
-        limits = (self._slow(), self.fastest) if robot.actuated(ABOUT) else (ahead,)
-        return unrenewed(bent, ahead, limits, run.effort.name, run.seed)
+        return unrenewed(bent, ahead, (*self._slow(run.seed), self.fastest), run.effort.name, run.seed)
 
-    def _slow(self) -> Velocity:
-        """Return a slow turn to the left, ahead where the robot drives ahead, that can be told from rest."""
-        limits, noise = self.robot.limits, self.robot.limits.noise
-        ahead = limits.range_of(AHEAD)[1] if self.robot.actuated(AHEAD) else 0.0
-        linear = _slow_part(ahead, limits.tolerance_linear_m_s + FARTHEST * noise.linear_m_s)
-        angular = _slow_part(limits.angular_rad_s, limits.tolerance_angular_rad_s + FARTHEST * noise.angular_rad_s)
-        return self.robot.drivable(Velocity(linear_x=linear, angular_z=angular))
+    def _slow(self, seed: int) -> list[Velocity]:
+        """Return a slow drive and a slow turn that can be told from rest, each in the direction that the seed says."""
+        limits, noise, chance = self.robot.limits, self.robot.limits.noise, random.Random(f"{seed}/slow")  # noqa: S311
+        found: list[Velocity] = []
+        for component, off in (
+            (AHEAD, limits.tolerance_linear_m_s + FARTHEST * noise.linear_m_s),
+            (ABOUT, limits.tolerance_angular_rad_s + FARTHEST * noise.angular_rad_s),
+        ):
+            least, greatest = limits.range_of(component)
+            end = chance.choice([one for one in (least, greatest) if one] or [0.0])
+            found.append(self.robot.only(component, math.copysign(_slow_part(abs(end), off), end)))
+        return found
 
     def along(self, component: int) -> None:
         """Drive along one more axis, slowly and as fast as the robot can, there and back, and let it go."""
@@ -264,13 +265,13 @@ class _Turning:
             drive.refresh(turning)
         # Given again once: a robot that takes that for a repetition ends it clearly too early.
         if (
-            by == "xml"
+            by in {"xml", "closing"}
             or limits.hold_s is None
             or not self.tries
             or clock.now() > drive.trace.full_sent + _SOON * limits.hold_s
         ):
             drive.keep(drive.trace.full_sent + _AGAIN * (limits.hold_s or 0.0) - clock.now())
-            drive.command(turning, xml=by == "xml")
+            drive.command(turning, xml=by == "xml", fresh=by == "closing")
         last = drive.trace.last_full
         if last is None or not drive_rules.answer_of(last).holds:
             return None
