@@ -179,7 +179,8 @@ def test_delete_twice(api: RestInterface, judge: Judge) -> None:
             call.send(api)
             read = by_path.get(operation.template)
             before = _after_a_while(api, read)
-            exchange = call.send(api)
+            # Many clients say that it has no content, which is no other request.
+            exchange = call.send(api, ("Content-Length", "0"))
             expect(judge, "http/delete-idempotent", exchange).status("2xx", 404, when="it is the second DELETE")
             after = _after_a_while(api, read)
             # A robot with a mission waiting may have begun it in between: that is no effect of the DELETE.

@@ -46,7 +46,6 @@ class Drive:
         self.robot, self.clock = robot, robot.clock
         self.trace = Trace(self.clock.now())
         self._turn_at = 0.0
-        self._linear_too = False
         self._crowded = False
 
     def command(self, velocity: Velocity, *, integers: bool = False, xml: bool = False, fresh: bool = False) -> bool:
@@ -168,7 +167,7 @@ class Drive:
         self.reach(velocity)
 
     def look(self) -> tuple[Velocity | None, Exchange]:
-        """GET odometry, velocity and every other time linear velocity; return the velocity and its exchange."""
+        """GET odometry, velocity and linear velocity; return the velocity and its exchange."""
         wait = self._turn_at + _PACE_S - self.clock.now()
         if wait > 0:
             self.clock.sleep(wait)
@@ -176,9 +175,7 @@ class Drive:
         odometry = self.robot.odometry()
         at = self.clock.now()
         velocity, exchange = self.robot.velocity()
-        self._linear_too = not self._linear_too
-        linear = self.robot.linear() if self._linear_too else (None, exchange)
-        self.trace = self.trace.looked(Turn(odometry, at, velocity, exchange, *linear))
+        self.trace = self.trace.looked(Turn(odometry, at, velocity, exchange, *self.robot.linear()))
         return velocity, exchange
 
     def glance(self) -> None:

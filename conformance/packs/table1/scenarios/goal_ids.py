@@ -32,6 +32,8 @@ _KNOWN: Final = (
     " with spaces ",
     "A",
 )
+# Ids that a robot which folds letters or compares the first characters takes for one.
+_ALIKE: Final = ("goal", "Goal", "a" * 64 + "1", "a" * 64 + "2")
 _READINGS: Final = 3
 
 
@@ -53,6 +55,8 @@ def goal_ids(robot: Robot, explore: Explorer) -> tuple[Put, ...]:
     try:
         # Also with little effort: as octets it is twice as long.
         explore(st.just("\u00e9" * _LONGEST), put, cases=1)
+        for id_ in _ALIKE:
+            put(id_)
         explore(st.one_of(st.sampled_from(_KNOWN), st.text(_CHARACTERS, min_size=1, max_size=_LONGEST)), put, cases=40)
         robot.delete_goal()
         await_none(robot)

@@ -53,7 +53,7 @@ def plans_from_robot(robot: Robot, explore: Explorer) -> PlansFromRobot:
             st.one_of(st.floats(0.3, 1.0), st.floats(1.0, 6.0)),
             st.floats(-math.pi, math.pi),
             st.floats(-math.pi, math.pi),
-            st.sampled_from((0.1, 0.2, 0.5)),
+            st.sampled_from((0.1, 0.2, 0.5, 0.0)),
         ),
         lambda case: request(here.ahead(case[0], case[1])._replace(yaw=case[2]), case[3]),
         cases=40,

@@ -11,7 +11,7 @@ from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART
 from conformance.packs.table1.robot.goals import make_room
 from conformance.packs.table1.robot.letting_go import LetGo, Way, ends_by
-from conformance.packs.table1.robot.robot import FARTHEST, STILL, Robot, Velocity
+from conformance.packs.table1.robot.robot import FARTHEST, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.undisturbed import arc, renewed
 from conformance.packs.table1.robot.velocity_range import both, fastest, handy, reach, slowest_along
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S, SEVERAL
@@ -32,6 +32,7 @@ _ATTEMPTS: Final = 3
 _WHOLE: Final = 1.0
 # Of the limit: how fast the robot drives along an arc.
 _ASIDE: Final = 0.3
+_NOT_ACCEPTABLE: Final = (("Accept", "image/png"),)
 # In this time several samples come, from any robot, s.
 _SAMPLES_S: Final = (SEVERAL + 1) * LONGEST_SAMPLE_S
 
@@ -288,7 +289,9 @@ class _Turning:
             if let_go.is_decided(limits, ends):
                 return let_go
             if resumed is None and clock.now() > silent_from:
+                # What is refused renews nothing: neither a command nor a read.
                 robot.put_velocity(Velocity(angular_z=1e4))
+                robot.rest.send("GET", VELOCITY, headers=_NOT_ACCEPTABLE)
                 silent_s = (1 + _BRIEF) * (limits.hold_s or 0.0) if self.brief else let_go.longest(limits)
                 due = max(clock.now(), answered + silent_s)
                 clock.sleep(due - clock.now())

@@ -4,8 +4,10 @@ from functools import partial
 from typing import Final, NamedTuple
 
 from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.geometry import Pose
+from conformance.packs.table1.robot.goal import goal_body
 from conformance.packs.table1.robot.message_shapes import body_of
-from conformance.packs.table1.robot.robot import LINEAR, VELOCITY, Robot
+from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, VELOCITY, Robot
 from conformance.packs.table1.robot.standstill import Standstill, watch_rest
 from conformance.packs.table1.robot.standstill_trace import Rest
 from conformance.scenarios.scenario import scenario
@@ -42,7 +44,10 @@ _PARTS: Final = (
     _Part(VELOCITY, 1.0, None, reset=False),
     _Part(LINEAR, 1.0, 10, reset=False),
     _Part(LINEAR, 1.0, None, reset=True),
+    _Part(GOAL_PATH, 1.0, 10, reset=False),
 )
+# How far away the goal is, m.
+_AWAY_M: Final = 1.0
 
 
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.STANDSTILL)
@@ -77,7 +82,11 @@ def _vanish(robot: Robot, part: _Part) -> None:
     """Begin a request that would move the robot, ahead or back, and close the connection before it ends."""
     sign = 1 if part.reset else -1
     fast = robot.share_of_limits(0.3 * sign, 0.5 * sign)
-    body = body_of(fast.twist if part.path == VELOCITY else fast.linear)
+    if part.path == GOAL_PATH:
+        goal = (robot.map_pose() or Pose(0.0, 0.0, 0.0)).ahead(_AWAY_M)
+        body = body_of(goal_body(goal, robot.statement.motion.frame, "vanished"))
+    else:
+        body = body_of(fast.twist if part.path == VELOCITY else fast.linear)
     sent = body[: int(part.share * len(body))]
     promised = None if part.lacking is None else len(body) + part.lacking
     request = PartialRequest(robot.rest, "PUT", part.path, sent=sent, promised=promised)
