@@ -8,7 +8,7 @@ from conformance.mutation.changes import parsed, plain, problem, rest, success
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.in_background import later
-from conformance.packs.table1.mutants.paths import GOAL
+from conformance.packs.table1.mutants.paths import GOAL, LINEAR, VELOCITY
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("rest-resources", "rest")
@@ -114,6 +114,58 @@ class _OnlyOnce:
         if id_ is not None and success(response):
             self._used.add(id_)
         return response
+
+
+@_mutant(
+    "goal-replaced-for-good", "goal-put", "PUT of a goal whose id a replaced goal had returns 200 and changes nothing."
+)
+class _ReplacedForGood:
+    def __init__(self) -> None:
+        self._replaced: set[str] = set()
+        self._current: str | None = None
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        id_ = identity(request) if _PUT(request) else None
+        if id_ is not None and id_ in self._replaced:
+            return plain(204)(request)
+        response = forward(request)
+        if _PUT(request) and success(response):
+            if self._current is not None and self._current != id_:
+                self._replaced.add(self._current)
+            self._current = id_
+        elif _DELETE(request):
+            self._replaced, self._current = set(), None
+        return response
+
+
+@_mutant("goal-id-folded", "goal-get", "Goal ids that differ in upper and lower case are one.")
+def _folded(request: Request, forward: Forward) -> Response:
+    id_ = identity(request) if _PUT(request) else None
+    known = active(forward, request) if id_ is not None else None
+    shown = str(known["goal_id"]["id"]) if known else None
+    if id_ is not None and shown is not None and id_ != shown and id_.lower() == shown.lower():
+        return plain(204)(request)
+    return forward(request)
+
+
+@_mutant("goal-dropped-by-refusal", "goal-get", "A velocity that is refused ends the goal.")
+def _dropped_by_refusal(request: Request, forward: Forward) -> Response:
+    response = forward(request)
+    if rest("PUT", VELOCITY, LINEAR)(request) and 400 <= response.status < 500:
+        fields = [("Host", "localhost"), ("Connection", "close")]
+        forward(request.copy(method="DELETE", target=GOAL, body=b"", fields=fields))
+    return response
+
+
+@_mutant("goal-conflict-by-place-alone", "goal-conflict", "Another heading under the active goal's id is a repetition.")
+def _by_place(request: Request, forward: Forward) -> Response:
+    id_ = identity(request) if _PUT(request) else None
+    known = active(forward, request) if id_ is not None else None
+    if known and str(known["goal_id"]["id"]) == id_:
+        wanted, shown = pose_of(parsed(request.body)), pose_of(known)
+        if wanted is not None and shown is not None and wanted["position"] == shown["position"]:
+            return plain(204)(request)
+    return forward(request)
 
 
 @_mutant("goal-abandoned", "goal-drives", "The robot aborts the goal before it arrives.")

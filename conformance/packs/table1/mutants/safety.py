@@ -211,21 +211,49 @@ _mutant("safety-relentless", "watchdog", "The robot drives on for 10 s after a v
 )
 
 
-class _GoingOnAfterXml(_GoingOn):
-    """The same for velocities that are sent as XML."""
+class _GoingOnAfter(_GoingOn):
+    """The same for some velocities only."""
 
-    def __call__(self, request: Request, forward: Forward) -> Response:
-        response = forward(request)
-        if (_PUT(request) or _PUT_GOAL(request)) and success(response):
-            self._turn += 1
-            if "xml" in request.media_type:
-                self.begin(request, forward)
-        return response
+    def __init__(self, when: Callable[[Request], bool]) -> None:
+        super().__init__(lambda request, forward: forward(request.copy()), 0.15, 10.0)
+        self._when = when
+
+    def begin(self, request: Request, forward: Forward) -> None:
+        """Go on if it is one of these velocities."""
+        if self._when(request):
+            super().begin(request, forward)
 
 
 _mutant(
     "safety-relentless-after-xml", "watchdog", "The robot drives on for 10 s after a velocity that was sent as XML."
-).made(lambda: _GoingOnAfterXml(lambda request, forward: forward(request.copy()), 0.15, 10.0))
+).made(lambda: _GoingOnAfter(lambda request: "xml" in request.media_type))
+_mutant(
+    "safety-relentless-when-slow", "watchdog", "The robot drives on for 10 s straight ahead or back at up to 0.1 m/s."
+).made(lambda: _GoingOnAfter(lambda request: 0 < abs(speeds(request)[0]) <= 0.1 and not speeds(request)[1]))
+_mutant("safety-relentless-to-one-side", "watchdog", "The robot drives on for 10 s ahead and to the right.").made(
+    lambda: _GoingOnAfter(lambda request: speeds(request)[0] > 0 > speeds(request)[1])
+)
+_mutant(
+    "safety-relentless-when-closed", "watchdog", "The robot drives on for 10 s after a velocity with Connection: close."
+).made(lambda: _GoingOnAfter(lambda request: (request.field("Connection") or "").lower() == "close"))
+
+
+@_mutant("safety-relentless-after-a-read", "hold-ends", "GET of the velocity with 406 renews a velocity command.")
+class _RenewedByRead:
+    def __init__(self) -> None:
+        self._last: Request | None = None
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        if _PUT(request) and success(response):
+            self._last = request.copy() if _moving(request) else None
+        elif _PUT_GOAL(request) and success(response):
+            self._last = None
+        elif rest("GET", VELOCITY)(request) and response.status == 406 and self._last is not None:
+            forward(self._last.copy())
+        return response
+
+
 _mutant("safety-long-winded", "hold-ends", "A velocity command holds 1.5 times as long as declared.").made(
     lambda: _GoingOn(_again, 0.55)
 )

@@ -2,6 +2,7 @@
 
 import json
 import operator
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -236,3 +237,21 @@ _mutant(
 _mutant("linear-put-created", "linear-put", "PUT of a linear velocity returns 201.").altered(
     _PUT_LINEAR, becomes(201), status(200, 204)
 )
+
+
+@_mutant("linear-as-commanded", "linear-agrees", "GET of the linear velocity returns the commanded one for a second.")
+class _LinearCommanded:
+    def __init__(self) -> None:
+        self._last: Any = None
+        self._until = 0.0
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        value: Any = parsed(request.body)
+        if (_PUT(request) or _PUT_LINEAR(request)) and response.status in {200, 204} and isinstance(value, dict):
+            self._last, self._until = value.get("linear", value), time.monotonic() + 1.0
+        if _GET_LINEAR(request) and response.status == 200 and time.monotonic() < self._until:
+            shown: Any = parsed(response.body)
+            if isinstance(shown, dict):
+                response.body = json.dumps(self._last).encode()
+        return response

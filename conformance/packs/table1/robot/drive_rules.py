@@ -17,6 +17,8 @@ from conformance.transport.exchange import Exchange
 
 # What was measured for so long alike is steady: readings of two resources may be compared, s.
 _STEADY_S: Final = 0.3
+# So many readings in a row that are off while the velocity changes are no matter of samples.
+_IN_A_ROW: Final = 5
 # More turns than are in any window.
 _LOOKED_AT: Final = 200
 #: Two writings of one double are no farther apart than this, whatever is accepted.
@@ -66,6 +68,32 @@ def _readings(trace: Trace, limits: Limits) -> Iterator[tuple[str, Outcome]]:
             fastest = speed(seen)
             if fastest is not None:
                 yield _LIMITS_HOLD, fastest
+    yield from ((_AGREEMENT[1], case) for case in _in_between(trace, limits))
+
+
+def _in_between(trace: Trace, limits: Limits) -> Iterator[Case]:
+    """Judge whether the linear velocity changes with the velocity: each between the velocities before and after it.
+
+    It may be ahead or behind by as much as the velocity changes from one look to the next, as one of them may come from
+    a newer sample. Only several in a row that are farther off are a difference.
+    """
+    off = 0
+    for turn, later in itertools.pairwise(trace.turns):
+        before, after = turn.velocity, later.velocity
+        if before is None or after is None or turn.linear is None or before[:3] == after[:3]:
+            continue
+        apart = [abs(one - other) for one, other in zip(before[:3], after[:3], strict=True)]
+        least, greatest = (
+            [end(one, other) + way * step for one, other, step in zip(before[:3], after[:3], apart, strict=True)]
+            for end, way in ((min, -1), (max, 1))
+        )
+        nearest = Velocity(*map(max, least, map(min, greatest, turn.linear[:3])))
+        off = 0 if is_near(limits, turn.linear, nearest) else off + 1
+        if off == _IN_A_ROW:
+            expected = f"a linear part between {rounded(before)} and {rounded(after)}, the velocities around it"
+            found, cause = str(turn.linear), "does not change with the velocity"
+            yield Case(holds=False, exchange=turn.linear_exchange, expected=expected, observed=found, cause=cause)
+            return
 
 
 def _ways(trace: Trace, limits: Limits) -> Iterator[tuple[str, Outcome]]:

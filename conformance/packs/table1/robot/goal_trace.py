@@ -90,9 +90,11 @@ class GoalLife:
         velocity: the response to a velocity PUT while a goal was active; None: no velocity was sent.
         drive: commands and readings of that velocity, where the robot accepted it.
         linear: the response to a PUT of a linear velocity after it; None: none was sent.
+        kept: velocities that were refused while a goal was active, with the goal that the robot then showed.
         second: the PUT of another goal without an id.
         now_s: the stamp of the robot's odometry after that, s; None: it could not be read.
         took_s: the time from the PUT to that reading, s.
+        reused: the PUT of another pose under the first goal's id, after that goal had been replaced.
         renamed: whether the robot accepted the second goal only with an id; None: it accepted it without one.
         cancelled: DELETEs of the active goal; empty: the goal had ended before.
         cancels: all DELETEs that were sent while a goal was active, also where the goal had ended when they arrived.
@@ -107,9 +109,11 @@ class GoalLife:
     velocity: Exchange | None = None
     drive: Trace | None = None
     linear: Exchange | None = None
+    kept: tuple[Put, ...] = ()
     second: Put | None = None
     now_s: float | None = None
     took_s: float = 0.0
+    reused: Put | None = None
     renamed: bool | None = None
     cancelled: tuple[Cancelled, ...] = ()
     cancels: tuple[Exchange, ...] = ()

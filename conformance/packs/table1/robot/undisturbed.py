@@ -10,7 +10,7 @@ from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART
 from conformance.packs.table1.robot.letting_go import certain_s
-from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
+from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, STILL, Robot, Velocity
 
 # Beyond any limit, or not to be actuated; and by the linear part alone.
 _BAD: Final = (Velocity(linear_x=-1e3), Velocity(linear_x=1e308, angular_z=-1e308), Velocity(angular_z=1e4))
@@ -123,8 +123,7 @@ def _renew(
         else:
             drive.clock.sleep(max(_STEP_S, min(due, begun + times.renewed_s) - drive.clock.now()))
     for bad in refused:
-        robot.put_velocity(bad)
-        robot.put_linear(_BAD_LINEAR)
+        _put_bad(robot, bad)
     drive.clock.sleep(max(0.0, max(begun + times.seen_s, reached) - drive.clock.now()))
     alone = robot.usual_s > _QUICK_S
     lasts, found = drive.sees(turning, 2, until=drive.trace.sent + times.holds_s, alone=alone)
@@ -148,14 +147,20 @@ def _refused(robot: Robot, drive: Drive, turning: Velocity) -> None:
     """Send velocities that the robot must reject, and record whether it turns as before."""
     for bad in _BAD:
         drive.refresh(turning)
-        robot.put_velocity(bad)
-        robot.put_linear(_BAD_LINEAR)
+        _put_bad(robot, bad)
         drive.look()
     drive.keep(min(_SHOWS_S, drive.holds_until - drive.clock.now()))
     keeps, found = drive.sees(turning, 2, until=drive.holds_until)
     # Where it is too late to say, the velocity of a slow robot may have ended by itself.
     expected = f"the velocity that was there before the refused ones, {turning}"
     drive.saw("safety/refused-keeps", expected, found, "changed", holds=keeps)
+
+
+def _put_bad(robot: Robot, bad: Velocity) -> None:
+    """Send a velocity, a linear part and a goal that the robot must reject."""
+    robot.put_velocity(bad)
+    robot.put_linear(_BAD_LINEAR)
+    robot.rest.send("PUT", GOAL_PATH, headers=JSON_BODY, body=b"{}")
 
 
 def arc(robot: Robot, drive: Drive, bent: Velocity, before: Velocity) -> None:

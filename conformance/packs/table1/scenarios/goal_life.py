@@ -20,11 +20,12 @@ from conformance.packs.table1.robot.goal import (
 )
 from conformance.packs.table1.robot.goal_trace import Cancelled, GoalLife, NoGoal, Put
 from conformance.packs.table1.robot.goals import choose_goals, meanwhile
-from conformance.packs.table1.robot.robot import LINEAR, STILL, Robot, Velocity
+from conformance.packs.table1.robot.robot import JSON_BODY, LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.standstill import Standstill, watch_rest
 from conformance.packs.table1.robot.standstill_trace import Rest
 from conformance.scenarios.scenario import PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.transport.exchange import Exchange
 
 ID: Final = "goal 1/\u00e9\u4e2d?&\"'<>\\ of the suite"
 _CANCELING: Final = 3
@@ -34,6 +35,8 @@ _LOOK_S: Final = 0.1
 _STAYS_S: Final = 1.3
 _STEP_S: Final = 0.02
 _TIMES: Final = 3
+# Another heading than a goal's, rad.
+_OTHER_RAD: Final = 1.0
 _AFTER: Final = "the goal was cancelled"
 
 
@@ -79,12 +82,15 @@ class _Player:
             meanwhile(robot, ID, lambda _, pose, __: self._put_back(pose))
         if not self._contradict(first, goal_body(back, frame, ID), there):
             meanwhile(robot, ID, lambda body, pose, other: self._contradict(body, other, pose))
-        self._velocity_meanwhile()
+        if robot.actuated(5):
+            self._contradict(first, goal_body(there._replace(yaw=there.yaw + _OTHER_RAD), frame, ID), there)
+        self._velocity_meanwhile(first, there)
         if robot.goal()[0] is None:
             put_goal(robot, first)  # a robot may end a goal when it takes a velocity
         second = goal_body(back, frame)
         second["goal"]["target_pose"]["header"]["stamp"] = {"sec": 0, "nanosec": 0}
         self._displace(second, back)
+        self.life = replace(self.life, reused=put_new(robot, goal_body(back, frame, ID), back))
         await_motion(robot)
         if not self._cancel(back):
             meanwhile(robot, ID, lambda _, pose, __: self._cancel(pose))
@@ -137,16 +143,31 @@ class _Player:
         self.life = replace(self.life, contradicted=(*self.life.contradicted, put))
         return True
 
-    def _velocity_meanwhile(self) -> None:
-        """Command a velocity while a goal is active."""
+    def _velocity_meanwhile(self, body: dict[str, Any], there: Pose) -> None:
+        """Command velocities while a goal is active: one that is invalid, one of both parts, and a linear one."""
         robot, drive = self.robot, Drive(self.robot)
+        self._keeps(robot.rest.send("PUT", VELOCITY, headers=JSON_BODY, body=b"{}"), body, there)
         slow, sent = slow_turn(robot), robot.clock.now()
         exchange = robot.put_velocity(slow)
+        self._keeps(exchange, body, there)
         if exchange.response.ok and drive.look_s < _LOOK_S:
             drive.commanded(slow, sent, exchange)
             drive.reach(slow, "rest-resources/velocity-goal")
         linear = robot.put(LINEAR, STILL.linear)
+        if not exchange.response.ok:  # else the robot may have ended the goal for it
+            self._keeps(linear, body, there)
         self.life = replace(self.life, velocity=exchange, drive=drive.trace, linear=linear)
+
+    def _keeps(self, exchange: Exchange, body: dict[str, Any], there: Pose) -> None:
+        """Record the goal after a velocity that the robot refused, unless a goal was not active or may have ended."""
+        before = any(put.shown is not None for put in self.life.contradicted[-1:])
+        if not before or not HTTPStatus.BAD_REQUEST <= exchange.response.status < HTTPStatus.INTERNAL_SERVER_ERROR:
+            return
+        goal, read = self.robot.goal()
+        if goal is None and arrived(self.robot, there):
+            return
+        put = Put(exchange, body, goal, read, read.came if goal is None else difference(goal, body), ended=False)
+        self.life = replace(self.life, kept=(*self.life.kept, put))
 
     def _displace(self, body: dict[str, Any], pose: Pose) -> None:
         """PUT another goal, without an id, while one is active."""

@@ -1,7 +1,6 @@
 """Turning: at the highest speed, renewed also after rejected commands, along an arc, and at last not renewed."""
 
 import math
-import random
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -11,8 +10,9 @@ from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART
 from conformance.packs.table1.robot.goals import make_room
 from conformance.packs.table1.robot.letting_go import LetGo, Way, ends_by
-from conformance.packs.table1.robot.robot import FARTHEST, STILL, VELOCITY, Robot, Velocity
+from conformance.packs.table1.robot.robot import STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.undisturbed import arc, renewed
+from conformance.packs.table1.robot.unrenewed import slow, unrenewed
 from conformance.packs.table1.robot.velocity_range import both, fastest, handy, reach, slowest_along
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S, SEVERAL
 from conformance.packs.table1.scenarios.trace import Driven
@@ -65,41 +65,6 @@ def further_axes(robot: Robot) -> Driven:
     except Exception as error:
         raise PartialTraceError(driving.recorded) from error
     return driving.recorded
-
-
-def unrenewed(
-    bent: Velocity, ahead: Velocity, others: tuple[Velocity, ...], effort: str, seed: int
-) -> list[tuple[Velocity, Way]]:
-    """Return velocities that are not renewed, and what commands them last.
-
-    A robot may keep a watchdog for each path, for each sign, for each part, and for small or large velocities. At the
-    effort "quick" the seed says which one is tried.
-
-    Args:
-        bent: a velocity along an arc.
-        ahead: its opposite, or as much of it as the robot can drive.
-        others: velocities of another size or with one part alone; the first one's connection is closed.
-        effort: quick, standard or deep.
-        seed: of the run.
-    """
-    ways: list[tuple[Velocity, Way]] = [
-        (bent, "linear" if bent.linear_x else "velocity"),
-        (bent, "velocity"),
-        (ahead, "linear" if ahead.linear_x else "velocity"),
-        *((one, "velocity" if number else "closing") for number, one in enumerate(others)),
-        (ahead, "xml"),
-    ]
-    if effort == "deep" or not any(one.linear_x * ahead.linear_x > 0 for one in others):
-        ways.append((ahead, "velocity"))
-    ways = [way for way in dict.fromkeys(ways) if any(way[0])]
-    if effort == "quick":
-        return random.Random(f"{seed}/ways").sample(ways, min(1, len(ways)))  # noqa: S311 - no secret
-    return ways
-
-
-def _slow_part(limit: float, seen_from_rest: float) -> float:
-    """Return a slow velocity in one component whose limit is given; one of ``seen_from_rest`` may be taken for rest."""
-    return min(max(0.1 * limit, 4 * seen_from_rest), 0.6 * limit)
 
 
 @dataclass
@@ -157,20 +122,8 @@ class _Turning:
         if robot.limits.hold_s is None:
             return [(bent, "velocity")]
         ahead = robot.drivable(Velocity(*(-one for one in bent)))
-        return unrenewed(bent, ahead, (*self._slow(run.seed), self.fastest), run.effort.name, run.seed)
-
-    def _slow(self, seed: int) -> list[Velocity]:
-        """Return a slow drive and a slow turn that can be told from rest, each in the direction that the seed says."""
-        limits, noise, chance = self.robot.limits, self.robot.limits.noise, random.Random(f"{seed}/slow")  # noqa: S311
-        found: list[Velocity] = []
-        for component, off in (
-            (AHEAD, limits.tolerance_linear_m_s + FARTHEST * noise.linear_m_s),
-            (ABOUT, limits.tolerance_angular_rad_s + FARTHEST * noise.angular_rad_s),
-        ):
-            least, greatest = limits.range_of(component)
-            end = chance.choice([one for one in (least, greatest) if one] or [0.0])
-            found.append(self.robot.only(component, math.copysign(_slow_part(abs(end), off), end)))
-        return found
+        across = robot.drivable(ahead._replace(angular_z=-ahead.angular_z))
+        return unrenewed(bent, ahead, across, (*slow(robot, run.seed), self.fastest), run.effort.name, run.seed)
 
     def along(self, component: int) -> None:
         """Drive along one more axis, slowly and as fast as the robot can, there and back, and let it go."""

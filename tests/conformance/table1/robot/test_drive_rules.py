@@ -161,3 +161,28 @@ def test_times_of_commands():
     assert (trace.sent, trace.full_sent, trace.answered) == (7.0, 6.0, 7.01)
     trace = trace.commanded(command(at=8.0, linear_only=True, renewal=True))
     assert (trace.sent, trace.full_sent, trace.answered) == (8.0, 6.0, 7.01)
+
+
+def sped_up(linear) -> Trace:
+    """A second of speeding up, with what the linear velocity is at each of its steps."""
+    trace = Trace(0.0).commanded(command())
+    for step in range(20):
+        velocity = Velocity(linear_x=0.03 * step)
+        trace = trace.looked(turn(0.02 * step, velocity, velocity, Velocity(linear_x=linear(step))))
+    return trace
+
+
+@pytest.mark.parametrize(
+    ("linear", "differs"),
+    [
+        (lambda step: 0.03 * step + 0.01, False),
+        (lambda step: 0.03 * (step + 1.5), False),  # from a newer sample
+        (lambda step: max(0.0, 0.03 * (step - 1)), False),  # from an older one
+        (lambda step: 0.57 if step % 4 else 0.03 * step, False),  # never several in a row
+        (lambda _: 0.57, True),  # what was commanded
+        (lambda _: 0.0, True),
+    ],
+)
+def test_the_linear_velocity_changes_with_the_velocity(linear, differs):
+    found = [one for id_, one in every_outcome(sped_up(linear), _LIMITS, way=False) if id_.endswith("linear-agrees")]
+    assert [one.cause for one in found if not one.holds] == ["does not change with the velocity"] * differs

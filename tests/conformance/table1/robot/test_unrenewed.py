@@ -1,14 +1,15 @@
 import pytest
 
 from conformance.packs.table1.robot.robot import Velocity
-from conformance.packs.table1.scenarios.turn import unrenewed
+from conformance.packs.table1.robot.unrenewed import unrenewed
 
 _BENT, _AHEAD = Velocity(linear_x=-0.1, angular_z=-0.8), Velocity(linear_x=0.1, angular_z=0.8)
+_ACROSS = Velocity(linear_x=0.1, angular_z=-0.8)
 _OTHERS = (Velocity(linear_x=-0.05), Velocity(angular_z=0.3), Velocity(linear_x=-0.3, angular_z=1.8))
 
 
 def _ways(effort: str, seed: int) -> list[tuple[Velocity, bool]]:
-    return unrenewed(_BENT, _AHEAD, _OTHERS, effort, seed)
+    return unrenewed(_BENT, _AHEAD, _ACROSS, _OTHERS, effort, seed)
 
 
 @pytest.mark.parametrize("effort", ["standard", "deep"])
@@ -31,6 +32,6 @@ def test_at_quick_seeds_let_each_of_them_go():
 
 def test_a_robot_without_a_reverse_gear_lets_no_rest_go():
     straight = Velocity(linear_x=0.2)
-    assert unrenewed(straight, Velocity(), (straight,), "standard", 0) == [
+    assert unrenewed(straight, Velocity(), Velocity(), (straight,), "standard", 0) == [
         (straight, by) for by in ("linear", "velocity", "closing")
     ]

@@ -16,7 +16,8 @@ _NOW_S = 5.0
 
 def _puts(life: GoalLife) -> Iterator[Put]:
     """Yield the PUTs of new goals."""
-    yield from (one for one in (life.first, life.second if life.renamed is None else None) if one is not None)
+    second = life.second if life.renamed is None else None
+    yield from (one for one in (life.first, second, life.reused) if one is not None)
 
 
 def _read(life: GoalLife) -> Iterator[Put]:
@@ -58,8 +59,11 @@ def goal_put(trace: GoalLife) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-get", on=(goal_life,))
 def goal_get(trace: GoalLife) -> Iterator[Outcome]:
-    """Judge that GET shows the goal that was sent."""
-    return map(_shown, _read(trace))
+    """Judge that GET shows the goal that was sent, and does so after a velocity that was refused."""
+    yield from map(_shown, _read(trace))
+    for one in trace.kept:
+        expected = f"the active goal, as {one.exchange.request.method} {one.exchange.request.target} was refused"
+        yield Case(not one.differs, one.read, expected, one.differs)
 
 
 @rule("rest-resources/goal-id", on=(goal_life,))

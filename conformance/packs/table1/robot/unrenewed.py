@@ -1,0 +1,59 @@
+"""Which velocities a robot is left with, not renewed, and what commands them last."""
+
+import math
+import random
+from typing import Final
+
+from conformance.packs.table1.robot.abilities import ABOUT, AHEAD
+from conformance.packs.table1.robot.letting_go import Way
+from conformance.packs.table1.robot.robot import FARTHEST, Robot, Velocity
+
+# Of a limit: a slow velocity. Or so many times what may be taken for rest, but never more than the last.
+_SLOW: Final = 0.1
+_TOLD: Final = 4
+_MOST: Final = 0.6
+
+
+def unrenewed(
+    bent: Velocity, ahead: Velocity, across: Velocity, others: tuple[Velocity, ...], effort: str, seed: int
+) -> list[tuple[Velocity, Way]]:
+    """Return velocities that are not renewed, and what commands them last.
+
+    A robot may keep a watchdog for each path, for each sign, for each part, and for small or large velocities. At the
+    effort "quick" the seed says which one is tried.
+
+    Args:
+        bent: a velocity along an arc.
+        ahead: its opposite, or as much of it as the robot can drive.
+        across: the same to the other side.
+        others: velocities of another size or with one part alone; the first one's connection is closed.
+        effort: quick, standard or deep.
+        seed: of the run.
+    """
+    ways: list[tuple[Velocity, Way]] = [
+        (bent, "linear" if bent.linear_x else "velocity"),
+        (bent, "velocity"),
+        (ahead, "linear" if ahead.linear_x else "velocity"),
+        *((one, "velocity" if number else "closing") for number, one in enumerate(others)),
+        (across, "xml"),
+    ]
+    if effort == "deep" or not any(one.linear_x * ahead.linear_x > 0 for one in others):
+        ways.append((ahead, "velocity"))
+    ways = [way for way in dict.fromkeys(ways) if any(way[0])]
+    if effort == "quick":
+        return random.Random(f"{seed}/ways").sample(ways, min(1, len(ways)))  # noqa: S311 - no secret
+    return ways
+
+
+def slow(robot: Robot, seed: int) -> list[Velocity]:
+    """Return a slow drive and a slow turn that can be told from rest, each in the direction that the seed says."""
+    limits, noise, chance = robot.limits, robot.limits.noise, random.Random(f"{seed}/slow")  # noqa: S311 - no secret
+    found: list[Velocity] = []
+    for component, off in (
+        (AHEAD, limits.tolerance_linear_m_s + FARTHEST * noise.linear_m_s),
+        (ABOUT, limits.tolerance_angular_rad_s + FARTHEST * noise.angular_rad_s),
+    ):
+        end = chance.choice([one for one in limits.range_of(component) if one] or [0.0])
+        size = min(max(_SLOW * abs(end), _TOLD * off), _MOST * abs(end))
+        found.append(robot.only(component, math.copysign(size, end)))
+    return found
