@@ -51,9 +51,11 @@ def _untyped(judge: Judge, service: SoapService) -> None:
             continue
         plain = next(candidates(service, operation, declared))
         answer = send(service, typed(envelope([plain]), declared, plain))
+        # Once more without: what was refused before may be there by now, as a goal that has begun.
+        needs_type = answer.accepted and not send(service, envelope([plain])).accepted
         expected = f"status 2xx for {operation.name} without xsi:type, as with it"
         found = "a refusal without xsi:type"
-        expect_answer(judge, "soap-basic-profile/R1017", answer).that(not answer.accepted, expected, found)
+        expect_answer(judge, "soap-basic-profile/R1017", answer).that(not needs_type, expected, found)
 
 
 @pytest.mark.requirement("soap-basic-profile/R1127", "xml-security/soapaction-spoofing")

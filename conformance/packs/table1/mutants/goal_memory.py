@@ -138,7 +138,7 @@ class _ReplacedForGood:
         return response
 
 
-@_mutant("goal-id-folded", "goal-get", "Goal ids that differ in upper and lower case are one.")
+@_mutant("goal-id-folded", "goal-id", "Goal ids that differ in upper and lower case are one.")
 def _folded(request: Request, forward: Forward) -> Response:
     id_ = identity(request) if _PUT(request) else None
     known = active(forward, request) if id_ is not None else None

@@ -218,10 +218,13 @@ class _GoingOnAfter(_GoingOn):
         super().__init__(lambda request, forward: forward(request.copy()), 0.15, 10.0)
         self._when = when
 
-    def begin(self, request: Request, forward: Forward) -> None:
-        """Go on if it is one of these velocities."""
-        if self._when(request):
-            super().begin(request, forward)
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        if (_PUT(request) or _PUT_GOAL(request)) and success(response):
+            self._turn += 1
+            if self._when(request):
+                self.begin(request, forward)
+        return response
 
 
 _mutant(
@@ -235,7 +238,9 @@ _mutant("safety-relentless-to-one-side", "watchdog", "The robot drives on for 10
 )
 _mutant(
     "safety-relentless-when-closed", "watchdog", "The robot drives on for 10 s after a velocity with Connection: close."
-).made(lambda: _GoingOnAfter(lambda request: (request.field("Connection") or "").lower() == "close"))
+).made(
+    lambda: _GoingOnAfter(lambda request: _moving(request) and (request.field("Connection") or "").lower() == "close")
+)
 
 
 @_mutant("safety-relentless-after-a-read", "hold-ends", "GET of the velocity with 406 renews a velocity command.")

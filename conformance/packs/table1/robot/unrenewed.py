@@ -35,7 +35,8 @@ def unrenewed(
         (bent, "velocity"),
         (ahead, "linear" if ahead.linear_x else "velocity"),
         *((one, "velocity" if number else "closing") for number, one in enumerate(others)),
-        (across, "xml"),
+        (across, "velocity"),
+        (ahead, "xml"),
     ]
     if effort == "deep" or not any(one.linear_x * ahead.linear_x > 0 for one in others):
         ways.append((ahead, "velocity"))

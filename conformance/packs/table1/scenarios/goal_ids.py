@@ -56,7 +56,7 @@ def goal_ids(robot: Robot, explore: Explorer) -> tuple[Put, ...]:
         # Also with little effort: as octets it is twice as long.
         explore(st.just("\u00e9" * _LONGEST), put, cases=1)
         for id_ in _ALIKE:
-            put(id_)
+            explore(st.just(id_), put, cases=1)
         explore(st.one_of(st.sampled_from(_KNOWN), st.text(_CHARACTERS, min_size=1, max_size=_LONGEST)), put, cases=40)
         robot.delete_goal()
         await_none(robot)
