@@ -126,6 +126,21 @@ def _old_version(request: Request, forward: Forward) -> Response:
     return response
 
 
+@_mutant(
+    "input-other-media-type-refused-and-made",
+    "delivery-refused",
+    "A delivery in a message under another media type returns 415 and is published.",
+    observer=True,
+    interface="soap",
+)
+def _other_media_type(request: Request, forward: Forward) -> Response:
+    response = forward(request)
+    if posted(request) and b"Execute" in request.body and response.status == 415:
+        fields = [pair for pair in request.fields if pair[0].lower() != "content-type"]
+        forward(request.copy(fields=[*fields, ("Content-Type", "text/xml; charset=utf-8")]))
+    return response
+
+
 _mutant(
     "input-goal-cancel-refused", "goal-refused", "A DELETE of the goal returns 406, and the goal is cancelled."
 ).altered(unwanted(rest("DELETE", GOAL)), page(406))

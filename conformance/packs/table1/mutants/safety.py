@@ -28,6 +28,11 @@ def _moving(request: Request) -> bool:
     return any(speeds(request))
 
 
+def _to_the_right(request: Request) -> bool:
+    value: Any = parsed(request.body)
+    return _moving(request) and value["linear"]["x"] > 0 > value["angular"]["z"]
+
+
 def _again(request: Request, forward: Forward) -> None:
     sent(request, forward, "PUT", VELOCITY, parsed(request.body))
 
@@ -234,7 +239,7 @@ _mutant(
     "safety-relentless-when-slow", "watchdog", "The robot drives on for 10 s straight ahead or back at up to 0.1 m/s."
 ).made(lambda: _GoingOnAfter(lambda request: 0 < abs(speeds(request)[0]) <= 0.1 and not speeds(request)[1]))
 _mutant("safety-relentless-to-one-side", "watchdog", "The robot drives on for 10 s ahead and to the right.").made(
-    lambda: _GoingOnAfter(lambda request: speeds(request)[0] > 0 > speeds(request)[1])
+    lambda: _GoingOnAfter(_to_the_right)
 )
 _mutant(
     "safety-relentless-when-closed", "watchdog", "The robot drives on for 10 s after a velocity with Connection: close."

@@ -44,6 +44,7 @@ _APART: Final = _of(COURIER, 80)
 _OLD_VERSION: Final = _of(COURIER, 120)
 _MANDATORY: Final = _of(COURIER, 130)
 _STRANGER: Final = _of(COURIER, 140)
+_OTHER_MEDIA: Final = _of(COURIER, 150)
 _STRANGE: Final = "http://example.com/unknown"
 # The requests after refused ones, over either interface.
 _AFTER_REST: Final = _of(3, 90)
@@ -213,7 +214,7 @@ def _put(api: RestInterface, delivery: Delivery, keys: Sequence[str]) -> tuple[E
 
 
 def _rejected_soap(publishers: SoapService) -> list[Rejected]:
-    """Send valid deliveries of another SOAP version, with a mandatory header, and without credentials if there are."""
+    """Send valid deliveries in messages of another version, media type or header, and without credentials if any."""
     mandatory = Node(clark(_STRANGE, "Transaction"), "5", (), ((clark(ENVELOPE, "mustUnderstand"), "1"),))
     old = envelope([_message(_OLD_VERSION)], space=_STRANGE)
     sent = [
@@ -222,6 +223,11 @@ def _rejected_soap(publishers: SoapService) -> list[Rejected]:
             "an unknown mandatory header block",
             _MANDATORY,
             call(publishers, _message(_MANDATORY), headers=(mandatory,), fresh=True),
+        ),
+        Rejected.of(
+            "the media type text/plain",
+            _OTHER_MEDIA,
+            call(publishers, _message(_OTHER_MEDIA), content_type="text/plain", fresh=True),
         ),
     ]
     if publishers.client.connection.credentials:

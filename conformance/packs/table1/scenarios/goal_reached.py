@@ -1,6 +1,7 @@
 """A goal that the robot reaches: it ends there, is then no longer active, and its id can be used again."""
 
 import math
+import random
 from dataclasses import dataclass, replace
 from http import HTTPStatus
 from typing import Any, Final
@@ -18,6 +19,7 @@ from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, 
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
 
 # How long a robot that comes nearer is waited for, at 0.01 m/s and with hindrances on the way, s.
 _LONGEST_S: Final = 120.0
@@ -37,23 +39,23 @@ _TURNED_RAD: Final = 0.05
 
 
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.DRIVE)
-def goal_reached(robot: Robot, effort: Effort, _prepared: None) -> GoalReached:
+def goal_reached(robot: Robot, run: Run, _prepared: None) -> GoalReached:
     """PUT a goal nearby, wait until the robot is there, and PUT the same goal again.
 
     A robot that goes on with another client's goal, for example a delivery that has waited, is sent once more.
     """
-    trace = _sent(robot, effort)
-    return _sent(robot, effort) if trace.other else trace
+    trace = _sent(robot, run.effort, run.seed)
+    return _sent(robot, run.effort, run.seed) if trace.other else trace
 
 
-def _sent(robot: Robot, effort: Effort) -> GoalReached:
+def _sent(robot: Robot, effort: Effort, seed: int) -> GoalReached:
     """Return the record of one goal."""
     here = robot.map_pose()
     if here is None:
         raise NotPossibleError("the robot's pose cannot be read")
     there, other = choose_goals(robot, max(_AWAY_M, 2 * robot.limits.arrival[0]), 2)
     if effort.name != "quick":
-        there = _turned(robot, here, there)
+        there = _turned(robot, here, there, random.Random(f"{seed}/heading"))  # noqa: S311 - no secret
     before = _turning_before(robot, effort)
     # Cancelled: a robot that has deliveries to make drops them, and does not begin with them between two drives.
     put_goal(robot, goal_body(other, robot.statement.motion.frame, "cancelled"))
@@ -73,13 +75,13 @@ def _sent(robot: Robot, effort: Effort) -> GoalReached:
     return way.recorded
 
 
-def _turned(robot: Robot, here: Pose, there: Pose) -> Pose:
-    """Return a goal with a heading across the way there, if the robot has a plan to it that is hardly longer."""
-    ahead = math.atan2(there.y - here.y, there.x - here.x)
-    turn = max(_TURN_RAD, 2 * robot.limits.arrival[1])
-    if not robot.actuated(5) or abs(wrapped(there.yaw - ahead)) >= turn:
+def _turned(robot: Robot, here: Pose, there: Pose, chance: random.Random) -> Pose:
+    """Return a goal with another heading than the way there, if the robot has a plan to it that is hardly longer."""
+    if not robot.actuated(5):
         return there
-    turned = Pose(there.x, there.y, wrapped(ahead + math.copysign(turn, there.yaw)))
+    ahead = math.atan2(there.y - here.y, there.x - here.x)
+    turn = chance.uniform(min(max(_TURN_RAD, 2 * robot.limits.arrival[1]), math.pi), math.pi)
+    turned = Pose(there.x, there.y, wrapped(ahead + chance.choice((-turn, turn))))
     _, plan, _ = ask(robot, turned)
     return turned if plan is not None and plan.length <= _DETOUR * here.distance(there) + 0.1 else there
 
