@@ -13,7 +13,7 @@ from typing import Final
 from conformance.observe.clock import WALL_CLOCK
 from conformance.packs.table1.robot import drive_rules, windows
 from conformance.packs.table1.robot.drive_trace import ALL, Command, Reach, Sighting, Trace, Turn
-from conformance.packs.table1.robot.letting_go import COUNTED_ON_S, certain_s
+from conformance.packs.table1.robot.letting_go import COUNTED_ON_S, Way, certain_s
 from conformance.packs.table1.robot.renewing import Renewing
 from conformance.packs.table1.robot.robot import STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.windows import SEVERAL
@@ -184,16 +184,22 @@ class Drive:
         velocity, exchange = self.robot.velocity()
         self.trace = self.trace.looked(Turn(None, at, velocity, exchange, None, exchange))
 
-    def stop(self, moving: Velocity) -> bool:
+    def stop(self, moving: Velocity, by: Way = "velocity") -> bool:
         """Renew a velocity, then command zero; return whether the command stops the robot, and not its watchdog.
 
         The time counts from sending. Where the response is late, the request may have been late on its way as well: so
         again.
+
+        Args:
+            moving: the velocity; without an angular part if the linear part alone is commanded.
+            by: what commands zero.
         """
         hold_s, settle_s = self.robot.limits.hold_s, self.robot.limits.settle_s
         within = max(1.1 * settle_s, 0.9 * hold_s) if hold_s is not None else self.robot.settle_s
         for _ in range(_STOPS):
-            if not self.command(moving) or not self.command(STILL):
+            if not self.command(moving):
+                return False
+            if not (self.command_linear(STILL) if by == "linear" else self.command(STILL, xml=by == "xml")):
                 return False
             last = self.trace.commands[-1]
             if not self.robot.is_late(last.exchange):
