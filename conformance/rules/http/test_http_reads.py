@@ -28,8 +28,6 @@ pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _AVAILABLE, _MANY = "http/available", "http/many-requests"
 # Reads in the series, and of each resource at standard effort.
 _IN_ALL, _EACH = 120, 60
-# Before this one, content is sent to a resource that takes none.
-_UNREAD = 9
 # So many requests that were dropped are the robot's habit, and not the end of an idle connection.
 _DROPS = 3
 # Only a robot that does not answer all reads that follow each other at once, for no longer than this, s, is read again,
@@ -134,9 +132,6 @@ def _send(api: RestInterface, series: _Reads) -> None:
         for turn, call in enumerate(_turns(api, calls)):
             accept = (("Accept", "application/json"),) if turn % 2 else ()
             try:
-                if turn == _UNREAD and not api.run.contract.described:
-                    # Content that a server has no use for must not be taken for the next request (RFC 9112 9.3).
-                    client.send("POST", call.path, headers=(("Content-Type", "application/json"),), body=b"{}")
                 exchange = client.send("GET", call.path, headers=accept)
             except NoAnswerError as none:
                 series.note(none.unanswered, 0, connection.resent - resent)

@@ -10,7 +10,7 @@ from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART
 from conformance.packs.table1.robot.letting_go import certain_s
-from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, STILL, Robot, Velocity
+from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 
 # Beyond any limit, or not to be actuated; and by the linear part alone.
 _BAD: Final = (Velocity(linear_x=-1e3), Velocity(linear_x=1e308, angular_z=-1e308), Velocity(angular_z=1e4))
@@ -157,10 +157,9 @@ def _refused(robot: Robot, drive: Drive, turning: Velocity) -> None:
 
 
 def _put_bad(robot: Robot, bad: Velocity) -> None:
-    """Send a velocity, a linear part and a goal that the robot must reject."""
+    """Send a velocity and a linear part that the robot must reject."""
     robot.put_velocity(bad)
     robot.put_linear(_BAD_LINEAR)
-    robot.rest.send("PUT", GOAL_PATH, headers=JSON_BODY, body=b"{}")
 
 
 def arc(robot: Robot, drive: Drive, bent: Velocity, before: Velocity) -> None:
