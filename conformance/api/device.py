@@ -29,6 +29,8 @@ class Device:
     is_known = False
     #: pytest plugins (names of modules) with the fixtures of the pack's checks.
     fixtures: tuple[str, ...] = ()
+    #: SOAP operations whose messages may be refused at any time, because what they read may have ended.
+    comes_and_goes: frozenset[str] = frozenset()
 
     #: What `--init` writes below the generic tables of a first statement.
     statement_template: str = ""

@@ -170,6 +170,8 @@ class RobotUnderTest:
                 if none.kind in {NoAnswer.REFUSED, NoAnswer.TLS}:
                     return
                 self._tell(f"{name}: {method} {target}: {none}")
+        # What hung here was not judged: the checks send it anew.
+        client.forget_hangs()
         if times:
             run.unreachable.pop(name, None)
             run.effort = run.effort.seen(statistics.median(times), min(times))

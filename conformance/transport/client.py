@@ -208,6 +208,10 @@ class HttpClient:
             listener.answered(exchange)
         return exchange
 
+    def forget_hangs(self) -> None:
+        """Send again to operations that did not respond, as if they had not been tried."""
+        self._hangs.clear()
+
     def _fields(self, method: str, headers: Headers, body: bytes, *, close: bool) -> Headers:
         names = {name.lower() for name, _ in headers}
         fields: list[tuple[str, str]] = [] if "host" in names else [("Host", self.authority)]

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import pytest
 
+from conformance.api.device import device_of
+from conformance.api.soap.calls import SoapResponse, call
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import example
 from conformance.contract.interfaces import Interface
@@ -73,6 +75,23 @@ def accepted_messages(soap: SoapServices, service: SoapService, *ids: str) -> li
     for id_ in ids if not accepted else ():
         soap.run.judge.note(id_, f"the {service.name} service accepted none of the messages tried")
     return accepted
+
+
+def is_gone(soap: SoapServices, service: SoapService, accepted: tuple[Operation, Node], answer: SoapResponse) -> bool:
+    """Return whether a refusal says nothing of the request: what the operation reads has ended since it was accepted.
+
+    Args:
+        soap: the services of the run.
+        service: the one that was called.
+        accepted: the operation, and its message that the robot accepted before.
+        answer: the response to the request to be judged.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+    """
+    operation, message = accepted
+    may_end = operation.name in device_of(soap.run).comes_and_goes
+    return may_end and answer.refused and call(service, message).refused
 
 
 def _problem(run: Run, service: SoapService) -> str:

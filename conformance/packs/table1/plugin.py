@@ -67,6 +67,7 @@ class Device(device.Device):
     statement_template = _TEMPLATE
     doubts = MappingProxyType({"safety": "to claim it, declare limits and hold time below"})
     fixtures = ("conformance.packs.table1.fixtures",)
+    comes_and_goes = frozenset({"GetGoal"})
 
     @property
     def settle_s(self) -> float:

@@ -4,7 +4,7 @@ import codecs
 
 import pytest
 
-from conformance.api.soap.callable_services import SoapServices, accepted_messages, callable_services
+from conformance.api.soap.callable_services import SoapServices, accepted_messages, callable_services, is_gone
 from conformance.api.soap.calls import call, expect_answer, send
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.mutations import invalid_ones, mutations
@@ -37,6 +37,8 @@ def test_answers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
         for operation, message in good:
             for _ in range(effort.cases(15)):
                 answer = call(service, message)
+                if is_gone(soap, service, (operation, message), answer):
+                    break
                 if expect_answer(judge, "soap-basic-profile/R1017", answer).accepted("a valid message has no xsi:type"):
                     same = answer.payload == operation.response
                     expected = f"the element {operation.response} in the Body"
@@ -110,6 +112,8 @@ def test_encodings(soap: SoapServices, judge: Judge, effort: Effort) -> None:
             ):
                 valid = require_valid_document(service, body)
                 answer = send(service, valid, content_type=f"text/xml; charset={charset}")
+                if is_gone(soap, service, (operation, message), answer):
+                    break
                 right = answer.accepted and answer.payload == operation.response
                 expect_answer(judge, f"soap-basic-profile/{id_}", answer).that(
                     right, f"status 2xx for a message in {what}"

@@ -12,6 +12,7 @@ from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.packs.table1.statement import Statement
 from conformance.statement.endpoints import Endpoints
 from conformance.transport.client import Connection
+from conformance.transport.exchange import NoAnswer, NoAnswerError
 from conformance.verdict.run import Run
 
 
@@ -51,6 +52,13 @@ def test_an_interface_that_hangs_is_put_down(robot_of):
     robot = robot_of(5.0)
     assert "no response" in robot.run.unreachable[Interface.REST]
     assert not robot.reached
+
+
+def test_what_hung_at_first_is_sent_again_by_the_checks(robot_of):
+    robot = robot_of(5.0)
+    with pytest.raises(NoAnswerError) as none:
+        robot.rest.client.send("GET", robot.rest.path)
+    assert none.value.unanswered.kind is NoAnswer.TIMEOUT
 
 
 @pytest.mark.parametrize(("takes_s", "told"), [(0.3, 1), (0.0, 0)])

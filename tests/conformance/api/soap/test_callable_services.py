@@ -1,9 +1,12 @@
 """Which services a check may call: nothing is sent to the one that acts without permission, and that is put down."""
 
 import pytest
+from toy_server import serving
 
-from conformance.api.soap.callable_services import SoapServices, callable_services
+from conformance.api.soap.callable_services import SoapServices, callable_services, is_gone
+from conformance.api.soap.calls import call
 from conformance.api.soap.service import SoapService
+from conformance.documents.xml_node import Node
 from conformance.packs.table1.files import CONTRACT_DIR
 from conformance.transport.client import Connection, HttpClient
 from conformance.verdict.run import Run
@@ -11,8 +14,8 @@ from conformance.verdict.run import Run
 MOTION, OTHER = "soap-basic-profile/R2724", "soap-basic-profile/R1125"
 
 
-def services(*, allow_motion: bool) -> SoapServices:
-    client = HttpClient("http://127.0.0.1:9", Connection())
+def services(*, allow_motion: bool, url: str = "http://127.0.0.1:9") -> SoapServices:
+    client = HttpClient(url, Connection())
     made = {
         name: SoapService(name, client, f"/{name}", contract_wsdl_path=CONTRACT_DIR / f"{name}.wsdl")
         for name in ("publishers", "subscribers")
@@ -49,3 +52,24 @@ def test_with_no_service_the_check_is_skipped():
     soap.subscribers = None
     with pytest.raises(pytest.skip.Exception, match="--allow-motion"):
         callable_services(soap, MOTION)
+
+
+@pytest.mark.parametrize(
+    ("name", "statuses", "gone"),
+    [
+        ("GetGoal", (400, 400), True),
+        ("GetGoal", (400, 200), False),
+        ("GetGoal", (200,), False),
+        ("GetPose", (400,), False),
+    ],
+)
+def test_only_a_refusal_of_what_may_have_ended_says_nothing(name, statuses, gone):
+    turns = iter(statuses)
+    message = Node(name)
+    with serving(lambda *_: (next(turns), b"")) as url:
+        soap = services(allow_motion=False, url=url)
+        service = soap.subscribers
+        operation = next(one for one in service.contract.operations if one.name == name)
+        assert is_gone(soap, service, (operation, message), call(service, message)) is gone
+        assert next(turns, None) is None
+        service.client.close()
