@@ -33,7 +33,7 @@ def read_wadl(body: bytes) -> list[Operation]:
 
 
 def _of_resource(
-    element: etree._Element, prefix: str, inherited: dict[tuple[str, str], bool], root: etree._Element
+    element: etree._Element, prefix: str, inherited: dict[tuple[str, str], Parameter], root: etree._Element
 ) -> list[Operation]:
     path = f"{prefix}/{element.get('path', '').lstrip('/')}" if element.get("path") else prefix
     parameters = inherited | _parameters(element)
@@ -46,11 +46,8 @@ def _of_resource(
             own = parameters
             for request in method.findall(f"{{{WADL}}}request"):
                 own |= _parameters(request)
-            parameters_of_all = tuple(
-                Parameter(name, where, required or where == "path", {}) for (where, name), required in own.items()
-            )
             name, template = method.get("name", "").upper(), _TEMPLATE.sub(r"{\1}", path)
-            found.append(Operation(f"{name} {template}", name, template, parameters_of_all))
+            found.append(Operation(f"{name} {template}", name, template, tuple(own.values())))
     return found
 
 
@@ -60,9 +57,11 @@ def _referred(method: etree._Element, root: etree._Element) -> etree._Element:
     return next((item for item in root.iter(f"{{{WADL}}}method") if name and item.get("id") == name), method)
 
 
-def _parameters(element: etree._Element) -> dict[tuple[str, str], bool]:
-    return {
-        (_KINDS.get(item.get("style", ""), item.get("style", "")), item.get("name", "")): item.get("required", "false")
-        in {"true", "1"}
-        for item in element.findall(f"{{{WADL}}}param")
-    }
+def _parameters(element: etree._Element) -> dict[tuple[str, str], Parameter]:
+    found = {}
+    for item in element.findall(f"{{{WADL}}}param"):
+        where, name = _KINDS.get(item.get("style", ""), item.get("style", "")), item.get("name", "")
+        required = where == "path" or item.get("required", "false") in {"true", "1"}
+        default = {"default": item.get("default")} if item.get("default") is not None else {}
+        found[where, name] = Parameter(name, where, required, default)
+    return found

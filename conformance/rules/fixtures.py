@@ -9,6 +9,7 @@ from typing import Final
 import pytest
 
 from conformance.api.interfaces import Interfaces
+from conformance.api.rest.kept_exchanges import KeptExchanges
 from conformance.api.rest.observers import Observer
 from conformance.api.rest.values import Values
 from conformance.api.soap.observer import PASSIVE, SoapObserver, answers_of
@@ -28,7 +29,13 @@ _NEEDED_LATER: Final = ("schemathesis.specs.openapi", "jsonschema")
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _watched(run: Run, interfaces: Interfaces, connection: Connection, other_exchanges: OtherExchanges | None) -> None:
+def _watched(
+    run: Run,
+    interfaces: Interfaces,
+    connection: Connection,
+    other_exchanges: OtherExchanges | None,
+    kept_exchanges: KeptExchanges | None,
+) -> None:
     """Register the observers, so that every exchange of the run is judged; no other code registers any."""
     services = interfaces.soap.there.values()
     api = interfaces.rest
@@ -36,8 +43,7 @@ def _watched(run: Run, interfaces: Interfaces, connection: Connection, other_exc
     if api is not None:
         observers.append(Observer(api, [service.endpoint for service in services]))
         connection.listeners.extend(api.device.observers(api))
-        if other_exchanges is not None:
-            connection.listeners.append(other_exchanges)
+        connection.listeners.extend(one for one in (other_exchanges, kept_exchanges) if one is not None)
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
         answers = {service.endpoint: answers_of(service) for service in services}
         observers.append(SoapObserver(run.judge, answers))
@@ -48,6 +54,13 @@ def _watched(run: Run, interfaces: Interfaces, connection: Connection, other_exc
 def other_exchanges(run: Run, interfaces: Interfaces) -> OtherExchanges | None:
     """Return what keeps the exchanges with a described API that no scenario records; None for any other robot."""
     return OtherExchanges(interfaces.rest) if run.contract.described and interfaces.rest else None
+
+
+@pytest.fixture(scope="session")
+def kept_exchanges(run: Run, interfaces: Interfaces) -> KeptExchanges | None:
+    """Return what keeps exchanges to compare with the robot's own description; None where nothing asks for that."""
+    asked = "describe/openapi-answers" in run.contract.ledger
+    return KeptExchanges(interfaces.rest) if asked and interfaces.rest else None
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from conformance.documents.json_schema import UnresolvedError
-from conformance.documents.openapi import Operation, read_operations
+from conformance.documents.openapi import Operation, Parameter, read_operations
 from conformance.documents.resources import PARAMETER
 from conformance.documents.wadl import read_wadl
 
@@ -75,16 +75,19 @@ def differences(wanted: Iterable[Operation], found: Iterable[Described]) -> list
 
 
 def _differences_of_parameters(ours: Operation, theirs: list[Operation]) -> list[str]:
-    described = {(one.where, one.name): one.required for operation in theirs for one in operation.parameters}
-    wanted = sorted((one.where, one.name, one.required) for one in ours.parameters)
+    described = {(one.where, one.name): one for operation in theirs for one in operation.parameters}
     missing = []
-    for where, name, required in wanted:
-        if (where, name) not in described:
+    for one in sorted(ours.parameters, key=lambda item: (item.where, item.name)):
+        where, name, their = one.where, one.name, described.get((one.where, one.name))
+        if their is None:
             missing.append(f"{ours.label} without the {where} parameter {name}")
-        elif where == "query" and described[where, name] != required:
-            missing.append(f"{ours.label} with the parameter {name} as {'optional' if required else 'required'}")
-    known = {name for where, name, _ in wanted if where == "query"}
-    extra = {name for (where, name), required in described.items() if required and where == "query"} - known
+        elif where == "query" and their.required != one.required:
+            missing.append(f"{ours.label} with the parameter {name} as {'optional' if one.required else 'required'}")
+        elif not _same_default(one, their):
+            default, other = one.schema.get("default"), their.schema.get("default")
+            missing.append(f"{ours.label} with the default {other!r} of the parameter {name} instead of {default!r}")
+    known = {one.name for one in ours.parameters if one.where == "query"}
+    extra = {name for (where, name), one in described.items() if one.required and where == "query"} - known
     return [
         *missing,
         *(
@@ -92,3 +95,14 @@ def _differences_of_parameters(ours: Operation, theirs: list[Operation]) -> list
             for name in sorted(extra)
         ),
     ]
+
+
+def _same_default(ours: Parameter, theirs: Parameter) -> bool:
+    """Return whether two defaults are equal, where both are there; a WADL writes each as text."""
+    default, other = ours.schema.get("default"), theirs.schema.get("default")
+    if default is None or other is None:
+        return True
+    try:
+        return float(default) == float(other)
+    except (TypeError, ValueError):
+        return bool(str(default) == str(other))

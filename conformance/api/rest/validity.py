@@ -60,9 +60,15 @@ def validity(contract: Contract, method: str, target: str, media_type: str, body
     operation = matching(contract, method, path)
     if operation is None or method != operation.method or not is_normal(path):
         return Validity(UNCLEAR)
+    said = validity_by(operation, path, query, media_type, body)
+    if said.requirement == "json-unknown" and _is_shown(contract, path, operation.bodies[media_type].schema, body):
+        return Validity(UNCLEAR, operation)
+    return said
+
+
+def validity_by(operation: Operation, path: str, query: str, media_type: str, body: bytes) -> Validity:
+    """Return the verdict on a request by the description of its operation alone; the arguments are as in validity()."""
     found = [*_of_path(operation, path), *_of_query(operation, query), _of_body(operation, media_type, body)]
-    if found[-1][1] == "json-unknown" and _is_shown(contract, path, operation.bodies[media_type].schema, body):
-        found[-1] = (UNCLEAR, "", "")
     for wanted in (UNCLEAR, INVALID):
         for verdict, requirement, why in found:
             if verdict == wanted:

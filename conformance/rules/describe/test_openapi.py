@@ -9,10 +9,12 @@ from conformance.api.expectation import expect
 from conformance.api.rest.calls import example_call
 from conformance.api.rest.description import Described, described_by_openapi, differences
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.kept_exchanges import KeptExchanges, contradiction
 from conformance.api.rest.presence import judge_there
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import operations_of
 from conformance.documents.openapi_validity import openapi_fault
+from conformance.rules.told_once import without_numbers
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
@@ -56,6 +58,25 @@ def test_openapi_has_the_operations(api: RestInterface, rest: HttpClient, judge:
     missing = [fault] if document is None else differences(operations_of(api.run.contract), found)
     expected = "a description with the paths, methods and parameters of the contract"
     expect(judge, "describe/openapi-operations", exchange).that(not missing, expected, "; ".join(missing[:3]))
+
+
+@pytest.mark.phase("last")
+@pytest.mark.requirement("describe/openapi-answers")
+def test_what_is_described_is_true(api: RestInterface, rest: HttpClient, kept_exchanges: KeptExchanges | None) -> None:
+    """Compare requests that the robot accepted in this run, and its responses, with its own description."""
+    document, _, _ = _document(rest)
+    found = [] if document is None else described_by_openapi(document, rest.base_url)
+    theirs = {item.address: item for item in found}
+    for kept in kept_exchanges.kept.values() if kept_exchanges else ():
+        for context, exchange in kept:
+            operation = context.operation
+            described = theirs.get(Described(operation, operation.template).address) if operation else None
+            if operation is None or described is None:
+                continue
+            wrong = contradiction(api, described, context, exchange)
+            expected = f"what {_PATH} says of {operation.label}"
+            cause = f"{operation.label} {without_numbers(wrong)}"
+            expect(api.run.judge, "describe/openapi-answers", exchange).that(not wrong, expected, wrong, cause=cause)
 
 
 @pytest.mark.requirement(_BEHAVIOUR)

@@ -1,6 +1,7 @@
 """Mutants whose OpenAPI or WADL description differs from their behaviour."""
 
 import re
+from collections.abc import Iterator
 from copy import deepcopy
 from typing import Any
 
@@ -34,6 +35,27 @@ def _promised_twice(resource: Any) -> None:
     resource.getparent().append(other)
 
 
+def _defaulted(schema: dict[str, Any]) -> dict[str, Any]:
+    """Return a schema whose default, where it has a numeric one, is another."""
+    return {**schema, "default": schema["default"] + 0.4} if isinstance(schema.get("default"), float) else schema
+
+
+def _objects(node: Any) -> Iterator[dict[str, Any]]:
+    """Yield each JSON object in a document."""
+    if isinstance(node, dict):
+        yield node
+    for part in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
+        yield from _objects(part)
+
+
+def _renamed(told: Any, old: str, new: str) -> None:
+    """Give a member another name in all schemas."""
+    for node in list(_objects(told)):
+        if isinstance(node.get("properties"), dict) and old in node["properties"]:
+            node["properties"][new] = node["properties"].pop(old)
+            node["required"] = [new if name == old else name for name in node.get("required", ())]
+
+
 _mutant("openapi-without-path", "openapi-operations", "/openapi.json lacks a path.").json(
     _OPENAPI, lambda told: told["paths"].pop(SENSORS, None) and None
 )
@@ -45,6 +67,19 @@ _mutant("openapi-without-parameter", "openapi-operations", "/openapi.json lacks 
 )
 _mutant("openapi-promises", "openapi-behaviour", "/openapi.json describes a path that does not exist.").json(
     _OPENAPI, field("paths./robot/arm/", {"get": {"responses": {"200": {"description": "the arm"}}}})
+)
+_mutant("openapi-other-default", "openapi-operations", "/openapi.json names another default of a parameter.").json(
+    _OPENAPI,
+    field(f"paths.{PLAN}.get.parameters", lambda all_: [{**one, "schema": _defaulted(one["schema"])} for one in all_]),
+)
+_mutant("openapi-too-strict", "openapi-answers", "/openapi.json forbids values that the robot accepts.").json(
+    _OPENAPI,
+    field(
+        f"paths.{PLAN}.get.parameters", lambda all_: [{**one, "schema": {**one["schema"], "const": -1}} for one in all_]
+    ),
+)
+_mutant("openapi-other-name", "openapi-answers", "/openapi.json requires a field that no response has.").json(
+    _OPENAPI, lambda told: _renamed(told, "child_frame_id", "child_frame")
 )
 _mutant("openapi-invalid", "openapi", "/openapi.json is not a valid OpenAPI document.").json(
     _OPENAPI, both(without("info"), field("paths", list))
@@ -67,6 +102,9 @@ _mutant("wadl-promises", "wadl-behaviour", "/application.wadl describes a resour
 )
 _mutant("wadl-without-resource", "wadl-resources", "/application.wadl lacks a resource.").made(
     _lost("resource", "path", "sensors/?$")
+)
+_mutant("wadl-other-default", "wadl-resources", "/application.wadl names another default of a parameter.").xml(
+    _WADL, each("param", lambda node: node.set("default", "0.5") if node.get("name") == "tolerance" else None)
 )
 _mutant("wadl-without-method", "wadl-resources", "/application.wadl lacks a method.").made(
     _lost("method", "name", "^DELETE$")

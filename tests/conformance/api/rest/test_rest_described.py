@@ -31,6 +31,10 @@ def test_the_contract_describes_itself():
             lambda paths: paths["/robot/navigation/service/plan"]["get"]["parameters"][0].pop("required"),
             "with the parameter x as optional",
         ),
+        (
+            lambda paths: paths["/robot/navigation/service/plan"]["get"]["parameters"][4]["schema"].update(default=0.5),
+            "the default 0.5 of the parameter tolerance instead of 0.1",
+        ),
         (lambda paths: paths.update({"/robot/sensors": paths.pop("/robot/sensors/")}), "no GET /robot/sensors/"),
     ],
 )
@@ -38,6 +42,13 @@ def test_what_is_missing_is_named(change, expected):
     document = copy.deepcopy(CONTRACT.openapi)
     change(document["paths"])
     assert expected in "; ".join(_differences(document))
+
+
+def test_a_wadl_has_the_defaults_of_the_contract():
+    document = CONTRACT.wadl_path.read_bytes()
+    other = document.replace(b'default="0.1"', b'default="0.10001"')
+    assert differences(operations_of(CONTRACT), described_by_wadl(document, BASE)) == []
+    assert "'0.10001'" in "".join(differences(operations_of(CONTRACT), described_by_wadl(other, BASE)))
 
 
 def test_freedoms_of_a_description():
