@@ -35,8 +35,16 @@ class Disagreement:
 Found = dict[tuple[str, str], Disagreement]
 
 
+def _nothing() -> None:
+    """Do nothing before a request."""
+
+
 def disagreements(
-    api: RestInterface, call: Call, media_types: list[str], renew: Callable[[], object] = lambda: None
+    api: RestInterface,
+    call: Call,
+    media_types: list[str],
+    renew: Callable[[], object] = _nothing,
+    before: Callable[[], object] = _nothing,
 ) -> tuple[list[Disagreement], Exchange]:
     """Read a resource as JSON, in the other formats, and as JSON again, repeatedly until all agree.
 
@@ -49,15 +57,17 @@ def disagreements(
     suspects: Found | None = None
     for _ in range(_TURNS):
         renew()
-        found, exchange = one_turn(api, call, media_types)
+        found, exchange = one_turn(api, call, media_types, before)
         suspects = found if suspects is None else {key: item for key, item in found.items() if key in suspects}
         if not suspects:
             break
     return list((suspects or {}).values()), exchange
 
 
-def one_turn(api: RestInterface, call: Call, media_types: list[str]) -> tuple[Found, Exchange]:
-    """Read a resource once as JSON, in the other formats, and as JSON again.
+def one_turn(
+    api: RestInterface, call: Call, media_types: list[str], before: Callable[[], object] = _nothing
+) -> tuple[Found, Exchange]:
+    """Read a resource once as JSON, in the other formats, each after a call of ``before``, and as JSON again.
 
     Returns:
         The disagreements by format and place (empty if the JSON is invalid, which other checks report), and the last
@@ -66,7 +76,10 @@ def one_turn(api: RestInterface, call: Call, media_types: list[str]) -> tuple[Fo
     """
     schema = call.operation.shape or {}
     first = call.send(api, ("Accept", JSON))
-    others = [(name, call.send(api, ("Accept", name))) for name in media_types]
+    others: list[tuple[str, Exchange]] = []
+    for name in media_types:
+        before()
+        others.append((name, call.send(api, ("Accept", name))))
     last = call.send(api, ("Accept", JSON))
     snapshots = [_snapshot(item, JSON, schema) for item in (first, last)]
     if any(shown is None for shown in snapshots):
@@ -80,17 +93,22 @@ def one_turn(api: RestInterface, call: Call, media_types: list[str]) -> tuple[Fo
 
 
 def judge_same_values(
-    api: RestInterface, call: Call, media_types: list[str], renew: Callable[[], object] = lambda: None
+    api: RestInterface,
+    call: Call,
+    media_types: list[str],
+    renew: Callable[[], object] = _nothing,
+    before: Callable[[], object] = _nothing,
 ) -> Exchange:
     """Judge whether the formats of a resource agree; return the last JSON exchange.
 
     Args:
         api: the robot's REST interface.
         call: reads the resource.
-        media_types: the formats other than JSON.
+        media_types: the formats to compare with JSON.
         renew: called before each comparison to keep the state constant.
+        before: called before each reading in one of these formats.
     """
-    found, exchange = disagreements(api, call, media_types, renew)
+    found, exchange = disagreements(api, call, media_types, renew, before)
     if exchange.response.ok:
         expect(api.run.judge, "rest-formats/same-values", found[0].exchange if found else exchange).that(
             not found,

@@ -1,10 +1,13 @@
 """JSON, XML and plain text of the same moment: each must be readable and have the same values (contract, formats)."""
 
+from collections.abc import Callable
+from functools import partial
+
 import pytest
 
 from conformance.api.expectation import expect
 from conformance.api.rest.applicable import answered, reads
-from conformance.api.rest.calls import root_name
+from conformance.api.rest.calls import Call, root_name
 from conformance.api.rest.formats import judge_same_values
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.json_schema import kind_of
@@ -16,6 +19,8 @@ from conformance.verdict.evidence import Judge
 pytestmark = pytest.mark.needs("rest")
 _XML = "application/xml"
 _TEXT = "text/plain"
+# No robot has its responses in this format.
+_NO_FORMAT = "image/png"
 _IDS = {_XML: "rest-formats/xml", _TEXT: "rest-formats/text"}
 
 
@@ -82,6 +87,27 @@ def test_formats_carry_the_same_values(api: RestInterface, judge: Judge) -> None
         compared += judge_same_values(api, call, others).response.ok
     if not compared and not any(set(_IDS) & set(item.formats) for item in operations_of(api.run.contract)):
         judge.unclaimed("rest-formats/same-values", "the contract has one format only")
+
+
+@pytest.mark.phase("resting")
+@pytest.mark.requirement("rest-formats/same-values")
+def test_formats_carry_the_same_values_after_other_requests(api: RestInterface) -> None:
+    """Compare every value again, just after a refused request, and just after one that acts.
+
+    At quick, the seed says after which of them.
+    """
+    run = api.run
+
+    def refused(call: Call) -> object:
+        return call.send(api, ("Accept", _NO_FORMAT))
+
+    events: list[Callable[[Call], object]] = [refused]
+    if run.allow_motion:
+        events.append(lambda _: api.device.halt(api))
+    for event in run.effort.draw(events, 2, f"{run.seed}/events"):
+        for call in run.effort.subsample(reads(api), 5):
+            if len(call.operation.formats) > 1:
+                judge_same_values(api, call, list(call.operation.formats), before=partial(event, call))
 
 
 @pytest.mark.phase("aside")

@@ -51,6 +51,12 @@ def _set(name: str, value: Callable[[str], str]) -> Callable[[Response], None]:
     return edit
 
 
+def _other_charset(value: str) -> str:
+    """Return a media type with another charset; JSON has none, so that it would have no effect (RFC 8259 11)."""
+    media_type = value.partition(";")[0]
+    return value if media_type.endswith("json") else f"{media_type}; charset=utf-16"
+
+
 def _twice(name: str, other: str) -> Callable[[Response], None]:
     def edit(response: Response) -> None:
         if response.field(name) is not None:
@@ -73,7 +79,7 @@ def _headers(exchange: Exchange) -> Iterator[tuple[str, str, Callable[[Response]
                     "header-double": _twice("Content-Type", "application/octet-stream"),
                     "header-change": _set("Content-Type", lambda _: "application/octet-stream"),
                     "header-truncate": _set("Content-Type", lambda value: value.partition("/")[0]),
-                    "header-charset": _set("Content-Type", lambda value: f"{value.partition(';')[0]}; charset=utf-16"),
+                    "header-charset": _set("Content-Type", _other_charset),
                 },
             )
     if exchange.side == "rest" and exchange.formats:

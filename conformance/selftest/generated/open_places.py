@@ -27,11 +27,6 @@ BY_NORM = (
         side="rest",
         methods=_UNSAFE,
     ),
-    OpenPlace(
-        r"header-charset:[^:]+:Content-Type-of-errors",
-        "An error is JSON, whose media type has no charset parameter: one that is added has no effect (RFC 8259 11).",
-        side="rest",
-    ),
 )
 
 

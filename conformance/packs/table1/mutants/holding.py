@@ -16,7 +16,7 @@ MUTANTS = Table()
 _mutant = MUTANTS.of_class("safety", "rest")
 
 _PUT, _PUT_LINEAR, _PUTS = rest("PUT", VELOCITY), rest("PUT", LINEAR), rest("PUT", VELOCITY, LINEAR)
-_DELETE, _PUT_GOAL = rest("DELETE", GOAL), rest("PUT", GOAL)
+_DELETE, _PUT_GOAL, _POST = rest("DELETE", GOAL), rest("PUT", GOAL), rest("POST", VELOCITY)
 # Nobody asks: nothing has come for so long; and how often is looked, s.
 _SILENT_S, _LOOK_S = 0.12, 0.04
 
@@ -74,6 +74,55 @@ class _Renewed(_Remembering):
         )
         if 400 <= response.status < 500 and driving:
             sent(request, forward, "PUT", VELOCITY, self.last)
+
+
+@_mutant("safety-renewed-by-soap", "hold-ends", "A SOAP message that only reads renews the velocity.")
+class _RenewedBySoap(_Remembering):
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        response = super().__call__(request, forward)
+        if request.side == "soap" and self.last and "angular" in self.last:
+            sent(request, forward, "PUT", VELOCITY, self.last)
+        return response
+
+
+@_mutant("safety-linear-deaf", "renewal", "A PUT of a linear velocity that is there already does not renew it.")
+class _LinearDeaf(_Remembering):
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        value: Any = parsed(request.body) if _PUT_LINEAR(request) else None
+        if isinstance(value, dict) and self.last and self.last.get("linear") == value:
+            return plain(204)(request)
+        return super().__call__(request, forward)
+
+    def put(self, request: Request, response: Response, _forward: Forward) -> None:
+        if not _PUT_LINEAR(request):
+            self.last = None
+        elif success(response):
+            self.last = {"linear": parsed(request.body)}
+
+
+@_mutant("safety-post-and-driven", "refused-keeps", "POST of a velocity returns 405, and the robot drives.")
+def _post_drives(request: Request, forward: Forward) -> Response:
+    response = forward(request)
+    if _POST(request) and response.status == 405 and request.body:
+        forward(request.copy(method="PUT"))
+    return response
+
+
+@_mutant("safety-without-slash-and-driven", "refused-keeps", "A velocity to the path without its slash is taken.")
+def _slashless_drives(request: Request, forward: Forward) -> Response:
+    response = forward(request)
+    if request.method == "PUT" and request.path == VELOCITY.rstrip("/") and response.status == 404:
+        forward(request.copy(target=VELOCITY))
+    return response
+
+
+@_mutant("safety-goal-refused-stops", "refused-keeps", "A goal that is refused stops a robot that is being driven.")
+def _goal_stops(request: Request, forward: Forward) -> Response:
+    response = forward(request)
+    if _PUT_GOAL(request) and 400 <= response.status < 500:
+        still = {"x": 0.0, "y": 0.0, "z": 0.0}
+        sent(request, forward, "PUT", VELOCITY, {"linear": still, "angular": still})
+    return response
 
 
 @_mutant(

@@ -17,6 +17,7 @@ from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
 
 _SLACK: Final = Slack()
+_NOT_ACCEPTABLE: Final = (("Accept", "image/png"),)
 # Two samples are farther apart than this, ns.
 _SAMPLES_APART_NS: Final = 1000
 #: Path, operation and shape of each state.
@@ -65,9 +66,15 @@ def _always(_since: float) -> bool:
 
 
 def read_state(
-    robot: Robot, subscribers: SoapService, name: str, apart_s: float, lasted: Callable[[float], bool] = _always
+    robot: Robot,
+    subscribers: SoapService,
+    name: str,
+    apart_s: float,
+    lasted: Callable[[float], bool] = _always,
+    *,
+    refused: bool = False,
 ) -> StateRead | None:
-    """Read a state over REST, SOAP and REST, ``apart_s`` apart.
+    """Read a state over REST, SOAP and REST, ``apart_s`` apart; SOAP just after a request that is ``refused``, or not.
 
     Return None where REST has no value, which the observers have judged, and where SOAP's differs although the state
     has not ``lasted`` since the first read: it may have changed to and fro.
@@ -76,6 +83,8 @@ def read_state(
     since = robot.clock.now()
     before, _ = robot.read(path, shape)
     robot.clock.sleep(apart_s)
+    if refused:
+        robot.rest.send("GET", path, headers=_NOT_ACCEPTABLE)
     exchange = ask(subscribers, operation)
     between, problem = answered(exchange, shape)
     robot.clock.sleep(apart_s)
@@ -128,6 +137,8 @@ def compare(
     name: str,
     renew: Callable[[], object] = lambda: None,
     lasted: Callable[[float], bool] = _always,
+    *,
+    refused: bool = False,
 ) -> list[StateRead]:
     """Read a state over both interfaces, again where one may lag an odometry message behind the other.
 
@@ -137,12 +148,13 @@ def compare(
         name: "pose" or "velocity".
         renew: called before each try to keep the state as it is.
         lasted: returns whether it has been kept since a time, s of the run's clock.
+        refused: whether a request that is refused comes just before the one over SOAP.
     """
 
     def tries() -> Iterator[StateRead | None]:
         for apart_s in (0.0, robot.sample_s, robot.sample_s):
             renew()
-            yield read_state(robot, subscribers, name, apart_s, lasted)
+            yield read_state(robot, subscribers, name, apart_s, lasted, refused=refused)
 
     return agreed(tries())
 

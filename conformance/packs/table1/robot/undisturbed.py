@@ -10,6 +10,7 @@ from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART
 from conformance.packs.table1.robot.letting_go import certain_s
+from conformance.packs.table1.robot.no_commands import refuse_goal
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 
 # Beyond any limit, or not to be actuated; and by the linear part alone.
@@ -124,6 +125,8 @@ def _renew(
             drive.clock.sleep(max(_STEP_S, min(due, begun + times.renewed_s) - drive.clock.now()))
     for bad in refused:
         _put_bad(robot, bad)
+    if refused:
+        refuse_goal(robot)
     drive.clock.sleep(max(0.0, max(begun + times.seen_s, reached) - drive.clock.now()))
     alone = robot.usual_s > _QUICK_S
     lasts, found = drive.sees(turning, 2, until=drive.trace.sent + times.holds_s, alone=alone)
@@ -149,6 +152,7 @@ def _refused(robot: Robot, drive: Drive, turning: Velocity) -> None:
         drive.refresh(turning)
         _put_bad(robot, bad)
         drive.look()
+    refuse_goal(robot)
     drive.keep(min(_SHOWS_S, drive.holds_until - drive.clock.now()))
     keeps, found = drive.sees(turning, 2, until=drive.holds_until)
     # Where it is too late to say, the velocity of a slow robot may have ended by itself.

@@ -3,10 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
+from conformance.api.rest.calls import JSON
 from conformance.observe.polling import poll_for
 from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.robot import LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.standstill import Standstill, read_rest, watch_rest
 from conformance.packs.table1.robot.standstill_trace import Rest
@@ -93,6 +95,9 @@ class _Player:
         robot = self.robot
         for velocity in self.effort.alternatives(list(_beyond(robot)), 8):
             self._send(velocity)
+        for path, value in ((VELOCITY, _fast(robot).twist), (LINEAR, _fast(robot).linear)):
+            for method, target in _elsewhere(robot, path):
+                self._send_elsewhere(method, target, value)
         if not robot.limits_declared:
             self.trace = replace(self.trace, settled=watch_rest(Drive(robot), _AFTER, robot.limits.settle_s))
         components = [component for component in range(6) if not robot.actuated(component)]
@@ -116,6 +121,21 @@ class _Player:
         rest = Rest(after, read, "") if seen is None or robot.near(seen, STILL) else read_rest(Drive(robot), after)
         self.trace = replace(self.trace, rests=(*self.trace.rests, rest))
 
+    def _send_elsewhere(self, method: str, target: str, value: dict[str, Any]) -> None:
+        """Send a valid velocity by a method or to a path that the robot must refuse, and read the robot."""
+        robot = self.robot
+        fields = (("Content-Type", JSON),)
+        exchange = robot.rest.send(method, target, headers=fields, body=body_of(value), fresh=True)
+        if not is_refused(exchange):
+            robot.put_velocity(STILL)  # a vendor's own, or a redirect
+            return
+        after = f"{method} {target}, which was refused"
+        seen, read = robot.velocity()
+        rest = Rest(after, read, "") if seen is None or robot.near(seen, STILL) else read_rest(Drive(robot), after)
+        self.trace = replace(self.trace, rests=(*self.trace.rests, rest))
+        if rest.found:
+            robot.put_velocity(STILL)
+
     def _actuate(self, component: int) -> None:
         """PUT velocities in a component, until the robot reaches one."""
         robot = self.robot
@@ -130,6 +150,17 @@ class _Player:
                 self.trace = replace(self.trace, unactuated=(*self.trace.unactuated, one))
                 if reached:
                     return
+
+
+def _fast(robot: Robot) -> Velocity:
+    return robot.drivable(robot.share_of_limits(0.4, 0.4))
+
+
+def _elsewhere(robot: Robot, path: str) -> Iterator[tuple[str, str]]:
+    """Yield methods that the resource does not have, and the path without its slash (contract.md#addresses)."""
+    allowed = robot.rest.send("OPTIONS", path).response.header("Allow") or ""
+    yield from ((method, path) for method in ("POST", "PATCH") if method not in allowed)
+    yield "PUT", path.rstrip("/")
 
 
 def _only(component: int, value: float) -> Velocity:

@@ -1,16 +1,19 @@
 """Turning: at the highest speed, renewed also after rejected commands, along an arc, and at last not renewed."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
+from conformance.api.soap.callable_services import SoapServices
 from conformance.packs.table1.robot import drive_rules
 from conformance.packs.table1.robot.abilities import ABOUT, AHEAD, turn_beside
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART
 from conformance.packs.table1.robot.goals import make_room
-from conformance.packs.table1.robot.letting_go import LetGo, Way, ends_by
-from conformance.packs.table1.robot.robot import STILL, VELOCITY, Robot, Velocity
+from conformance.packs.table1.robot.letting_go import LetGo, Way, certain_s, ends_by
+from conformance.packs.table1.robot.no_commands import no_commands
+from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 from conformance.packs.table1.robot.undisturbed import arc, renewed
 from conformance.packs.table1.robot.unrenewed import slow, unrenewed
 from conformance.packs.table1.robot.velocity_range import both, fastest, handy, reach, slowest_along
@@ -26,25 +29,26 @@ _AGAIN: Final = 0.25
 _SOON: Final = 0.2
 # Of the hold time: so long after its end the suite does not read the robot, if that is enough for it to come to rest.
 _BRIEF: Final = 0.2
+# For so many times the hold time a linear part is renewed.
+_RENEWED: Final = 1.4
 # How often a measurement of how long a velocity holds is tried that a stall of the suite or a late response spoilt.
 _ATTEMPTS: Final = 3
 # The only whole number of rad/s below the limits of most robots.
 _WHOLE: Final = 1.0
 # Of the limit: how fast the robot drives along an arc.
 _ASIDE: Final = 0.3
-_NOT_ACCEPTABLE: Final = (("Accept", "image/png"),)
 # In this time several samples come, from any robot, s.
 _SAMPLES_S: Final = (SEVERAL + 1) * LONGEST_SAMPLE_S
 
 
 @scenario(needs={Need.REST, Need.MOTION})
-def turn(robot: Robot, run: Run) -> Driven:
+def turn(robot: Robot, run: Run, soap: SoapServices) -> Driven:
     """Turn for about four seconds, in several ways, and let the last velocity end by itself.
 
     A robot that cannot turn on the spot turns in its narrowest circle; one that cannot turn at all drives.
     """
     make_room(robot)
-    turning = _Turning(robot, Drive(robot))
+    turning = _Turning(robot, Drive(robot), no_commands(robot, soap.subscribers, str(run.seed)))
     try:
         turning.play(run)
     except Exception as error:
@@ -53,10 +57,10 @@ def turn(robot: Robot, run: Run) -> Driven:
 
 
 @scenario(needs={Need.REST, Need.MOTION})
-def further_axes(robot: Robot) -> Driven:
+def further_axes(robot: Robot, run: Run, soap: SoapServices) -> Driven:
     """Drive along each axis that the robot has beside those of a robot on two wheels; without any, do nothing."""
     further = [axis for axis in range(len(STILL)) if axis not in {AHEAD, ABOUT} and robot.actuated(axis)]
-    driving = _Turning(robot, Drive(robot))
+    driving = _Turning(robot, Drive(robot), no_commands(robot, soap.subscribers, str(run.seed)))
     if further:
         make_room(robot)
     try:
@@ -69,10 +73,11 @@ def further_axes(robot: Robot) -> Driven:
 
 @dataclass
 class _Turning:
-    """One play of the scenario."""
+    """One play of the scenario; ``idle`` are requests that must not renew a velocity."""
 
     robot: Robot
     drive: Drive
+    idle: list[Callable[[], object]] = field(default_factory=list)
     tries: list[tuple[LetGo, ...]] = field(default_factory=list)
     not_tested: list[tuple[str, str]] = field(default_factory=list)
     fastest: Velocity = STILL  # the fastest turn to the left that the robot has reached
@@ -114,7 +119,7 @@ class _Turning:
         for velocity, by in self._unrenewed(bent, run):
             self.let_go(velocity, by)
         if robot.actuated(AHEAD) and robot.actuated(ABOUT):
-            self._ahead_from_rest()
+            self._ahead_from_rest(renewed=run.effort.name != "quick")
 
     def _unrenewed(self, bent: Velocity, run: Run) -> list[tuple[Velocity, Way]]:
         """Return what unrenewed() returns; without a declared hold time one velocity is enough."""
@@ -170,16 +175,35 @@ class _Turning:
             return None
         return right if reach(drive, right) else None
 
-    def _ahead_from_rest(self) -> None:
-        """Command a linear part after the angular part has ended by itself: the angular part must stay zero."""
+    def _ahead_from_rest(self, *, renewed: bool) -> None:
+        """Command a linear part after the angular part has ended by itself: the angular part must stay zero.
+
+        If ``renewed``, the linear part is renewed by its own resource as well, for longer than it holds.
+        """
         drive, ahead = self.drive, self.robot.share_of_limits(_ASIDE, 0.0)
         if not drive.command_linear(ahead):
             return
         drive.reach(ahead, "rest-resources/linear-put", part=LINEAR_PART)
         keeps, seen = drive.sees(ahead, 1.5, part=ANGULAR_PART)
-        self.robot.put_velocity(STILL)
         expected = f"no angular part beside {ahead}: the one before it had ended"
         drive.saw("rest-resources/linear-keeps-angular", expected, seen, "came back", holds=keeps)
+        if renewed and self.robot.limits.hold_s:
+            self._renew_linear(ahead, self.robot.limits.hold_s)
+        self.robot.put_velocity(STILL)
+
+    def _renew_linear(self, ahead: Velocity, hold_s: float) -> None:
+        """PUT a linear part again and again for longer than it holds, and record whether it lasts."""
+        drive = self.drive
+        until = drive.clock.now() + _RENEWED * hold_s
+        in_time = True
+        while drive.clock.now() < until:
+            before = drive.trace.sent
+            drive.command_linear(ahead)
+            in_time = in_time and drive.trace.answered < before + certain_s(hold_s)
+            drive.keep(_AGAIN * hold_s)
+        lasts, seen = drive.sees(ahead, 2, part=LINEAR_PART, until=drive.trace.sent + certain_s(hold_s))
+        expected = f"{ahead} as long as a PUT of the linear part renews it"
+        drive.saw("safety/renewal", expected, seen, "ended", holds=lasts if in_time else None)
 
     def let_go(self, turning: Velocity, by: Way = "velocity") -> None:
         """Stop renewing a velocity, and watch how it ends; ``by``: what commands it last.
@@ -207,13 +231,22 @@ class _Turning:
         if tries:
             self.tries.append(tuple(tries))
 
+    def _send_idle(self, until: float) -> None:
+        """Send requests that renew nothing while they still could, until a time, s of the run's clock; at least one."""
+        for _ in range(len(self.idle)):
+            send = self.idle.pop(0)
+            self.idle.append(send)
+            send()
+            if self.drive.clock.now() > until:
+                break
+
     def _watch(self, turning: Velocity, by: Way) -> LetGo | None:
         """Command a velocity, and look until the robot rests or its time is over; return None if it is rejected.
 
         With a declared hold time, the suite does not read the robot around the end of that time, because a velocity
         must end by time and not by a request. A rejected command meanwhile must not renew it.
         """
-        robot, drive, clock, limits = self.robot, self.drive, self.drive.clock, self.robot.limits
+        drive, clock, limits = self.drive, self.drive.clock, self.robot.limits
         last = drive.trace.last_full
         if last is None or last.velocity != turning or clock.now() > drive.holds_until:
             drive.refresh(turning)
@@ -242,9 +275,7 @@ class _Turning:
             if let_go.is_decided(limits, ends):
                 return let_go
             if resumed is None and clock.now() > silent_from:
-                # What is refused renews nothing: neither a command nor a read.
-                robot.put_velocity(Velocity(angular_z=1e4))
-                robot.rest.send("GET", VELOCITY, headers=_NOT_ACCEPTABLE)
+                self._send_idle(full + (limits.hold_s or 0.0))
                 silent_s = (1 + _BRIEF) * (limits.hold_s or 0.0) if self.brief else let_go.longest(limits)
                 due = max(clock.now(), answered + silent_s)
                 clock.sleep(due - clock.now())

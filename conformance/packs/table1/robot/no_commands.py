@@ -1,0 +1,49 @@
+"""Requests that command no velocity: they must neither renew one that is there nor end it."""
+
+import random
+from collections.abc import Callable
+from typing import Final
+
+from conformance.api.soap.service import SoapService
+from conformance.packs.table1.robot.delivery import path_of
+from conformance.packs.table1.robot.geometry import Pose
+from conformance.packs.table1.robot.goal import goal_body, put_goal
+from conformance.packs.table1.robot.robot import LINEAR, SENSORS, VELOCITY, Robot, Velocity
+from conformance.packs.table1.robot.soap_services import ask
+
+_NOT_ACCEPTABLE: Final = (("Accept", "image/png"),)
+_BEYOND: Final = Velocity(angular_z=1e4)
+# Quaternions off by more than 2e-3 are refused (contract.md#poses).
+_NO_UNIT: Final = 2.0
+_NO_NUMBER: Final = ("3", "1", "2", "3", "4", "5", "abc")
+
+
+def refuse_goal(robot: Robot) -> object:
+    """PUT a goal that the robot must refuse."""
+    return put_goal(robot, goal_body(Pose(0.0, 0.0, 0.0), robot.statement.motion.frame, length=_NO_UNIT))
+
+
+def no_commands(robot: Robot, subscribers: SoapService | None, seed: str) -> list[Callable[[], object]]:
+    """Return requests that are refused or only read, in an order that the seed says.
+
+    Args:
+        robot: the robot.
+        subscribers: its SOAP service that reads, or None.
+        seed: of the order.
+    """
+    rest = robot.rest
+    found: list[Callable[[], object]] = [
+        lambda: robot.put_velocity(_BEYOND),
+        lambda: robot.put_linear(_BEYOND._replace(linear_x=1e3, angular_z=0.0)),
+        lambda: refuse_goal(robot),
+        lambda: rest.send("PUT", path_of(*_NO_NUMBER)),
+        lambda: rest.send("GET", VELOCITY, headers=_NOT_ACCEPTABLE),
+        lambda: rest.send("HEAD", VELOCITY),
+        lambda: rest.send("OPTIONS", LINEAR),
+        lambda: rest.send("GET", SENSORS),
+    ]
+    if subscribers is not None:
+        found.append(lambda: ask(subscribers, "GetVelocity"))
+        found.append(lambda: ask(subscribers, "GetPose"))
+    random.Random(f"{seed}/no commands").shuffle(found)  # noqa: S311 - no secret
+    return found
