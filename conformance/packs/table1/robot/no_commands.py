@@ -20,7 +20,7 @@ _NO_NUMBER: Final = ("3", "1", "2", "3", "4", "5", "abc")
 
 def refuse_goal(robot: Robot) -> object:
     """PUT a goal that the robot must refuse."""
-    return put_goal(robot, goal_body(Pose(0.0, 0.0, 0.0), robot.statement.motion.frame, length=_NO_UNIT))
+    return put_goal(robot, goal_body(Pose(0.0, 0.0, 0.0), "map", length=_NO_UNIT))
 
 
 def no_commands(robot: Robot, subscribers: SoapService | None, seed: str) -> list[Callable[[], object]]:

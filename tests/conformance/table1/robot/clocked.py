@@ -71,6 +71,7 @@ class Drive(drive.Drive):
         limits = DeclaredLimits(**declared).resolved()
         given: dict[str, Any] = {"limits": limits, "clock": body.clock, "settle_s": 1.25 * SETTLE_S + 0.25}
         given |= {"sample_s": SAMPLE_S, "usual_s": usual_s, "put_velocity": body.refuse, "put_linear": body.refuse}
+        given["put"] = body.refuse
         super().__init__(SimpleNamespace(**given))
         self.body, self.looks = body, looks
 
