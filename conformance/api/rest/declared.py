@@ -6,6 +6,7 @@ from conformance.api.expectation import expect
 from conformance.api.rest.accept import quality
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.request_context import RequestContext
+from conformance.api.rest.validity import VALID, validity
 from conformance.documents.json_schema import Schema, shape_of
 from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.documents.representation import UnreadableError, read
@@ -28,7 +29,7 @@ def judge(api: RestInterface, exchange: Exchange, answer: Response, context: Req
         return
     if answer.status < _SERVER_ERROR:
         expect(api.run.judge, "http/declared-status", exchange).that(
-            _status_fits(operation, answer, context),
+            _status_fits(api, operation, answer, context),
             f"a status that the contract declares for {operation.id}: {', '.join(operation.responses)}",
             f"status {answer.status}",
             cause=f"{operation.id} {answer.status}",
@@ -59,7 +60,15 @@ def judge_refused_method(api: RestInterface, exchange: Exchange, context: Reques
     )
 
 
-def _status_fits(operation: Operation, answer: Response, context: RequestContext) -> bool:
+def _is_valid(api: RestInterface, context: RequestContext) -> bool:
+    """Return whether the contract allows a request, so that nothing in it is a reason to refuse it."""
+    request = context.request
+    fields = {name.lower(): value for name, value in request.headers}
+    media_type = fields.get("content-type", "").partition(";")[0].strip().lower()
+    return validity(api.run.contract, request.method, context.target, media_type, request.body).verdict == VALID
+
+
+def _status_fits(api: RestInterface, operation: Operation, answer: Response, context: RequestContext) -> bool:
     status = answer.status
     if status in _ANY_REQUEST or operation.declared(status) is not None:
         return True
@@ -74,7 +83,8 @@ def _status_fits(operation: Operation, answer: Response, context: RequestContext
     # Invalid input may be refused with any 4xx (contract, fine print); 404 only where a value is in the path.
     has_input = bool(context.request.body or operation.parameters or operation.bodies)
     elsewhere = status == _NO_METHOD or (status == _NOT_FOUND and not operation.parameter("path"))
-    return has_input and HTTPStatus.BAD_REQUEST <= status < _SERVER_ERROR and not elsewhere
+    refused = has_input and HTTPStatus.BAD_REQUEST <= status < _SERVER_ERROR and not elsewhere
+    return refused and not (status != _NOT_FOUND and context.usual and _is_valid(api, context))
 
 
 def _judge_body(api: RestInterface, exchange: Exchange, answer: Response, context: RequestContext) -> None:

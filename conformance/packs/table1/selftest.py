@@ -205,6 +205,20 @@ _OPEN_PLACES = (
         r"body-empty(@[\w-]+)?:putGoal:body:\w+",
         "A goal is acknowledged by the status (contract.md#goals); no clause requires a response body.",
     ),
+    OpenPlace(
+        r"single(@[\w-]+)?:putGoal:request\.goal\.target_pose\.pose\.(position|orientation)\.\w+:\w+",
+        "A robot responds with the goal as it understood it, and may have transformed it (contract.md#goals): only "
+        "deliveries are the same to the last bit.",
+    ),
+    OpenPlace(
+        r"(default|scale|negate|single|ulp|ignore|lag|clamp|round)(@[\w-]+)?:[gG]etPlan:request\.start_yaw:\w+",
+        "A path starts near the given position; no clause says with which heading (contract.md#plans).",
+    ),
+    OpenPlace(
+        r"header-more:\w+:Allow",
+        "A method that Allow names in every response is the vendor's own, which the suite does not send "
+        "(contract.md#http).",
+    ),
     OpenPlace(r"status:putDelivery:2\d\d-2\d\d", "A delivery responds 2xx; 204 is preferred (contract.md#rest)."),
     OpenPlace(
         r"reorder:[gG]et(Sensors|NavigationServices):answer(\.return)?:\w+",

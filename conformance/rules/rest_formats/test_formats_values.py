@@ -92,7 +92,7 @@ def test_formats_carry_the_same_values(api: RestInterface, judge: Judge) -> None
 @pytest.mark.phase("resting")
 @pytest.mark.requirement("rest-formats/same-values")
 def test_formats_carry_the_same_values_after_other_requests(api: RestInterface) -> None:
-    """Compare every value again, just after a refused request, and just after one that acts.
+    """Compare every value again, just after a refused request, on a new connection, and just after one that acts.
 
     At quick, the seed says after which of them.
     """
@@ -101,10 +101,10 @@ def test_formats_carry_the_same_values_after_other_requests(api: RestInterface) 
     def refused(call: Call) -> object:
         return call.send(api, ("Accept", _NO_FORMAT))
 
-    events: list[Callable[[Call], object]] = [refused]
+    events: list[Callable[[Call], object]] = [refused, lambda _: api.client.close()]
     if run.allow_motion:
         events.append(lambda _: api.device.halt(api))
-    for event in run.effort.draw(events, 2, f"{run.seed}/events"):
+    for event in run.effort.draw(events, 3, f"{run.seed}/events"):
         for call in run.effort.subsample(reads(api), 5):
             if len(call.operation.formats) > 1:
                 judge_same_values(api, call, list(call.operation.formats), before=partial(event, call))

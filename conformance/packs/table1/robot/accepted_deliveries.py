@@ -31,6 +31,8 @@ _WAITS_S: Final = 1.0
 _STEP_S: Final = 0.1
 # What the list holds at least.
 _HELD: Final = 50
+# So many lists are remembered: several clients may read it at once.
+_LISTS: Final = 8
 # A message of more octets is not read.
 _LARGE: Final = 100_000
 _OPERATIONS: Final = {clark(NAMESPACE, f"Execute{name}Request"): name == "Coffee" for name in ("Coffee", "Delivery")}
@@ -70,6 +72,8 @@ class AcceptedDeliveries(Listener):
         # New entries that no accepted delivery has been found for, yet: its response may come after the list.
         self._new: Counter[tuple[Delivery, str]] = Counter()
         self._has_list = True
+        # The lists that were read last, with the time of the response, s: what a later one shows has to have these.
+        self._lists: list[tuple[float, Counter[str]]] = []
 
     def answered(self, exchange: Exchange) -> None:
         """Take one exchange of the run: a delivery, or the list of them."""
@@ -117,6 +121,7 @@ class AcceptedDeliveries(Listener):
             return
         entries = Counter(json.dumps([entry["request"], entry["accepted"], entry["interface"]]) for entry in value)
         listed = Counter((Delivery.of(entry["request"]), str(entry["interface"])) for entry in value)
+        self._judge_kept(exchange, entries)
         first = self._before is None and not self._waiting
         before = entries if first else self._before or Counter()
         for entry in (entries - before).elements():
@@ -138,6 +143,19 @@ class AcceptedDeliveries(Listener):
                 self._waiting.append(one)
             elif whole:
                 self._judge(one, there=False)
+
+    def _judge_kept(self, exchange: Exchange, entries: Counter[str]) -> None:
+        """Judge whether a list that is not full still has each entry of the one before, unchanged."""
+        received_s = exchange.response.received_s
+        asked_s = received_s - exchange.response.elapsed_ms / 1000
+        before = next((one for at, one in reversed(self._lists) if at < asked_s), Counter[str]())
+        gone = before - entries if entries.total() < _HELD else Counter[str]()
+        expected, found = "the entries of the list that was read before", "".join([*gone][:1])
+        self._api.run.judge.check(
+            "rest-delivery/list", not gone, exchange, expected, found=found and f"none with {found}", cause="changed"
+        )
+        if not gone:
+            self._lists = [*self._lists[-_LISTS:], (received_s, entries)]
 
     def _take(self, one: _Accepted, there: Counter[tuple[Delivery, str]]) -> bool:
         """Return whether there is an entry for a delivery that is no other's; it is then this one's."""

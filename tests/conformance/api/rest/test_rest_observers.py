@@ -47,6 +47,13 @@ def test_good_answers_raise_no_alarm():
     assert seen("PUT", "/robot/velocity/", None, problem="the server closed the connection without a response") == set()
 
 
+@pytest.mark.parametrize(("path", "refuted"), [("1.5", True), ("north", False)])
+def test_a_valid_request_is_not_refused_by_just_any_status(path, refuted):
+    path = f"/robot/app/delivery/3/depot_x/1/depot_y/2/destination_x/3/destination_y/4/source_x/5/source_y/{path}"
+    assert ("http/declared-status" in seen("PUT", path, 407, [DATE])) is refuted
+    assert "http/declared-status" not in seen("PUT", path, 406, [DATE], sent=(("Accept", "image/png"),))
+
+
 def test_a_server_s_answer_to_a_range_or_a_condition_is_its_own():
     part = [DATE, VARY, JSON, ("Content-Range", "bytes 0-3/300")]
     assert seen("GET", "/robot/velocity/", 206, part, b'{"li', sent=(("Range", "bytes=0-3"),)) == set()

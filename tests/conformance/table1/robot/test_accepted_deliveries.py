@@ -42,6 +42,11 @@ class Robot:
             self.hold(held)
         self._answered(Request("PUT", f"{_BASE}{one.rest_path}"), Response(status, (), b"", 1.0))
 
+    def change(self) -> None:
+        """Show another value in the oldest entry from now on."""
+        oldest = self._listed[-1]
+        self._listed = [*self._listed[:-1], oldest | {"request": oldest["request"] | {"source_y": 0.75}}]
+
     def show(self, after_s: float = 10.0) -> None:
         """Show the list."""
         self._now += after_s
@@ -140,3 +145,12 @@ def test_a_clock_in_whole_seconds():
         robot.show(0.05)
     robot.show()
     assert not robot.blamed
+
+
+@pytest.mark.parametrize(("held", "blamed"), [(3, {"rest-delivery/list"}), (60, set())])
+def test_an_entry_that_changes_where_the_list_need_drop_none(held, blamed):
+    robot = Robot(*map(_some, range(held)))
+    robot.change()
+    robot.show()
+    robot.show()
+    assert robot.blamed == blamed

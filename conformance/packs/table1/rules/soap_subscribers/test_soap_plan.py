@@ -27,6 +27,7 @@ _PLAN = "soap-subscribers/plan"
 _TOLERANCE = 0.25
 # A path that is not told right after so many refusals, and is otherwise, is not told because of them.
 _REFUSALS = 3
+_LONG = "no_such_frame_" * 8
 
 
 @dataclass(frozen=True)
@@ -153,7 +154,13 @@ def test_no_plan(soap: SoapServices, subscribers: SoapService, judge: Judge) -> 
             delivery_messages.request("GetPlan", x=here.x, y=here.y, frame_id="no_such_frame"),
             "a frame that the robot does not know",
         ),
+        (
+            delivery_messages.request("GetPlan", x=here.x, y=here.y, frame_id=_LONG),
+            f"a frame with a name of {len(_LONG)} characters",
+        ),
     ):
+        # A response of another request, in the place of this one's, is then no fault.
+        call_valid(subscribers, delivery_messages.request("GetVelocity"))
         answer = call_valid(subscribers, message)
         wrapper = answer.first if answer.accepted else None
         path = _path(wrapper, expected)[0] if wrapper is not None else None
