@@ -49,7 +49,7 @@ def test_good_answers_raise_no_alarm():
 
 @pytest.mark.parametrize(("path", "refuted"), [("1.5", True), ("north", False)])
 def test_a_valid_request_is_not_refused_by_just_any_status(path, refuted):
-    path = f"/robot/app/delivery/3/depot_x/1/depot_y/2/destination_x/3/destination_y/4/source_x/5/source_y/{path}"
+    path = f"/robot/app/delivery/3/depot_x/1/depot_y/2/dest_x/3/dest_y/4/source_x/5/source_y/{path}"
     assert ("http/declared-status" in seen("PUT", path, 407, [DATE])) is refuted
     assert "http/declared-status" not in seen("PUT", path, 406, [DATE], sent=(("Accept", "image/png"),))
 
