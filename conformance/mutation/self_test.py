@@ -118,6 +118,8 @@ class SelfTest:
         variants: harmless changes of this pack, beside those of the suite.
         classes: the classes that can detect a change in an operation, its own class first, by a regular expression of
             the operation's name; the first match counts. Default: all classes of the pack that judge its interface.
+        clauses: the clause of the contract that an operation keeps, by a regular expression of the operation's name;
+            the first match counts.
         open_places: generated changes that break no clause.
     """
 
@@ -129,6 +131,7 @@ class SelfTest:
     wsdls: Callable[[str], tuple[str, str]] = only_publishers
     variants: tuple[HarmlessChange, ...] = ()
     classes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    clauses: Mapping[str, str] = field(default_factory=dict)
     open_places: tuple[OpenPlace, ...] = ()
 
     def device(self, name: str) -> GoodDevice:
@@ -151,6 +154,10 @@ class SelfTest:
     def classes_of(self, operation: str) -> tuple[str, ...]:
         """Return the pack's classes that can detect a change in an operation; empty: not declared."""
         return next((found for pattern, found in self.classes.items() if re.fullmatch(pattern, operation)), ())
+
+    def clause_of(self, operation: str) -> str:
+        """Return the clause of the contract that an operation keeps; empty: not declared."""
+        return next((found for pattern, found in self.clauses.items() if re.fullmatch(pattern, operation)), "")
 
 
 @cache

@@ -275,5 +275,15 @@ SELFTEST = SelfTest(
         r"Execute\w+": ("soap-delivery", "equivalence"),
         r"\w+": ("soap-subscribers", "equivalence"),
     },
+    clauses={
+        r"[a-z]\w*Pose": "Poses",
+        r"[a-z]\w*Velocity": "Velocity",
+        r"[a-z]\w*(Sensors|Services)": "Sensors and services",
+        r"[a-z]\w*Goal": "Goals",
+        r"[a-z]\w*Plan": "Plans",
+        r"[a-z]\w*Deliver(y|ies)": "Deliveries",
+        r"Execute\w+": "SOAP publishers",
+        r"Get\w+": "SOAP subscribers",
+    },
     open_places=_OPEN_PLACES,
 )

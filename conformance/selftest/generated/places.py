@@ -39,6 +39,7 @@ class Exchange:
         classes: conformance classes of the pack that read its messages, the operation's own class first.
         statuses: statuses that the description declares.
         formats: media types of a successful response.
+        clause: the clause of the contract that it keeps, where the pack names one.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Exchange:
     classes: tuple[str, ...]
     statuses: tuple[int, ...]
     formats: tuple[str, ...]
+    clause: str = ""
 
     @property
     def class_(self) -> str:
@@ -117,7 +119,8 @@ def exchanges(contract: Contract) -> tuple[Exchange, ...]:
     for interface, description in _services(contract):
         for operation in description.operations:
             classes = classes_of(contract, operation.name, interface)
-            found.append(Exchange(operation.name, "soap", "POST", "", (), classes, (200,), ("text/xml",)))
+            clause = self_test_of(contract).clause_of(operation.name)
+            found.append(Exchange(operation.name, "soap", "POST", "", (), classes, (200,), ("text/xml",), clause))
     return tuple(found)
 
 
@@ -148,6 +151,7 @@ def rest_exchange(contract: Contract, operation: Operation, base: str = "") -> E
         classes_of(contract, operation.id, Interface.REST),
         tuple(statuses),
         tuple(operation.formats),
+        self_test_of(contract).clause_of(operation.id),
     )
 
 

@@ -12,7 +12,7 @@ from conformance.selftest.generated.sampling import Rate, rate_of, rates_by
 
 # The result file's word for a mutant that was killed, as roaas-selftest/1 has it.
 _WRITTEN = {KILLED: "caught"}
-_KEYS = ("class", "operation", "when", "operator", "effort")
+_KEYS = ("class", "clause", "operation", "when", "operator", "effort")
 
 
 def _figures(rate: Rate) -> dict[str, Any]:

@@ -94,13 +94,30 @@ def rates_by(results: Iterable[GeneratedResult], key: str) -> dict[str, Rate]:
 
 
 def group_of(result: GeneratedResult, key: str) -> str:
-    """Return a result's ``operator``, ``when`` it strikes, ``class``, ``operation``, or ``effort`` of the last run."""
+    """Return what a result counts for.
+
+    Args:
+        result: the result.
+        key: ``operator``, ``when`` it strikes, ``class``, ``clause`` of the contract, ``operation``, or ``effort`` of
+            the last run.
+    """
     mutant = result.mutant
     operator, _, when = mutant.operator.partition("@")
     return {
         "operator": operator,
         "when": when or "always",
         "class": mutant.exchange.class_,
+        "clause": _clause(mutant),
         "operation": mutant.exchange.name,
         "effort": result.effort,
     }[key]
+
+
+def _clause(mutant: GeneratedMutant) -> str:
+    """Return the clause of the contract that a mutant breaks: that of headers or formats, or of its operation."""
+    exchange = mutant.exchange
+    if exchange.clause and mutant.operator.startswith("header-"):
+        return "HTTP"
+    if exchange.clause and exchange.side == "rest" and mutant.name.endswith((":xml", ":text")):
+        return "Formats"
+    return exchange.clause or exchange.class_
