@@ -1,6 +1,7 @@
 """Questions whose responses can be told apart, so that a response that went to another client is noticed."""
 
 import itertools
+import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -10,7 +11,7 @@ from urllib.parse import quote
 from conformance.api.rest.applicable import allowed, answered
 from conformance.api.rest.calls import JSON, Call, example_call
 from conformance.api.rest.interface import RestInterface
-from conformance.documents.json_schema import is_numeric, shape_of
+from conformance.documents.json_schema import Schema, is_numeric, shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, operations_of
 from conformance.documents.representation import UnreadableError, read
@@ -20,6 +21,8 @@ from conformance.transport.parallel import Outgoing
 # Stands in the questions that only one client sends.
 _MARK: Final = "roaas-client-"
 _UNKNOWN: Final = 4
+# So many characters of a mismatch are shown.
+_SHOWN: Final = 400
 
 
 @dataclass(frozen=True)
@@ -92,14 +95,17 @@ def _reads(api: RestInterface) -> list[tuple[Question, Response]]:
     for call in answered(api):
         for media_type in call.operation.formats:
             answer = call.send(api, ("Accept", media_type)).response
-            mismatch = _shape_of(call, media_type, _names_in(answer))
+            alike = api.device.answers_alike(call.operation.template) and not call.operation.motion
+            mismatch = _shape_of(call, media_type, answer, entries=alike)
             comes_and_goes = call.operation.declared(HTTPStatus.NOT_FOUND) is not None
             found.append((Question(call.path, media_type, mismatch, comes_and_goes), answer))
     return found
 
 
-def _shape_of(call: Call, media_type: str, names: frozenset[str]) -> Callable[[Response], str]:
-    schema = call.operation.shape or {}
+def _shape_of(call: Call, media_type: str, alone: Response, *, entries: bool) -> Callable[[Response], str]:
+    """Return a test whether a response has the shape of the one that was received alone, and, if asked, its entries."""
+    schema, names = call.operation.shape or {}, _names_in(alone)
+    listed = _entries(media_type, alone, schema) if entries else None
 
     def mismatch(answer: Response) -> str:
         if not answer.ok:
@@ -113,10 +119,21 @@ def _shape_of(call: Call, media_type: str, names: frozenset[str]) -> Callable[[R
         if problem:
             return f"a body in which {problem}"
         found = _names_in(answer)
-        is_other = bool(names and found and names - found)
-        return f"an object without {min(names - found)}" if is_other else ""
+        if names and found and names - found:
+            return f"an object without {min(names - found)}"
+        other = _entries(media_type, answer, schema) if listed is not None else None
+        return "" if other == listed else f"{other} in place of {listed}"[:_SHOWN]
 
     return mismatch
+
+
+def _entries(media_type: str, answer: Response, schema: Schema) -> list[str] | None:
+    """Return the entries of a list, sorted; None where the response is no list."""
+    try:
+        value = read(media_type, answer.body, schema) if answer.ok else None
+    except UnreadableError:
+        return None
+    return sorted(json.dumps(entry, sort_keys=True) for entry in value) if isinstance(value, list) else None
 
 
 def _names_in(answer: Response) -> frozenset[str]:

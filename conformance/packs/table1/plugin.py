@@ -107,9 +107,9 @@ class Device(device.Device):
 
     def answers_alike(self, template: str) -> bool:
         """Return whether a resource's responses to equal requests are equal."""
-        from conformance.packs.table1.robot.robot import LINEAR, VELOCITY  # noqa: PLC0415 - see the class
+        from conformance.packs.table1.robot.robot import LINEAR, SENSORS, SERVICES, VELOCITY  # noqa: PLC0415
 
-        return template in {VELOCITY, LINEAR}
+        return template in {VELOCITY, LINEAR, SENSORS, SERVICES}
 
     def is_near(self, place: str, shown: Any, wanted: Any) -> bool:
         """Return whether a value that is read is the one that was sent, within the declared tolerance."""

@@ -211,8 +211,8 @@ _OPEN_PLACES = (
         "deliveries are the same to the last bit.",
     ),
     OpenPlace(
-        r"(default|scale|negate|single|ulp|ignore|lag|clamp|round)(@[\w-]+)?:[gG]etPlan:request\.start_yaw:\w+",
-        "A path starts near the given position; no clause says with which heading (contract.md#plans).",
+        r"ulp(@[\w-]+)?:put(Linear)?Velocity:request\.[\w.]+:\w+",
+        "A velocity is reached within the declared tolerance (contract.md#velocity), and 204 is a full response.",
     ),
     OpenPlace(
         r"header-more:\w+:Allow",

@@ -1,5 +1,6 @@
 """JSON, XML and plain text of the same moment: each must be readable and have the same values (contract, formats)."""
 
+import time
 from collections.abc import Callable
 from functools import partial
 
@@ -21,6 +22,8 @@ _XML = "application/xml"
 _TEXT = "text/plain"
 # No robot has its responses in this format.
 _NO_FORMAT = "image/png"
+# Longer than a client waits between two requests, s.
+_PAUSE_S = 1.1
 _IDS = {_XML: "rest-formats/xml", _TEXT: "rest-formats/text"}
 
 
@@ -92,7 +95,7 @@ def test_formats_carry_the_same_values(api: RestInterface, judge: Judge) -> None
 @pytest.mark.phase("resting")
 @pytest.mark.requirement("rest-formats/same-values")
 def test_formats_carry_the_same_values_after_other_requests(api: RestInterface) -> None:
-    """Compare every value again, just after a refused request, on a new connection, and just after one that acts.
+    """Compare every value again: just after a refused request or one that acts, on a new connection, after a pause.
 
     At quick, the seed says after which of them.
     """
@@ -104,10 +107,14 @@ def test_formats_carry_the_same_values_after_other_requests(api: RestInterface) 
     events: list[Callable[[Call], object]] = [refused, lambda _: api.client.close()]
     if run.allow_motion:
         events.append(lambda _: api.device.halt(api))
+    calls = [call for call in run.effort.subsample(reads(api), 5) if len(call.operation.formats) > 1]
     for event in run.effort.draw(events, 3, f"{run.seed}/events"):
-        for call in run.effort.subsample(reads(api), 5):
-            if len(call.operation.formats) > 1:
-                judge_same_values(api, call, list(call.operation.formats), before=partial(event, call))
+        for call in calls:
+            judge_same_values(api, call, list(call.operation.formats), before=partial(event, call))
+    # A pause costs its time: only in longer runs, and the seed says for which resources.
+    for call in run.effort.draw(calls, 2, f"{run.seed}/pause") if run.effort.name != "quick" else ():
+        formats = run.effort.draw(call.operation.formats, 2, f"{run.seed}/formats")
+        judge_same_values(api, call, formats, before=partial(time.sleep, _PAUSE_S))
 
 
 @pytest.mark.phase("aside")

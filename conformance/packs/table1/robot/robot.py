@@ -119,10 +119,12 @@ class Robot:
 
     Attributes:
         clock: the run's clock, used for every wait.
+        may_move: whether the run has the permission to move it.
     """
 
     def __init__(self, api: RestInterface, clock: Clock = WALL_CLOCK) -> None:
         self.rest, self.clock = api.client, clock
+        self.may_move = api.run.allow_motion
         self._contract = api.run.contract
         self.statement = said_of(api.run)
         self.limits = self.statement.limits

@@ -17,7 +17,6 @@ from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
 
 _SLACK: Final = Slack()
-_NOT_ACCEPTABLE: Final = (("Accept", "image/png"),)
 # Two samples are farther apart than this, ns.
 _SAMPLES_APART_NS: Final = 1000
 #: Path, operation and shape of each state.
@@ -65,6 +64,10 @@ def _always(_since: float) -> bool:
     return True
 
 
+def _nothing() -> None:
+    """Do nothing before a request."""
+
+
 def read_state(
     robot: Robot,
     subscribers: SoapService,
@@ -72,9 +75,9 @@ def read_state(
     apart_s: float,
     lasted: Callable[[float], bool] = _always,
     *,
-    refused: bool = False,
+    first: Callable[[], object] = _nothing,
 ) -> StateRead | None:
-    """Read a state over REST, SOAP and REST, ``apart_s`` apart; SOAP just after a request that is ``refused``, or not.
+    """Read a state over REST, SOAP and REST, ``apart_s`` apart; ``first`` is called just before SOAP's.
 
     Return None where REST has no value, which the observers have judged, and where SOAP's differs although the state
     has not ``lasted`` since the first read: it may have changed to and fro.
@@ -83,8 +86,7 @@ def read_state(
     since = robot.clock.now()
     before, _ = robot.read(path, shape)
     robot.clock.sleep(apart_s)
-    if refused:
-        robot.rest.send("GET", path, headers=_NOT_ACCEPTABLE)
+    first()
     exchange = ask(subscribers, operation)
     between, problem = answered(exchange, shape)
     robot.clock.sleep(apart_s)
@@ -138,7 +140,7 @@ def compare(
     renew: Callable[[], object] = lambda: None,
     lasted: Callable[[float], bool] = _always,
     *,
-    refused: bool = False,
+    first: Callable[[], object] = _nothing,
 ) -> list[StateRead]:
     """Read a state over both interfaces, again where one may lag an odometry message behind the other.
 
@@ -148,13 +150,13 @@ def compare(
         name: "pose" or "velocity".
         renew: called before each try to keep the state as it is.
         lasted: returns whether it has been kept since a time, s of the run's clock.
-        refused: whether a request that is refused comes just before the one over SOAP.
+        first: called just before each reading over SOAP.
     """
 
     def tries() -> Iterator[StateRead | None]:
         for apart_s in (0.0, robot.sample_s, robot.sample_s):
             renew()
-            yield read_state(robot, subscribers, name, apart_s, lasted, refused=refused)
+            yield read_state(robot, subscribers, name, apart_s, lasted, first=first)
 
     return agreed(tries())
 

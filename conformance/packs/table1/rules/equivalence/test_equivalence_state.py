@@ -1,5 +1,7 @@
 """REST and SOAP must show the same state."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 import pytest
@@ -13,7 +15,7 @@ from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, TW
 from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.packs.table1.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.packs.table1.robot.plan import plan_of, query, reachable
-from conformance.packs.table1.robot.robot import POSE, SENSORS, SERVICES, Robot, Velocity
+from conformance.packs.table1.robot.robot import POSE, SENSORS, SERVICES, STILL, Robot, Velocity
 from conformance.packs.table1.robot.single_readings import BesideOdometry
 from conformance.packs.table1.robot.soap_services import ask, returned
 from conformance.packs.table1.robot.state_over_soap import STATES, answered, compare
@@ -30,10 +32,19 @@ _END_OFF: Final = 0.3
 _POSES: Final = 200
 _VELOCITIES: Final = 320
 _READ: Final = 4
-# One state in so many is read just after a request that is refused.
-_REFUSED: Final = 5
+# Of so many states one is read over SOAP just after a request that is refused, and one just after one that acts.
+_TURNS: Final = 5
+_NOT_ACCEPTABLE: Final = (("Accept", "image/png"),)
 # How far ahead a plan in the odometry's frame leads, m.
 _AHEAD: Final = 0.3
+
+
+def _event(robot: Robot, turn: int) -> None:
+    """Send, in some turns, a request whose effect on the next one shows a robot that mixes requests up."""
+    if turn % _TURNS == 0:
+        robot.rest.send("GET", POSE, headers=_NOT_ACCEPTABLE)
+    elif turn % _TURNS == 1 and robot.may_move:
+        robot.put_velocity(STILL)
 
 
 @pytest.mark.phase("resting")
@@ -45,7 +56,7 @@ def test_pose_and_velocity(robot: Robot, subscribers: SoapService, judge: Judge,
             if (
                 evidence := judge.of(f"equivalence/{name}")
             ) is None or not evidence.findings:  # it costs three tries each time
-                found = compare(robot, subscribers, name, refused=turn % _REFUSED == 0)
+                found = compare(robot, subscribers, name, first=partial(_event, robot, turn))
                 outcomes = (case for read in found for case in read.cases)
                 record(judge, f"equivalence/{name}", outcomes)
 
@@ -123,13 +134,19 @@ def test_plan(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effo
         there = pose_of(odometry["pose"]["pose"]).ahead(_AHEAD)
         other: dict[str, float | str] = {"x": there.x, "y": there.y, "frame_id": odometry["header"]["frame_id"]}
         for end, parameters in ((goal, few), (there, other), (goal, full)):
-            _compare_plans(robot, subscribers, judge, end, parameters)
+            _compare_plans(robot, subscribers, judge, end, parameters, partial(_event, robot, index))
 
 
 def _compare_plans(
-    robot: Robot, subscribers: SoapService, judge: Judge, goal: Pose, parameters: dict[str, float | str]
+    robot: Robot,
+    subscribers: SoapService,
+    judge: Judge,
+    goal: Pose,
+    parameters: dict[str, float | str],
+    first: Callable[[], object],
 ) -> None:
     before, _ = robot.read(query(**parameters), GET_PLAN)
+    first()
     exchange = ask(subscribers, "GetPlan", **parameters)
     between, problem = answered(exchange, GET_PLAN)
     after, _ = robot.read(query(**parameters), GET_PLAN)
