@@ -3,13 +3,15 @@
 from types import SimpleNamespace
 
 import pytest
+from toy_server import Handler, server_of
 
 from conformance.api.rest import calls
 from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.questions import Question, misplaced
+from conformance.api.rest.questions import Question, misplaced, questions
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
+from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.run import Run
 
@@ -80,3 +82,33 @@ def test_an_answer_is_another_one_s_unless_the_robot_gives_it_alone_as_well(alon
     goal = Question("/goal/", "application/json", lambda answer: "" if answer.status == 200 else f"{answer.status}")
     assert misplaced(api, goal, _answer(200)) == ""
     assert bool(misplaced(api, goal, _answer(404))) is misplaced_too
+
+
+@pytest.mark.parametrize(
+    ("media_type", "body", "other"),
+    [
+        ("application/json", b'[{"name": "b", "type": "a/srv/B"}, {"name": "a", "type": "a/srv/A"}]', False),
+        ("application/json", b'[{"name": "a", "type": "a/srv/A"}]', True),
+        ("text/plain", b"- name: a\n  type: a/srv/A\n- name: bc\n  type: a/srv/B\n", True),
+        ("text/plain", b"- name: a\n  type: a/srv/A\n- name: b\n  type: a/srv/B\n", False),
+    ],
+)
+def test_a_list_keeps_its_entries_beside_other_clients(media_type, body, other):
+    good = {
+        "application/json": b'[{"name": "a", "type": "a/srv/A"}, {"name": "b", "type": "a/srv/B"}]',
+        "text/plain": b"- name: a\n  type: a/srv/A\n- name: b\n  type: a/srv/B\n",
+    }
+
+    class Listing(Handler):
+        def answer(self):
+            kind = self.headers["Accept"].replace("*/*", "application/json")
+            found = self.path == "/robot/navigation/services/" and kind in good
+            self.send(200 if found else 404, good.get(kind, b""), kind)
+
+    with server_of(Listing) as server:
+        api = RestInterface(Run(contract=_CONTRACT), HttpClient(server.url, Connection()))
+        asked = {(one.path, one.accept): one for one in questions(api)}
+        api.client.close()
+    question = asked["/robot/navigation/services/", media_type]
+    answer = Response(200, (("Content-Type", media_type),), body, 1.0)
+    assert bool(question.mismatch(answer)) is other
