@@ -73,7 +73,7 @@ class AcceptedDeliveries(Listener):
         self._new: Counter[tuple[Delivery, str]] = Counter()
         self._has_list = True
         # The lists that were read last, with the time of the response, s: what a later one shows has to have these.
-        self._lists: list[tuple[float, Counter[str]]] = []
+        self._lists: list[tuple[float, list[str]]] = []
 
     def answered(self, exchange: Exchange) -> None:
         """Take one exchange of the run: a delivery, or the list of them."""
@@ -119,9 +119,10 @@ class AcceptedDeliveries(Listener):
         value, problem = read_as(exchange.response, LIST)
         if problem:
             return
-        entries = Counter(json.dumps([entry["request"], entry["accepted"], entry["interface"]]) for entry in value)
+        shown = [json.dumps([entry["request"], entry["accepted"], entry["interface"]]) for entry in value]
+        entries = Counter(shown)
         listed = Counter((Delivery.of(entry["request"]), str(entry["interface"])) for entry in value)
-        self._judge_kept(exchange, entries)
+        self._judge_kept(exchange, shown)
         first = self._before is None and not self._waiting
         before = entries if first else self._before or Counter()
         for entry in (entries - before).elements():
@@ -144,17 +145,26 @@ class AcceptedDeliveries(Listener):
             elif whole:
                 self._judge(one, there=False)
 
-    def _judge_kept(self, exchange: Exchange, entries: Counter[str]) -> None:
-        """Judge whether a list that is not full still has each entry of the one before, unchanged."""
+    def _judge_kept(self, exchange: Exchange, entries: list[str]) -> None:
+        """Judge whether a list has each entry of the one before, unchanged; a full one may lack the oldest."""
         received_s = exchange.response.received_s
         asked_s = received_s - exchange.response.elapsed_ms / 1000
-        before = next((one for at, one in reversed(self._lists) if at < asked_s), Counter[str]())
-        gone = before - entries if entries.total() < _HELD else Counter[str]()
-        expected, found = "the entries of the list that was read before", "".join([*gone][:1])
+        before = next((one for at, one in reversed(self._lists) if at < asked_s), [])
+        left = Counter(entries)
+        kept: list[bool] = []
+        for entry in before:
+            kept.append(left[entry] > 0)
+            left[entry] -= 1
+        if len(entries) >= _HELD:
+            # The oldest ones may have been pushed out.
+            while kept and not kept[-1]:
+                kept.pop()
+        wrong = [entry for entry, there in zip(before, kept, strict=False) if not there][:1]
+        expected, found = "the entries of the list that was read before", "".join(wrong)
         self._api.run.judge.check(
-            "rest-delivery/list", not gone, exchange, expected, found=found and f"none with {found}", cause="changed"
+            "rest-delivery/list", not wrong, exchange, expected, found=found and f"none with {found}", cause="changed"
         )
-        if not gone:
+        if not wrong:
             self._lists = [*self._lists[-_LISTS:], (received_s, entries)]
 
     def _take(self, one: _Accepted, there: Counter[tuple[Delivery, str]]) -> bool:
