@@ -69,6 +69,8 @@ def one_turn(
 ) -> tuple[Found, Exchange]:
     """Read a resource once as JSON, in the other formats, each after a call of ``before``, and as JSON again.
 
+    With ``before``, each of these requests prefers its format to the others, as clients do that take any of them.
+
     Returns:
         The disagreements by format and place (empty if the JSON is invalid, which other checks report), and the last
         JSON
@@ -79,7 +81,8 @@ def one_turn(
     others: list[tuple[str, Exchange]] = []
     for name in media_types:
         before()
-        others.append((name, call.send(api, ("Accept", name))))
+        rather = [f"{other};q=0.2" for other in call.operation.formats if other != name and before is not _nothing]
+        others.append((name, call.send(api, ("Accept", ", ".join((name, *rather))))))
     last = call.send(api, ("Accept", JSON))
     snapshots = [_snapshot(item, JSON, schema) for item in (first, last)]
     if any(shown is None for shown in snapshots):

@@ -35,7 +35,7 @@ _KNOWN: Final = (
 # Ids that a robot which folds letters or compares the first characters takes for one.
 _ALIKE: Final = ("goal", "Goal", "a" * 64 + "1", "a" * 64 + "2")
 _READINGS: Final = 3
-# One goal in so many is put just after the one before was cancelled.
+# One goal in so many is put just after the one before was cancelled; not those whose ids are alike.
 _AFTER_DELETE: Final = 3
 
 
@@ -50,7 +50,7 @@ def goal_ids(robot: Robot, explore: Explorer) -> tuple[Put, ...]:
         if last is not None and ((last.differs and not last.ended) or last.body["goal_id"]["id"] == id_):
             return  # waiting for the right goal again and again shows no more; an id with another pose is a conflict
         pose = next(goals)
-        if len(puts) % _AFTER_DELETE == _AFTER_DELETE - 1:
+        if len(puts) > len(_ALIKE) and len(puts) % _AFTER_DELETE == 0:
             robot.delete_goal()
         puts.append(put_new(robot, goal_body(pose, robot.statement.motion.frame, id_), pose))
         if puts[-1].exchange.response.status not in NEW:
