@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import plain, rest, soap, unwanted, values
+from conformance.mutation.changes import plain, rest, soap, success, unwanted, values
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.packs.table1.delivery import COORDINATES, PATH_NAMES
 from conformance.packs.table1.mutants.paths import DELIVERIES, deliveries
@@ -48,19 +48,21 @@ class EveryNth:
 
 
 class First:
-    """A change that rewrites the first request alone."""
+    """A change that rewrites the first request that is accepted."""
 
     def __init__(self, where: Callable[[Request], bool], edit: Callable[[Request], object]) -> None:
         self._where, self._edit = where, edit
         self._done = False
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """Forward the request, rewritten if it is the first."""
+        """Forward the request, rewritten if none before it was accepted."""
         if self._done or not self._where(request):
             return forward(request)
-        self._done, request = True, request.copy()
+        request = request.copy()
         self._edit(request)
-        return forward(request)
+        response = forward(request)
+        self._done = success(response)
+        return response
 
 
 class OutOfOrder:
