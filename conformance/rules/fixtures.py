@@ -36,18 +36,26 @@ def _watched(
     other_exchanges: OtherExchanges | None,
     kept_exchanges: KeptExchanges | None,
 ) -> None:
-    """Register the observers, so that every exchange of the run is judged; no other code registers any."""
+    """Register the observers, so that every exchange of the run is judged, the first ones too.
+
+    No other code registers any.
+    """
     services = interfaces.soap.there.values()
     api = interfaces.rest
     observers: list[Listener] = []
+    listeners: list[Listener] = []
     if api is not None:
         observers.append(Observer(api, [service.endpoint for service in services]))
-        connection.listeners.extend(api.device.observers(api))
-        connection.listeners.extend(one for one in (other_exchanges, kept_exchanges) if one is not None)
+        listeners += api.device.observers(api)
+        listeners += [one for one in (other_exchanges, kept_exchanges) if one is not None]
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
         answers = {service.endpoint: answers_of(service) for service in services}
         observers.append(SoapObserver(run.judge, answers))
-    connection.listeners.append(Observers(run.judge, observers))
+    listeners.append(Observers(run.judge, observers))
+    connection.listeners.extend(listeners)
+    for exchange in api.looked if api is not None else ():
+        for listener in listeners:
+            listener.answered(exchange)
 
 
 @pytest.fixture(scope="session")

@@ -31,6 +31,7 @@ class RestInterface:
         slow: operations that once took more than a second to respond.
         stop_device: stops a device with a motion map; None: it has none, or was not moved.
         values: what the survey of a described API knows for parameters and bodies, or None.
+        looked: the exchanges by which the run has connected, before anything observed them.
         is_recorded: whether the present exchange is recorded by a scenario, whose rules judge it.
     """
 
@@ -45,6 +46,7 @@ class RestInterface:
     slow: set[str] = field(default_factory=set)
     stop_device: Callable[[], Any] | None = None
     values: Any = None
+    looked: list[Exchange] = field(default_factory=list)
     is_recorded: bool = False
     device: Device = field(init=False)
 
