@@ -35,6 +35,8 @@ _READ: Final = 4
 # Of so many states one is read over SOAP just after a request that is refused, and one just after one that acts.
 _TURNS: Final = 5
 _NOT_ACCEPTABLE: Final = (("Accept", "image/png"),)
+# Between the headings of plans, rad: small ones are among them.
+_STEP: Final = 0.07
 # How far ahead a plan in the odometry's frame leads, m.
 _AHEAD: Final = 0.3
 
@@ -128,7 +130,7 @@ def test_plan(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effo
         few: dict[str, float | str] = {"x": goal.x, "y": goal.y}
         if frame != "map":
             few["frame_id"] = frame
-        yaw = 0.1 * index * (-1) ** index
+        yaw = _STEP * index * (-1) ** index
         full: dict[str, float | str] = {"x": goal.x, "y": goal.y, "yaw": yaw, "frame_id": frame}
         full |= {"tolerance": 0.2, "start_x": start.x, "start_y": start.y, "start_yaw": start.yaw}
         there = pose_of(odometry["pose"]["pose"]).ahead(_AHEAD)
