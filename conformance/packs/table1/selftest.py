@@ -214,11 +214,6 @@ _OPEN_PLACES = (
         r"ulp(@[\w-]+)?:put(Linear)?Velocity:request\.[\w.]+:\w+",
         "A velocity is reached within the declared tolerance (contract.md#velocity), and 204 is a full response.",
     ),
-    OpenPlace(
-        r"header-more:\w+:Allow",
-        "A method that Allow names in every response is the vendor's own, which the suite does not send "
-        "(contract.md#http).",
-    ),
     OpenPlace(r"status:putDelivery:2\d\d-2\d\d", "A delivery responds 2xx; 204 is preferred (contract.md#rest)."),
     OpenPlace(
         r"reorder:[gG]et(Sensors|NavigationServices):answer(\.return)?:\w+",
