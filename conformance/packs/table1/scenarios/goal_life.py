@@ -153,8 +153,7 @@ class _Player:
         if exchange.response.ok and drive.look_s < _LOOK_S:
             drive.commanded(slow, sent, exchange)
             drive.reach(slow, "rest-resources/velocity-goal")
-        # Beside the turn that it took, a robot that turns in circles alone need not stand still.
-        linear = robot.put(LINEAR, (slow if exchange.response.ok else STILL).linear)
+        linear = robot.put(LINEAR, STILL.linear)
         if not exchange.response.ok:  # else the robot may have ended the goal for it
             self._keeps(linear, body, there)
         self.life = replace(self.life, velocity=exchange, drive=drive.trace, linear=linear)
