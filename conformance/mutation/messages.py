@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 from http import HTTPStatus
 from typing import Any, Protocol
 
+from conformance.transport.exchange import media_type_of
+
 _REASONS = {status.value: status.phrase for status in HTTPStatus}
 _INFORMATIONAL = range(100, 200)
 _NO_BODY = {204, 304}
@@ -39,7 +41,7 @@ class _Message:
     @property
     def media_type(self) -> str:
         """The media type in Content-Type, without parameters, in lower case; empty without the header."""
-        return (self.field("Content-Type") or "").partition(";")[0].strip().lower()
+        return media_type_of(self.field("Content-Type") or "")
 
     @property
     def is_last(self) -> bool:

@@ -64,9 +64,7 @@ class OtherExchanges(Listener):
         hidden = any(item.required for where in ("header", "cookie") for item in operation.parameter(where))
         if not context.usual or hidden or "transfer-encoding" in names or context.accept not in _ANY_FORMAT:
             return ""
-        fields = {name.lower(): value for name, value in request.headers}
-        media_type = fields.get("content-type", "").split(";")[0].strip().lower()
-        said = validity(contract, request.method, context.target, media_type, request.body)
+        said = validity(contract, request.method, context.target, request.media_type, request.body)
         return operation.label if said.verdict == VALID else ""
 
 

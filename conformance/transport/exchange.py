@@ -64,6 +64,11 @@ class Request:
         return target
 
     @property
+    def media_type(self) -> str:
+        """The media type in Content-Type, without parameters, in lower case; empty without the header."""
+        return media_type_of(next((value for name, value in self.headers if name.lower() == "content-type"), ""))
+
+    @property
     def endpoint(self) -> str:
         """Return method, server and path without parameter values, and the operation of a SOAP message."""
         path = "/".join(
@@ -102,6 +107,11 @@ class Request:
         words.append(self.url + self.query)
         # The shell has to expand the variables of credentials.
         return pipe + " ".join(quoted(word) or shlex.quote(word) for word in words)
+
+
+def media_type_of(content_type: str) -> str:
+    """Return the media type in the value of a Content-Type, without parameters, in lower case (RFC 9110 8.3)."""
+    return content_type.partition(";")[0].strip().lower()
 
 
 def _is_plain(body: bytes) -> bool:
@@ -163,7 +173,7 @@ class Response:
     @cached_property
     def media_type(self) -> str:
         """The media type in Content-Type, without parameters, in lower case; empty without the header."""
-        return (self.header("content-type") or "").split(";", 1)[0].strip().lower()
+        return media_type_of(self.header("content-type") or "")
 
     @property
     def ok(self) -> bool:

@@ -15,6 +15,9 @@ read = rest("GET", "/lamp")
 
 mutant("lamp-no-target", "state", "The state has no target.").json(read, without("target"))
 mutant("lamp-half-target", "target", "The state has half of the target.").json(read, field("target", scaled(0.5)))
+mutant("lamp-old-target", "target", "The response to a PUT has half of the target.").json(
+    rest("PUT", "/lamp"), field("target", scaled(0.5))
+)
 mutant("lamp-too-dark", "fades", "The lamp reaches 90 % of the target.").json(read, field("brightness", scaled(0.9)))
 mutant("lamp-flickers", "in-between", "Every tenth state has brightness 1.").json(
     read, field("brightness", 1.0), nth=10

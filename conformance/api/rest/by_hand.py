@@ -12,7 +12,7 @@ import h11
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.transport import raw
-from conformance.transport.exchange import Attempt
+from conformance.transport.exchange import Attempt, media_type_of
 from conformance.verdict.evidence import HarnessError
 
 
@@ -59,7 +59,7 @@ def talk(api: RestInterface, octets: bytes, *, answers: int = 0, refused: bool =
             parts = urlsplit(target)
             target = parts.path + (f"?{parts.query}" if parts.query else "")
         fields = dict(request.headers)
-        media_type = fields.get(b"content-type", b"").decode().split(";", 1)[0].strip().lower()
+        media_type = media_type_of(fields.get(b"content-type", b"").decode())
         below = target.removeprefix(api.client.prefix)
         if not refused:
             require_valid(api.run.contract, method, below, media_type, body)

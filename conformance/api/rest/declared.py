@@ -63,9 +63,8 @@ def judge_refused_method(api: RestInterface, exchange: Exchange, context: Reques
 def _is_valid(api: RestInterface, context: RequestContext) -> bool:
     """Return whether the contract allows a request, so that nothing in it is a reason to refuse it."""
     request = context.request
-    fields = {name.lower(): value for name, value in request.headers}
-    media_type = fields.get("content-type", "").partition(";")[0].strip().lower()
-    return validity(api.run.contract, request.method, context.target, media_type, request.body).verdict == VALID
+    said = validity(api.run.contract, request.method, context.target, request.media_type, request.body)
+    return said.verdict == VALID
 
 
 def _status_fits(api: RestInterface, operation: Operation, answer: Response, context: RequestContext) -> bool:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from conformance.api.rest.interface import RestInterface
-from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Exchange, media_type_of
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class GeneratedRequest:
     @property
     def media_type(self) -> str:
         """The Content-Type without parameters."""
-        return self.content_type.split(";", 1)[0].strip().lower()
+        return media_type_of(self.content_type)
 
     def send(self, api: RestInterface, *, fresh: bool = False) -> Exchange:
         """Send the request through the run's client; ``fresh``: on a connection of its own.

@@ -62,11 +62,9 @@ def contradiction(api: RestInterface, theirs: Described, context: RequestContext
     """
     request, answer = exchange.request, exchange.response
     own = replace(theirs.operation, template=theirs.path)
-    fields = {name.lower(): value for name, value in request.headers}
-    media_type = fields.get("content-type", "").partition(";")[0].strip().lower()
-    if validity(api.run.contract, request.method, context.target, media_type, request.body).verdict == VALID:
+    if validity(api.run.contract, request.method, context.target, request.media_type, request.body).verdict == VALID:
         path, _, query = context.target.partition("?")
-        said = validity_by(own, path, query, media_type, request.body)
+        said = validity_by(own, path, query, request.media_type, request.body)
         if said.verdict == INVALID:
             return f"a request that the description forbids: {said.why}"
     schema = (own.declared(answer.status) or {}).get(answer.media_type)

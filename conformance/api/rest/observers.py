@@ -159,9 +159,7 @@ class Observer(Listener):
     def _judge_input(self, exchange: Exchange, answer: Response, context: RequestContext) -> None:
         """Judge a 5xx response: it is wrong for an invalid request, and undeclared for a valid one."""
         api, request = self._api, context.request
-        media_type = next((value for name, value in request.headers if name.lower() == "content-type"), "")
-        media_type = media_type.split(";", 1)[0].strip().lower()
-        said = validity(api.run.contract, request.method, context.target, media_type, request.body)
+        said = validity(api.run.contract, request.method, context.target, request.media_type, request.body)
         status = answer.status
         crashed = status >= HTTPStatus.INTERNAL_SERVER_ERROR
         if status == HTTPStatus.SERVICE_UNAVAILABLE:

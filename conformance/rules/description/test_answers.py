@@ -69,9 +69,9 @@ def _in_question(probe: Probe, status: int) -> bool:
 def _is_unreadable(probe: Probe) -> bool:
     """Return whether a request's content is not JSON, although its Content-Type says so."""
     request = probe.exchange.request if probe.exchange else None
-    named = {name.lower(): value for name, value in request.headers} if request else {}
-    media_type = named.get("content-type", "").partition(";")[0].strip().lower()
-    return request is not None and is_json(media_type) and bool(request.body and read_json(request.body).unreadable)
+    if request is None or not is_json(request.media_type):
+        return False
+    return bool(request.body and read_json(request.body).unreadable)
 
 
 @rule("description/status-declared", on=_ON)

@@ -75,11 +75,8 @@ def _why_invalid(run: Run, probe: Probe) -> str:
     if probe.exchange is None:
         return ""
     request = probe.exchange.request
-    media_type = next((value for name, value in request.headers if name.lower() == "content-type"), "")
     target = request.url.split("//", 1)[-1].partition("/")[2]
-    said = validity(
-        run.contract, request.method, f"/{target}", media_type.split(";", 1)[0].strip().lower(), request.body
-    )
+    said = validity(run.contract, request.method, f"/{target}", request.media_type, request.body)
     if said.verdict == INVALID:
         return said.why
     return next((text for code, text in probe.opinions if code in _INVALID_TAKEN), "")

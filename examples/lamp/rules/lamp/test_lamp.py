@@ -59,8 +59,9 @@ def fading(api: RestInterface) -> Trace:
     """Set the lamp from 0 to 0.8 and read its state every 20 ms while it fades."""
     put(api, 0.0)
     WALL_CLOCK.sleep(FADES_S)
-    begun, trace = WALL_CLOCK.now(), []
-    put(api, 0.8)
+    begun = WALL_CLOCK.now()
+    taken = put(api, 0.8)  # its response is the first reading
+    trace = [(WALL_CLOCK.now() - begun, shown(taken).get("brightness", -1.0), taken)]
     for _ in poll_for(WALL_CLOCK, 0.02, FADES_S):
         exchange = api.client.send("GET", "/lamp")
         trace.append((WALL_CLOCK.now() - begun, shown(exchange).get("brightness", -1.0), exchange))
@@ -69,7 +70,7 @@ def fading(api: RestInterface) -> Trace:
 
 @rule("lamp/target", on=(fading,))
 def target(trace: Trace) -> Iterator[Outcome]:
-    """Judge whether every reading during the fade reports the requested target."""
+    """Judge whether the response to the PUT and every reading during the fade report the requested target."""
     for _, _, exchange in trace:
         yield Case(shown(exchange).get("target") == 0.8, exchange, "the target 0.8 that was sent")
 
