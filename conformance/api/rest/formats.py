@@ -11,6 +11,7 @@ from conformance.api.rest.snapshot import steady
 from conformance.documents.json_schema import Schema
 from conformance.documents.representation import UnreadableError, flattened, read
 from conformance.transport.exchange import Exchange
+from conformance.transport.parallel import MOST_CLIENTS, Outgoing, send_together
 
 # A robot at rest jitters; a difference in so many turns in a row is no jitter.
 _TURNS = 10
@@ -45,6 +46,8 @@ def disagreements(
     media_types: list[str],
     renew: Callable[[], object] = _nothing,
     before: Callable[[], object] = _nothing,
+    *,
+    together: bool = False,
 ) -> tuple[list[Disagreement], Exchange]:
     """Read a resource as JSON, in the other formats, and as JSON again, repeatedly until all agree.
 
@@ -57,7 +60,7 @@ def disagreements(
     suspects: Found | None = None
     for _ in range(_TURNS):
         renew()
-        found, exchange = one_turn(api, call, media_types, before)
+        found, exchange = one_turn(api, call, media_types, before, together=together)
         suspects = found if suspects is None else {key: item for key, item in found.items() if key in suspects}
         if not suspects:
             break
@@ -65,11 +68,17 @@ def disagreements(
 
 
 def one_turn(
-    api: RestInterface, call: Call, media_types: list[str], before: Callable[[], object] = _nothing
+    api: RestInterface,
+    call: Call,
+    media_types: list[str],
+    before: Callable[[], object] = _nothing,
+    *,
+    together: bool = False,
 ) -> tuple[Found, Exchange]:
     """Read a resource once as JSON, in the other formats, each after a call of ``before``, and as JSON again.
 
-    With ``before``, each of these requests prefers its format to the others, as clients do that take any of them.
+    With ``before``, each of these requests prefers its format to the others, as clients do that take any of them. With
+    ``together``, several clients send them at the same moment.
 
     Returns:
         The disagreements by format and place (empty if the JSON is invalid, which other checks report), and the last
@@ -78,8 +87,8 @@ def one_turn(
     """
     schema = call.operation.shape or {}
     first = call.send(api, ("Accept", JSON))
-    others: list[tuple[str, Exchange]] = []
-    for name in media_types:
+    others = _at_once(api, call, media_types) if together else []
+    for name in () if together else media_types:
         before()
         rather = [f"{other};q=0.2" for other in call.operation.formats if other != name and before is not _nothing]
         others.append((name, call.send(api, ("Accept", ", ".join((name, *rather))))))
@@ -95,12 +104,21 @@ def one_turn(
     }, last
 
 
+def _at_once(api: RestInterface, call: Call, media_types: list[str]) -> list[tuple[str, Exchange]]:
+    """Read a resource in each format at the same moment, by clients of their own; a busy robot may leave some out."""
+    round_ = [Outgoing(api.client, "GET", call.path, (("Accept", name),)) for name in media_types[:MOST_CLIENTS]]
+    attempts = send_together([round_])[0] if round_ else []
+    return [(name, one) for name, one in zip(media_types, attempts, strict=False) if isinstance(one, Exchange)]
+
+
 def judge_same_values(
     api: RestInterface,
     call: Call,
     media_types: list[str],
     renew: Callable[[], object] = _nothing,
     before: Callable[[], object] = _nothing,
+    *,
+    together: bool = False,
 ) -> Exchange:
     """Judge whether the formats of a resource agree; return the last JSON exchange.
 
@@ -110,8 +128,9 @@ def judge_same_values(
         media_types: the formats to compare with JSON.
         renew: called before each comparison to keep the state constant.
         before: called before each reading in one of these formats.
+        together: read in these formats at the same moment.
     """
-    found, exchange = disagreements(api, call, media_types, renew, before)
+    found, exchange = disagreements(api, call, media_types, renew, before, together=together)
     if exchange.response.ok:
         expect(api.run.judge, "rest-formats/same-values", found[0].exchange if found else exchange).that(
             not found,

@@ -97,7 +97,7 @@ def test_formats_carry_the_same_values(api: RestInterface, judge: Judge) -> None
 def test_formats_carry_the_same_values_after_other_requests(api: RestInterface) -> None:
     """Compare every value again: just after a refused request or one that acts, on a new connection, after a pause.
 
-    At quick, the seed says after which of them.
+    And by several clients at once. At quick, the seed says after what.
     """
     run = api.run
 
@@ -111,6 +111,8 @@ def test_formats_carry_the_same_values_after_other_requests(api: RestInterface) 
     for event in run.effort.draw(events, 3, f"{run.seed}/events"):
         for call in calls:
             judge_same_values(api, call, list(call.operation.formats), before=partial(event, call))
+    for call in reads(api):
+        judge_same_values(api, call, list(call.operation.formats), together=True)
     # A pause costs its time: only in longer runs, and the seed says for which resources.
     for call in run.effort.draw(calls, 2, f"{run.seed}/pause") if run.effort.name != "quick" else ():
         formats = run.effort.draw(call.operation.formats, 2, f"{run.seed}/formats")

@@ -50,6 +50,21 @@ def _shift(name: str, by: float) -> Callable[[Any], None]:
     return edit
 
 
+def _mirrored(root: Any) -> None:
+    """Give a heading that is more than 90 degrees from x as the same to the other side."""
+    for turn in named(root, "orientation")[:1]:
+        parts = {axis: named(turn, axis)[0] for axis in "zw"}
+        z, w = (float(part.text) for part in parts.values())
+        if abs(z) > abs(w):
+            parts["z"].text = repr(-z)
+
+
+def _unsigned(root: Any) -> None:
+    for part in named(root, "linear"):
+        for axis in named(part, "x"):
+            axis.text = repr(abs(float(axis.text)))
+
+
 def _straighter(root: Any) -> None:
     poses = named(root, "poses")
     for pose in poses[1:-1]:
@@ -185,6 +200,12 @@ _soap_state("same-pose", "pose", "The pose over SOAP is 37 cm ahead of the pose 
 )
 _soap_state("same-velocity", "velocity", "The velocity over SOAP is never zero.").xml(
     soap("GetVelocity"), _shift("linear", 0.1)
+)
+_soap_state("same-pose-mirrored", "pose", "GetPose mirrors a heading more than 90 degrees from x.").xml(
+    soap("GetPose"), _mirrored
+)
+_soap_state("same-velocity-unsigned", "velocity", "GetVelocity returns a linear part without its sign.").xml(
+    soap("GetVelocity"), _unsigned
 )
 _soap_state(
     "same-velocity-sometimes", "velocity", "One velocity in 60 over SOAP is 0.1 m/s higher than the odometry's."

@@ -40,11 +40,13 @@ class Drive:
 
     Attributes:
         trace: the commands and readings so far.
+        aside: called after each look with its number: sends what is compared with the looks.
     """
 
     def __init__(self, robot: Robot) -> None:
         self.robot, self.clock = robot, robot.clock
         self.trace = Trace(self.clock.now())
+        self.aside: Callable[[int], object] = lambda _turn: None
         self._turn_at = 0.0
         self._crowded = False
 
@@ -176,6 +178,7 @@ class Drive:
         at = self.clock.now()
         velocity, exchange = self.robot.velocity()
         self.trace = self.trace.looked(Turn(odometry, at, velocity, exchange, *self.robot.linear()))
+        self.aside(len(self.trace.turns))
         return velocity, exchange
 
     def glance(self) -> None:

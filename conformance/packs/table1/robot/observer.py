@@ -19,6 +19,7 @@ from conformance.packs.table1.robot.robot import FARTHEST, LINEAR, POSE, VELOCIT
 from conformance.packs.table1.robot.single_readings import BesideOdometry, OneSample
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S, SEVERAL
 from conformance.packs.table1.statement import said_of
+from conformance.scenarios.rule import record
 from conformance.transport.exchange import Exchange, Listener
 
 _READINGS: Final[dict[str, tuple[str, Shape, str]]] = {
@@ -72,7 +73,7 @@ class Observer(Listener):
         self._velocity_of_none: Exchange | None = None
         # Single readings, one after another.
         self._sample = OneSample(api.run.judge, said_of(api.run).limits)
-        self._beside = BesideOdometry(api.run.judge, said_of(api.run).limits)
+        self._beside = BesideOdometry[Velocity](said_of(api.run).limits)
         self._read_until = 0.0
         self._fast = {path: _Samples() for path in _READINGS}
 
@@ -108,14 +109,16 @@ class Observer(Listener):
         judge, limits = self._api.run.judge, said_of(self._api.run).limits
         received = _received_s(exchange)
         if received - exchange.response.elapsed_ms / 1000 < self._read_until:
-            self._sample, self._beside = OneSample(judge, limits), BesideOdometry(judge, limits, self._beside.out)
+            self._sample, self._beside = OneSample(judge, limits), BesideOdometry(limits, self._beside.out)
         self._read_until = max(self._read_until, received)
         if path == POSE:
             stamp = value["header"]["stamp"]["sec"], value["header"]["stamp"]["nanosec"]
             self._sample.odometry(stamp, value, exchange)
-            self._beside.odometry(stamp[0] + stamp[1] / 1e9, Velocity.of(value["twist"]["twist"]), received)
+            velocity = Velocity.of(value["twist"]["twist"])
+            outcomes = self._beside.odometry(stamp[0] + stamp[1] / 1e9, velocity, received)
+            record(judge, "rest-resources/velocity-odometry", outcomes)
         elif path == VELOCITY:
-            self._beside.velocity(Velocity.of(value), exchange, received)
+            self._beside.reading(Velocity.of(value), exchange, received)
 
     def _unavailable(self, path: str, exchange: Exchange) -> None:
         """Judge a 503: it must have Retry-After, and the velocity must be 503 as well."""

@@ -1,25 +1,30 @@
 """Find single wrong readings of the state: values that no sample of the odometry can have had.
 
 A wrong odometry sample is shown by every resource and fails nothing. But all responses with one stamp must show the
-same values, and a velocity must lie between the odometry samples shortly before and just after it: a robot may smooth
-its velocity and lag one sample behind. A velocity outside them counts only when it happens repeatedly.
+same values, and a velocity, or a pose over SOAP, must lie between the odometry samples shortly before and just after
+it: a robot may smooth its velocity and lag one sample behind. What lies outside counts only when it happens repeatedly.
 """
 
+from __future__ import annotations
+
 import itertools
+import math
 from collections import deque
-from typing import Any, Final, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any, Final, Generic, NamedTuple, TypeVar
 
 import msgspec
 
 from conformance.packs.table1.limits import Limits
+from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.robot import FARTHEST, Velocity, is_near
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
+from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
 Stamp = tuple[int, int]
 _SAMPLE: Final = "rest-resources/pose-sample"
-_VELOCITY: Final = "rest-resources/velocity-odometry"
 # For so long a velocity may be behind the odometry, s.
 _BEHIND_S: Final = 0.4
 # Odometry read after it, and before it, without a sample in between that was not read: it may be a message behind.
@@ -35,6 +40,9 @@ _LAPSES: Final = 50
 _TOLD: Final = 3
 # What may be in one answer and not in another, for want of digits, m, rad, m/s and rad/s.
 _ABSOLUTE: Final = 0.02
+# A pose may be out by so much, m, and so may its heading as a vector: a robot may turn on between two samples.
+_PLACE_M: Final = 0.05
+_HEADING: Final = 0.2
 
 
 class OneSample:
@@ -90,50 +98,77 @@ def _difference(between: dict[str, float], around: dict[str, float], slack: floa
     return next((f"{name} is {between[name]!r} for {around[name]!r}" for name in odd), "")
 
 
-class _Sample(NamedTuple):
-    """One reading of the odometry: stamp, s; velocity; when it was received, s of the monotonic clock."""
+class Place(NamedTuple):
+    """A pose in numbers that change steadily while a robot turns: position, m, and heading as a vector."""
+
+    x: float
+    y: float
+    ahead_x: float
+    ahead_y: float
+
+    @classmethod
+    def of(cls, pose: Pose) -> Place:
+        """Return the numbers of a pose."""
+        return cls(pose.x, pose.y, math.cos(pose.yaw), math.sin(pose.yaw))
+
+
+_Value = TypeVar("_Value", bound=Velocity | Place)
+
+
+def _fits(limits: Limits, value: Velocity | Place, nearest: Velocity | Place) -> bool:
+    if isinstance(value, Velocity) and isinstance(nearest, Velocity):
+        return is_near(limits, value, nearest, _OUT)
+    noise = limits.noise
+    rooms = (_PLACE_M + FARTHEST * noise.position_m,) * 2 + (_HEADING + FARTHEST * noise.heading_rad,) * 2
+    return all(abs(one - other) <= room for one, other, room in zip(value, nearest, rooms, strict=True))
+
+
+class _Sample(NamedTuple, Generic[_Value]):
+    """One reading of the odometry: stamp, s; value; when it was received, s of the monotonic clock."""
 
     stamp: float
-    velocity: Velocity
+    value: _Value
     received: float
 
 
-class _Reading(NamedTuple):
-    """One reading of the velocity with the odometry samples read before and after it."""
+class _Reading(NamedTuple, Generic[_Value]):
+    """One reading of the value with the odometry samples read before and after it."""
 
-    velocity: Velocity
+    value: _Value
     exchange: Exchange
-    before: tuple[_Sample, ...]
-    after: list[_Sample]
+    before: tuple[_Sample[_Value], ...]
+    after: list[_Sample[_Value]]
 
 
-class BesideOdometry:
-    """Judges a run's velocity readings by the odometry samples around each.
+class BesideOdometry(Generic[_Value]):
+    """Judges a run's readings of the velocity, or of the pose over SOAP, by the odometry samples around each.
 
     Args:
-        judge: takes the evidence.
         limits: the robot's limits.
         out: number of wrong readings so far.
-        requirement: the requirement that the readings are judged by.
 
     Attributes:
         out: number of wrong readings.
         judged: number of readings that could be judged.
     """
 
-    def __init__(self, judge: Judge, limits: Limits, out: int = 0, *, requirement: str = _VELOCITY) -> None:
-        self._judge = judge
+    def __init__(self, limits: Limits, out: int = 0) -> None:
         self._limits = limits
-        self._requirement = requirement
-        self._samples: deque[_Sample] = deque()
+        self._samples: deque[_Sample[_Value]] = deque()
         self._lapses: deque[float] = deque(maxlen=_LAPSES)
-        self._readings: deque[_Reading] = deque()
+        self._readings: deque[_Reading[_Value]] = deque()
         self.out = out
         self.judged = 0
 
-    def odometry(self, stamp: float, velocity: Velocity, received: float) -> None:
-        """Take a reading of the odometry; ``stamp``: by the robot's clock, s."""
-        sample = _Sample(stamp, velocity, received)
+    def odometry(self, stamp: float, value: _Value, received: float) -> Iterator[Case]:
+        """Take a reading of the odometry; yield the readings that can be judged now.
+
+        Args:
+            stamp: by the robot's clock, s.
+            value: the odometry's.
+            received: when it was received, s of the monotonic clock.
+        """
+        sample = _Sample(stamp, value, received)
         if self._samples and stamp > self._samples[-1].stamp:
             self._lapses.append(stamp - self._samples[-1].stamp)
         self._samples.append(sample)
@@ -142,42 +177,41 @@ class BesideOdometry:
         for reading in self._readings:
             reading.after.append(sample)
         while self._readings and len(self._readings[0].after) == _AROUND:
-            self._judge_one(self._readings.popleft())
+            yield from self._cases(self._readings.popleft())
 
-    def velocity(self, velocity: Velocity, exchange: Exchange, received: float) -> None:
-        """Take a reading of the velocity."""
+    def reading(self, value: _Value, exchange: Exchange, received: float) -> None:
+        """Take a reading that the odometry is compared with."""
         before = tuple(self._samples)
         if len(before) >= _AROUND and before[0].received < received - _BEHIND_S:
-            self._readings.append(_Reading(velocity, exchange, before, []))
+            self._readings.append(_Reading(value, exchange, before, []))
 
-    def _judge_one(self, reading: _Reading) -> None:
+    def _cases(self, reading: _Reading[_Value]) -> Iterator[Case]:
         all_ = (*reading.before, *reading.after)
-        if not self._neighbours(all_[-2 * _AROUND :]):
+        if not self._neighbours([one.stamp for one in all_[-2 * _AROUND :]]):
             return
-        nearest = _between(reading.velocity, [one.velocity for one in all_])
-        fits = is_near(self._limits, reading.velocity, nearest, _OUT)
+        nearest = _between(reading.value, [one.value for one in all_])
+        fits = _fits(self._limits, reading.value, nearest)
         self.judged += 1
         self.out += not fits
         if fits or self.out >= _SEVERAL:
-            self._judge.check(
-                self._requirement,
+            yield Case(
                 fits,
                 reading.exchange,
-                f"a velocity that the odometry had before or after; the nearest is {nearest}",
-                found=f"{reading.velocity}, and out so {self.out} times",
-                cause="out now and then",
+                f"a value that the odometry had before or after; the nearest is {nearest}",
+                f"{reading.value}, and out so {self.out} times",
+                "out now and then",
             )
 
-    def _neighbours(self, around: tuple[_Sample, ...]) -> bool:
-        """Return whether these samples are consecutive, so that the suite missed none between them."""
+    def _neighbours(self, stamps: list[float]) -> bool:
+        """Return whether samples with these stamps are consecutive, so that the suite missed none between them."""
         if not self._lapses:
             return False
         hertz = self._limits.odometry_hz
         usual = 1 / hertz if hertz else min(*self._lapses, LONGEST_SAMPLE_S)
-        return all(0 <= two.stamp - one.stamp <= _NEIGHBOURS * usual for one, two in itertools.pairwise(around))
+        return all(0 <= two - one <= _NEIGHBOURS * usual for one, two in itertools.pairwise(stamps))
 
 
-def _between(velocity: Velocity, around: list[Velocity]) -> Velocity:
-    """Return the velocity nearest to the given one whose components lie within the range of the others."""
+def _between(value: Velocity | Place, around: Sequence[Velocity | Place]) -> Velocity | Place:
+    """Return the value nearest to the given one whose components lie within the range of the others."""
     ranges = [(min(some), max(some)) for some in zip(*around, strict=True)]
-    return Velocity(*(max(low, min(one, high)) for one, (low, high) in zip(velocity, ranges, strict=True)))
+    return type(value)(*(max(low, min(one, high)) for one, (low, high) in zip(value, ranges, strict=True)))

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from conformance.packs.table1.robot.drive_trace import Trace
 from conformance.packs.table1.robot.letting_go import LetGo
+from conformance.transport.exchange import Exchange
 
 
 @dataclass(frozen=True)
@@ -15,9 +16,11 @@ class Driven:
         let_go: for each velocity that was not renewed, every measurement of how long it holds.
         ends_s: time within which a velocity that is not renewed must end, s.
         not_tested: why a requirement could not be tested, by its id.
+        over_soap: readings of pose and velocity over SOAP, beside the looks.
     """
 
     drive: Trace
     let_go: tuple[tuple[LetGo, ...], ...] = ()
     not_tested: tuple[tuple[str, str], ...] = ()
     ends_s: float = 0.0
+    over_soap: tuple[Exchange, ...] = ()

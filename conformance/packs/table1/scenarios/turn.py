@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Final
 
 from conformance.api.soap.callable_services import SoapServices
+from conformance.api.soap.service import SoapService
 from conformance.packs.table1.robot import drive_rules
 from conformance.packs.table1.robot.abilities import ABOUT, AHEAD, turn_beside
 from conformance.packs.table1.robot.drive import Drive
@@ -14,6 +16,7 @@ from conformance.packs.table1.robot.goals import make_room
 from conformance.packs.table1.robot.letting_go import LetGo, Way, certain_s, ends_by
 from conformance.packs.table1.robot.no_commands import no_commands
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
+from conformance.packs.table1.robot.soap_services import ask
 from conformance.packs.table1.robot.undisturbed import arc, renewed
 from conformance.packs.table1.robot.unrenewed import slow, unrenewed
 from conformance.packs.table1.robot.velocity_range import both, fastest, handy, reach, slowest_along
@@ -21,6 +24,7 @@ from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S, SEVERAL
 from conformance.packs.table1.scenarios.trace import Driven
 from conformance.scenarios.scenario import PartialTraceError, scenario
 from conformance.scenarios.stage import Need
+from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
 
 # Of the hold time: so long after a command it is given again, and holds from then on; so long after it a robot that
@@ -37,6 +41,10 @@ _ATTEMPTS: Final = 3
 _WHOLE: Final = 1.0
 # Of the limit: how fast the robot drives along an arc.
 _ASIDE: Final = 0.3
+# Beside one of so many looks the state is also read over SOAP, where a response does not take longer than this, s.
+_BESIDE: Final = 4
+_QUICK_S: Final = 0.02
+_STATES: Final = ("GetPose", "GetVelocity")
 # In this time several samples come, from any robot, s.
 _SAMPLES_S: Final = (SEVERAL + 1) * LONGEST_SAMPLE_S
 
@@ -49,6 +57,8 @@ def turn(robot: Robot, run: Run, soap: SoapServices) -> Driven:
     """
     make_room(robot)
     turning = _Turning(robot, Drive(robot), no_commands(robot, soap.subscribers, str(run.seed)))
+    if soap.subscribers is not None and robot.usual_s <= _QUICK_S:
+        turning.drive.aside = partial(turning.read_over_soap, soap.subscribers)
     try:
         turning.play(run)
     except Exception as error:
@@ -80,6 +90,7 @@ class _Turning:
     idle: list[Callable[[], object]] = field(default_factory=list)
     tries: list[tuple[LetGo, ...]] = field(default_factory=list)
     not_tested: list[tuple[str, str]] = field(default_factory=list)
+    over_soap: list[Exchange] = field(default_factory=list)
     fastest: Velocity = STILL  # the fastest turn to the left that the robot has reached
     brief: bool = True  # whether the robot was at rest after each brief silence so far
 
@@ -90,7 +101,13 @@ class _Turning:
     @property
     def recorded(self) -> Driven:
         """Return the record so far."""
-        return Driven(self.drive.whole, tuple(self.tries), tuple(self.not_tested), self._ends_s)
+        recorded = Driven(self.drive.whole, tuple(self.tries), tuple(self.not_tested), self._ends_s)
+        return replace(recorded, over_soap=tuple(self.over_soap))
+
+    def read_over_soap(self, subscribers: SoapService, turn: int) -> None:
+        """Read the state over SOAP beside some looks, so that it is compared with the odometry at every heading."""
+        if turn % _BESIDE == 0:
+            self.over_soap.append(ask(subscribers, _STATES[turn // _BESIDE % len(_STATES)]))
 
     def play(self, run: Run) -> None:
         """Turn left by whole numbers, as fast as the robot can, renewed, along an arc, and straight on."""

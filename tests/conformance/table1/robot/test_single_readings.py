@@ -1,11 +1,15 @@
-"""Readings of the velocity that are out now and then: of no sample that the odometry had, and of one that was out."""
+"""Readings that are out now and then: of no sample that the odometry had, and of one that was out."""
+
+from typing import Any
 
 import pytest
 from toy_messages import exchange, odometry
 
 from conformance.packs.table1.limits import DeclaredLimits, Noise
+from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.robot import STILL, Velocity
-from conformance.packs.table1.robot.single_readings import BesideOdometry, OneSample
+from conformance.packs.table1.robot.single_readings import BesideOdometry, OneSample, Place
+from conformance.scenarios.rule import record
 from conformance.verdict.evidence import Judge
 from conformance.verdict.run import Run
 
@@ -17,19 +21,18 @@ _TURN_S = 0.02
 
 
 class _Run:
-    """Odometry and velocity read in turns, each turn a sample of the odometry, unless it has fewer."""
+    """Odometry and another value read in turns, each turn a sample of the odometry, unless it has fewer."""
 
-    def __init__(self, sample_s: float = _TURN_S, *, requirement: str = _ID, **declared: object) -> None:
+    def __init__(self, sample_s: float = _TURN_S, **declared: object) -> None:
         self.judge: Judge = Run().judge
-        limits = DeclaredLimits(tolerance_abs=0.02, **declared).resolved()
-        self.beside = BesideOdometry(self.judge, limits, requirement=requirement)
+        self.beside = BesideOdometry[Any](DeclaredLimits(tolerance_abs=0.02, **declared).resolved())
         self.sample_s, self.now = sample_s, 100.0
 
-    def turns(self, count: int, odometry: Velocity = STILL, velocity: Velocity | None = None) -> None:
+    def turns(self, count: int, odometry: Any = STILL, velocity: Any = None) -> None:
         for _ in range(count):
             stamp = self.now // self.sample_s * self.sample_s
-            self.beside.odometry(stamp, odometry, self.now)
-            self.beside.velocity(odometry if velocity is None else velocity, _EXCHANGE, self.now + 0.005)
+            record(self.judge, _ID, self.beside.odometry(stamp, odometry, self.now))
+            self.beside.reading(odometry if velocity is None else velocity, _EXCHANGE, self.now + 0.005)
             self.now += _TURN_S
 
     @property
@@ -51,12 +54,26 @@ def test_a_reading_that_is_out_again_is_judged_from_the_second_on():
     assert run.refuted == 3
 
 
-def test_readings_over_soap_are_judged_by_a_requirement_of_their_own():
-    run = _Run(requirement="equivalence/pose")
-    run.turns(60)
-    run.turns(3, velocity=_FAST)
-    run.turns(2)
-    assert run.judge.refuted() == {"equivalence/pose": 2}
+@pytest.mark.parametrize("yaw", [3.0, -3.0])
+def test_a_pose_is_compared_at_any_heading(yaw):
+    run, here = _Run(), Place.of(Pose(1.0, 2.0, yaw))
+    run.turns(60, here)
+    assert run.cases > 30
+    assert run.refuted == 0
+    run.turns(3, here, Place.of(Pose(1.0, 2.0, -yaw)))
+    run.turns(2, here)
+    assert run.refuted == 2
+
+
+@pytest.mark.parametrize("sample_s", [0.02, 0.05, 0.1])
+def test_a_pose_between_two_samples_is_no_fault(sample_s):
+    run = _Run(sample_s)
+    for turn in range(400):
+        at = turn * _TURN_S
+        sampled = 2.5 * (at // sample_s * sample_s)
+        run.turns(1, Place.of(Pose(0.1, 0.2, sampled)), Place.of(Pose(0.1, 0.2, 2.5 * at)))
+    assert run.cases > 10
+    assert run.refuted == 0
 
 
 @pytest.mark.parametrize("sample_s", [0.02, 0.05, 0.2])

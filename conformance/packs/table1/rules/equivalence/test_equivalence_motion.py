@@ -1,11 +1,23 @@
 """Rules on pose, velocity and goal over REST and SOAP, while the robot moves and when it has come to rest."""
 
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
+from operator import attrgetter
+from typing import Any
 
-from conformance.packs.table1.robot.state_over_soap import StateRead
+from conformance.documents.json_schema import Shape
+from conformance.packs.table1.robot.geometry import pose_of
+from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST
+from conformance.packs.table1.robot.robot import Odometry, Velocity
+from conformance.packs.table1.robot.single_readings import BesideOdometry, Place
+from conformance.packs.table1.robot.state_over_soap import StateRead, answered
 from conformance.packs.table1.scenarios.interfaces_in_motion import goals_over_soap, interfaces_in_motion
+from conformance.packs.table1.scenarios.trace import Driven
+from conformance.packs.table1.scenarios.turn import turn
+from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import Outcome, Rule, rule
 from conformance.scenarios.scenario import Scenario
+from conformance.verdict.run import Run
 
 
 def _same(name: str, scenario: Scenario) -> Rule:
@@ -20,3 +32,37 @@ def _same(name: str, scenario: Scenario) -> Rule:
 pose = _same("pose", interfaces_in_motion)
 velocity = _same("velocity", interfaces_in_motion)
 goal = _same("goal", goals_over_soap)
+
+
+def _beside(operation: str, shape: Shape, over_soap: Callable[[Any], Any], of: Callable[[Odometry], Any]) -> Rule:
+    """Return a rule that compares a state over SOAP with the odometry around it, at every heading.
+
+    Args:
+        operation: the operation that returns the state.
+        shape: its shape.
+        over_soap: returns the value to compare.
+        of: returns that of an odometry.
+    """
+
+    def judge(trace: Driven, run: Run) -> Iterator[Outcome]:
+        beside = BesideOdometry[Any](said_of(run).limits)
+        reads = deque(one for one in trace.over_soap if operation.encode() in one.request.body)
+        for odometry in trace.drive.odometry:
+            while reads and reads[0].response.received_s < odometry.received:
+                exchange = reads.popleft()
+                value, problem = answered(exchange, shape)
+                # What is not of this shape is judged by those who compare all of it.
+                if not problem and not shape.problem(value):
+                    beside.reading(over_soap(value), exchange, exchange.response.received_s)
+            yield from beside.odometry(odometry.stamp, of(odometry), odometry.received)
+
+    return rule(f"equivalence/{operation.removeprefix('Get').lower()}", on=(turn,))(judge)
+
+
+pose_turning = _beside(
+    "GetPose",
+    ODOMETRY,
+    lambda value: Place.of(pose_of(value["pose"]["pose"])),
+    lambda odometry: Place.of(odometry.pose),
+)
+velocity_turning = _beside("GetVelocity", TWIST, Velocity.of, attrgetter("velocity"))

@@ -69,15 +69,16 @@ def test_single_velocities(robot: Robot, subscribers: SoapService, judge: Judge,
     """Compare each velocity over SOAP with the odometry around it, to find intermittent faults; not at quick."""
     if effort.name == "quick":
         return  # too few to notice it
-    beside = BesideOdometry(judge, robot.limits, requirement="equivalence/velocity")
+    beside = BesideOdometry[Velocity](robot.limits)
     for _ in range(_READ * effort.cases(_VELOCITIES)):
         odometry = robot.odometry()
         exchange = ask(subscribers, "GetVelocity")
         twist, problem = answered(exchange, TWIST)
         if odometry is None or problem or TWIST.problem(twist):
             return  # judged by those who compare all of it
-        beside.odometry(odometry.stamp, odometry.velocity, odometry.received)
-        beside.velocity(Velocity.of(twist), exchange, exchange.response.received_s)
+        outcomes = beside.odometry(odometry.stamp, odometry.velocity, odometry.received)
+        record(judge, "equivalence/velocity", outcomes)
+        beside.reading(Velocity.of(twist), exchange, exchange.response.received_s)
         if beside.judged == effort.cases(_VELOCITIES):
             return
 

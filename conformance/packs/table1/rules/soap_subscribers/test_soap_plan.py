@@ -27,7 +27,7 @@ _PLAN = "soap-subscribers/plan"
 _TOLERANCE = 0.25
 # A path that is not told right after so many refusals, and is otherwise, is not told because of them.
 _REFUSALS = 3
-_LONG = "no_such_frame<&>_" * 6
+_LONG = "no_such_frame<&>\u00e9_" * 6
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def test_no_plan(soap: SoapServices, subscribers: SoapService, judge: Judge) -> 
         ),
         (
             delivery_messages.request("GetPlan", x=here.x, y=here.y, frame_id=_LONG),
-            f"a frame with a name of {len(_LONG)} characters, some of which XML escapes",
+            f"a frame with a name of {len(_LONG)} characters, with markup and beyond ASCII",
         ),
     ):
         # A response of another request, in the place of this one's, is then no fault.
