@@ -113,9 +113,9 @@ def test_formats_carry_the_same_values_after_other_requests(api: RestInterface) 
             judge_same_values(api, call, list(call.operation.formats), before=partial(event, call))
     for call in reads(api):
         judge_same_values(api, call, list(call.operation.formats), together=True)
-    # A pause costs its time: only in longer runs, and the seed says for which resources.
-    for call in run.effort.draw(calls, 2, f"{run.seed}/pause") if run.effort.name != "quick" else ():
-        formats = run.effort.draw(call.operation.formats, 2, f"{run.seed}/formats")
+    # A pause costs its time: only in longer runs, and the seed says for which resource.
+    for call in run.effort.draw(calls, 1, f"{run.seed}/pause") if run.effort.name != "quick" else ():
+        formats = run.effort.draw(call.operation.formats, 1, f"{run.seed}/formats")
         judge_same_values(api, call, formats, before=partial(time.sleep, _PAUSE_S))
 
 

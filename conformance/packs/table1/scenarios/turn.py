@@ -30,7 +30,7 @@ from conformance.verdict.run import Run
 # Of the hold time: so long after a command it is given again, and holds from then on; so long after it a robot that
 # has reached it already has time to hold it.
 _AGAIN: Final = 0.25
-_SOON: Final = 0.2
+_SOON: Final = 0.45
 # Of the hold time: so long after its end the suite does not read the robot, if that is enough for it to come to rest.
 _BRIEF: Final = 0.2
 # For so many times the hold time a linear part is renewed.
