@@ -1,24 +1,39 @@
-"""Judge every plan of a run, whichever check requests it: no path may jump aside to one pose and back.
+"""Judge every plan of a run, whichever check requests it: it ends where it was asked to, and leaps nowhere.
 
 The allowed step length depends on the request, so that other checks judge it.
 """
 
 import itertools
+import math
+from collections.abc import Iterable, Mapping
 from statistics import median
-from typing import Final
+from typing import Any, Final
+from urllib.parse import parse_qsl, urlsplit
 
 from conformance.api.rest.interface import RestInterface
+from conformance.documents.representation import UnreadableError, local_name, parse_xml, read
 from conformance.packs.table1.robot.geometry import Pose
-from conformance.packs.table1.robot.message_shapes import GET_PLAN, read_as
+from conformance.packs.table1.robot.message_shapes import GET_PLAN
 from conformance.packs.table1.robot.plan import plan_of
 from conformance.packs.table1.robot.robot import PLAN
-from conformance.transport.exchange import Exchange, Listener
+from conformance.packs.table1.robot.state_over_soap import answered
+from conformance.transport.exchange import Exchange, Listener, Response
 
 # Shorter than this, m, or than so many of the path's own steps, is no leap.
 _LEAP_M: Final = 1.0
 _STEPS: Final = 4.0
 # Whoever leaps aside and back is about where it was: of the leap.
 _BACK: Final = 0.5
+# Numbers up to this, m, are exact enough to compare, and a tolerance that is shorter asks for none.
+_FAR_M: Final = 1e4
+_NEAR_M: Final = 0.01
+_TOLERANCE_M: Final = 0.1
+# What judges that a plan ends where it was asked to, by media type; the last is SOAP's. YAML takes too long to read.
+_ENDS: Final = {
+    "application/json": "rest-resources/plan-end",
+    "application/xml": "rest-formats/same-values",
+    "text/xml": "soap-subscribers/plan",
+}
 # Of fewer poses nobody knows the usual step.
 _FEWEST: Final = 6
 
@@ -37,16 +52,40 @@ class PlanObserver(Listener):
     def answered(self, exchange: Exchange) -> None:
         """Judge one exchange if it is a plan."""
         response = exchange.response
-        if (
-            exchange.request.method != "GET"
-            or response.media_type != "application/json"
-            or not exchange.request.url.startswith(self._url)
-        ):
+        if not response.ok or response.media_type not in _ENDS:
             return
-        value, problem = read_as(response, GET_PLAN)
-        if problem:
+        if exchange.request.method == "GET" and exchange.request.url.startswith(self._url):
+            asked = _once(parse_qsl(urlsplit(exchange.request.url).query))
+            value = _read(response)
+        elif exchange.request.method == "POST" and b"GetPlanResponse" in response.body:
+            asked = _asked_over_soap(exchange.request.body)
+            value, _ = answered(exchange, GET_PLAN)
+        else:
+            return
+        if value is None or GET_PLAN.problem(value):
             return  # which others judge
-        leap = longest_leap(plan_of(value).poses)
+        poses = plan_of(value).poses
+        self._judge_end(exchange, asked, poses[-1])
+        if response.media_type == "application/json":
+            self._judge_leaps(exchange, poses)
+
+    def _judge_end(self, exchange: Exchange, asked: Mapping[str, str], end: Pose) -> None:
+        """Judge that a path ends at the position in the request, where that is clear."""
+        there = Pose(_number(asked.get("x", "")), _number(asked.get("y", "")), 0.0)
+        tolerance_m = _number(asked.get("tolerance", str(_TOLERANCE_M)))
+        if not (abs(there.x) < _FAR_M and abs(there.y) < _FAR_M and tolerance_m >= _NEAR_M):
+            return
+        self._judge.check(
+            _ENDS[exchange.response.media_type],
+            end.distance(there) <= tolerance_m * 1.05 + _NEAR_M,
+            exchange,
+            f"a path that ends at ({there.x:.3f}, {there.y:.3f}) within {tolerance_m:g} m",
+            found=f"one that ends at ({end.x:.3f}, {end.y:.3f})",
+            cause="ends elsewhere",
+        )
+
+    def _judge_leaps(self, exchange: Exchange, poses: tuple[Pose, ...]) -> None:
+        leap = longest_leap(poses)
         self._judge.check(
             "rest-resources/plan-continuous",
             not leap,
@@ -55,6 +94,38 @@ class PlanObserver(Listener):
             found=f"a leap of {leap:.3f} m",
             cause="leaps",
         )
+
+
+def _read(response: Response) -> Any:
+    """Return the plan in a REST response; None where it cannot be read."""
+    try:
+        return read(response.media_type, response.body, GET_PLAN.schema)
+    except UnreadableError:
+        return None
+
+
+def _asked_over_soap(body: bytes) -> dict[str, str]:
+    """Return the parameters of a GetPlan message; none where it cannot be read."""
+    try:
+        root = parse_xml(body)
+    except UnreadableError:
+        return {}
+    return _once((local_name(one), one.text or "") for one in root.iter() if isinstance(one.tag, str) and not len(one))
+
+
+def _once(named: Iterable[tuple[str, str]]) -> dict[str, str]:
+    """Return parameters by name; none where one is there twice, as nobody knows which counts."""
+    pairs = list(named)
+    found = dict(pairs)
+    return found if len(found) == len(pairs) else {}
+
+
+def _number(text: str) -> float:
+    """Return a number, or NaN."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def longest_leap(poses: tuple[Pose, ...]) -> float:

@@ -7,6 +7,7 @@ import pytest
 from toy_messages import exchange, header, pose
 
 from conformance.api.rest.interface import RestInterface
+from conformance.packs.table1.robot.delivery_messages import NAMESPACE
 from conformance.packs.table1.robot.geometry import Pose, middle_of
 from conformance.packs.table1.robot.plan import Plan, start_of
 from conformance.packs.table1.robot.plan_observer import PlanObserver, longest_leap
@@ -16,7 +17,15 @@ from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.run import Run
 
 _BASE = "http://robot:7003/r2d2"
-_ID = "rest-resources/plan-continuous"
+_ID, _END, _SOAP = "rest-resources/plan-continuous", "rest-resources/plan-end", "soap-subscribers/plan"
+
+
+def _envelope(payload: str) -> bytes:
+    """Return a SOAP message with this payload, in the contract's namespace."""
+    return (
+        f'<s:Envelope xmlns:s="http://schemas.xmlsoap.org/soap/envelope/" xmlns:r="{NAMESPACE}">'
+        f"<s:Body>{payload}</s:Body></s:Envelope>"
+    ).encode()
 
 
 def _straight(step: float, count: int = 20) -> list[Pose]:
@@ -50,7 +59,7 @@ def test_what_is_no_leap(poses):
     assert longest_leap(tuple(poses)) == 0
 
 
-def _seen(poses: list[Pose], *, path: str = "/robot/navigation/service/plan?x=1.0&y=2.0", **answer: object) -> Run:
+def _seen(poses: list[Pose], *, path: str = "/robot/navigation/service/plan?x=1.9&y=0.0", **answer: object) -> Run:
     run = Run(statement=Statement())
     observer = PlanObserver(RestInterface(run, HttpClient(_BASE + "/", Connection())))
     there = [
@@ -65,6 +74,46 @@ def _seen(poses: list[Pose], *, path: str = "/robot/navigation/service/plan?x=1.
 def test_every_plan_counts():
     assert _seen(_straight(0.1)).judge.counts([_ID]) == {_ID: 1}
     assert _seen(_leaping(1.5)).judge.refuted() == {_ID: 1}
+
+
+@pytest.mark.parametrize(
+    ("asked", "cases", "failures"),
+    [
+        ("x=1.9&y=0.0", 1, 0),
+        ("x=1.9&y=0.0&tolerance=0.01", 1, 0),
+        ("x=0.0&y=0.0", 1, 1),
+        ("x=2.0&y=0.0&tolerance=0.05", 1, 1),
+        ("x=2.0&y=0.0&tolerance=0.2", 1, 0),
+        # What nobody can compare: a place that is not clear, one beyond exact numbers, no room at all.
+        ("x=0.0&x=1.9&y=0.0", 0, 0),
+        ("x=0.0&y=nan", 0, 0),
+        ("x=1e9&y=0.0", 0, 0),
+        ("x=2.0&y=0.0&tolerance=0", 0, 0),
+    ],
+)
+def test_every_plan_ends_where_it_was_asked_to(asked, cases, failures):
+    judge = _seen(_straight(0.1), path=f"/robot/navigation/service/plan?{asked}").judge
+    assert judge.counts([_END]) == {_END: cases}
+    assert judge.refuted().get(_END, 0) == failures
+
+
+@pytest.mark.parametrize("x", ["1.9", "0.0"])
+def test_a_plan_over_soap_ends_where_it_was_asked_to(x):
+    poses = "".join(
+        f"<poses><header><stamp><sec>1</sec><nanosec>0</nanosec></stamp><frame_id>map</frame_id></header><pose>"
+        f"<position><x>{one.x}</x><y>0</y><z>0</z></position>"
+        f"<orientation><x>0</x><y>0</y><z>0</z><w>1</w></orientation></pose></poses>"
+        for one in _straight(0.1)
+    )
+    head = "<header><stamp><sec>1</sec><nanosec>0</nanosec></stamp><frame_id>map</frame_id></header>"
+    answer = _envelope(f"<r:GetPlanResponse><return><plan>{head}{poses}</plan></return></r:GetPlanResponse>")
+    asked = _envelope(f"<r:GetPlan><x>{x}</x><y>0</y></r:GetPlan>")
+    request = Request("POST", "http://robot:5555/turtlesim_subscriber_ws", (("Content-Type", "text/xml"),), body=asked)
+    run = Run(statement=Statement())
+    observer = PlanObserver(RestInterface(run, HttpClient(_BASE + "/", Connection())))
+    observer.answered(Exchange(request, Response(200, (("Content-Type", "text/xml"),), answer, 1.0)))
+    assert run.judge.counts([_SOAP]) == {_SOAP: 1}
+    assert run.judge.refuted().get(_SOAP, 0) == (x != "1.9")
 
 
 @pytest.mark.parametrize(
