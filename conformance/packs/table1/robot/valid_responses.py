@@ -4,6 +4,7 @@ A response that is invalid now and then is found only if all are looked at.
 """
 
 from collections.abc import Iterable
+from http import HTTPStatus
 from typing import Final
 
 from conformance.api.soap.service import SoapService
@@ -37,6 +38,9 @@ class ValidResponses(Listener):
         # What the robot says of itself is fetched by the checks, and not while an exchange is judged.
         if service is None or "described" not in vars(service) or exchange.request.method != "POST":
             return
+        # With 202 a service says that it sends its response elsewhere, as WS-Addressing allows.
+        if response.ok and response.status != HTTPStatus.ACCEPTED and not response.body:
+            self._judge.check(_IDS[service.name], False, exchange, "a SOAP response", found="nothing")  # noqa: FBT003
         if not response.ok or response.media_type != "text/xml" or len(response.body) > _LARGE:
             return
         try:

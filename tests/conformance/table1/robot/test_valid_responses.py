@@ -28,6 +28,9 @@ _VELOCITY = (
         (_VELOCITY.format("0.5").replace("<linear>", "<linear/><linear>"), 200, True),
         (_VELOCITY.format("0,5"), 500, False),
         ("no XML", 200, False),
+        ("", 200, True),
+        ("", 202, False),
+        ("", 413, False),
     ],
 )
 def test_an_invalid_response_is_found_whoever_asked(body, status, refuted):

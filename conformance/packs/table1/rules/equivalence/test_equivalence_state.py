@@ -87,20 +87,29 @@ def test_single_velocities(robot: Robot, subscribers: SoapService, judge: Judge,
 @pytest.mark.requirement("equivalence/sensors", "equivalence/services")
 def test_lists(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """Compare the lists' entries over REST and SOAP, in any order."""
-    for _ in range(effort.cases(50)):
+    for turn in range(effort.cases(50)):
         for name, path, operation, shape in (
             ("sensors", SENSORS, "GetSensors", SENSORS_SHAPE),
             ("services", SERVICES, "GetNavigationServices", SERVICES_SHAPE),
         ):
-            _compare_lists(robot, subscribers, judge, name, path, operation, shape)
+            first = partial(_event, robot, turn)
+            _compare_lists(robot, subscribers, judge, name, path, operation, shape, first)
 
 
 def _compare_lists(
-    robot: Robot, subscribers: SoapService, judge: Judge, name: str, path: str, operation: str, shape: Shape
+    robot: Robot,
+    subscribers: SoapService,
+    judge: Judge,
+    name: str,
+    path: str,
+    operation: str,
+    shape: Shape,
+    first: Callable[[], object],
 ) -> None:
     entry = shape.schema["items"]
     names = tuple(entry["properties"])
     before, _ = robot.read(path, shape)
+    first()
     exchange = ask(subscribers, operation)
     found, problem = returned(exchange)
     after, _ = robot.read(path, shape)
