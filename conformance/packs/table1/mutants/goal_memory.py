@@ -101,6 +101,22 @@ class _Resumed:
         return response
 
 
+@_mutant("goal-turn-skipped", "goal-drives", "The robot ends a goal at the place of the last one without turning.")
+class _NoTurn:
+    def __init__(self) -> None:
+        self._there: Any = None
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        value: Any = parsed(request.body) if _PUT(request) else None
+        there = pose_of(value)
+        if there is not None and self._there is not None and there["position"] == self._there["position"]:
+            value["goal"]["target_pose"]["pose"]["orientation"] = self._there["orientation"]
+            request = request.copy(body=json.dumps(value).encode())
+        elif there is not None:
+            self._there = there
+        return forward(request)
+
+
 @_mutant("goal-id-only-once", "goal-id-again", "The robot refuses a goal with the id of a goal that has ended.")
 class _OnlyOnce:
     def __init__(self) -> None:

@@ -138,7 +138,9 @@ class GoalReached:
         undecided: whether the robot still made progress when the time was over, or another client's goal ended it.
         turned: a drive after the goal that shows whether the robot resumes a velocity from before it; or None.
         start: where a plan begins after the goal; or None.
-        again: the PUT of the same goal after it had ended; or None.
+        again: the PUT of the same goal, or of one that only turns, after it had ended; or None.
+        turned_off: the last GET of the goal that only turns, and by how much the heading is off at its end, rad; or
+            None.
     """
 
     put: Exchange
@@ -158,6 +160,7 @@ class GoalReached:
     turned: Trace | None = None
     start: Start | None = None
     again: Exchange | None = None
+    turned_off: tuple[Exchange, float] | None = None
 
     @property
     def arrived(self) -> bool:

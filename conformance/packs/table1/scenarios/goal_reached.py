@@ -15,6 +15,7 @@ from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.message_shapes import ODOMETRY
 from conformance.packs.table1.robot.plan import ask, start_of
 from conformance.packs.table1.robot.robot import FARTHEST, POSE, Robot
+from conformance.packs.table1.robot.windows import SEVERAL
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
@@ -30,6 +31,8 @@ _MOVED_M: Final = 0.15
 # The heading of a goal differs by so much from the direction of the way there, rad, or by twice the tolerance.
 _TURN_RAD: Final = 0.6
 _DETOUR: Final = 1.3
+# Another heading at the goal, rad.
+_ASIDE_RAD: Final = 2.0
 _LOOKED_S: Final = 1.0
 _DISPLACED: Final = "displaced"
 _REACHED: Final = "reached"
@@ -69,7 +72,9 @@ def _sent(robot: Robot, effort: Effort, seed: int) -> GoalReached:
     way = _Way(robot, Drive(robot), trace)
     try:
         way.drive_to(there, here)
-        way.look_back(here, before, body)
+        motion = robot.statement.motion
+        turns = effort.name != "quick" and robot.actuated(5) and motion.turns_on_the_spot
+        way.look_back(here, before, body, turns=turns)
     except Exception as error:
         raise PartialTraceError(way.recorded) from error
     return way.recorded
@@ -180,8 +185,11 @@ class _Way:
             undecided=not trace.arrived if other else goal is not None and now <= progress + limits.goal_s,
         )
 
-    def look_back(self, start: Pose, before: Command | None, body: dict[str, Any]) -> None:
-        """Watch, after a goal was reached, for the velocity from before it; request a plan back; PUT the goal again."""
+    def look_back(self, start: Pose, before: Command | None, body: dict[str, Any], *, turns: bool) -> None:
+        """Watch, after a goal was reached, for the velocity from before it; request a plan back; PUT the goal again.
+
+        A robot that ``turns`` on the spot gets it with another heading.
+        """
         trace, robot = self.trace, self.robot
         if trace.undecided or not (trace.ended or trace.other) or not trace.arrived or trace.way_m <= trace.has_to_m:
             return
@@ -193,9 +201,33 @@ class _Way:
         if plan is not None and arrived is not None:
             found = start_of(robot, plan, arrived, exchange, lambda: ask(robot, start)[1])
             self.trace = replace(self.trace, start=found)
-        self.trace = replace(self.trace, again=put_goal(robot, body))
+        if turns and trace.there is not None:
+            self._turn_at(trace.there)
+        else:
+            self.trace = replace(self.trace, again=put_goal(robot, body))
         await_none(robot, 0.1)
         robot.delete_goal()
+
+    def _turn_at(self, there: Pose) -> None:
+        """PUT a goal under the same id where the robot is, with another heading, and watch whether it turns there."""
+        robot, drive, clock = self.robot, Drive(self.robot), self.drive.clock
+        heading = wrapped(there.yaw + _ASIDE_RAD)
+        put = put_goal(robot, goal_body(there._replace(yaw=heading), robot.statement.motion.frame, _REACHED))
+        self.trace = replace(self.trace, again=put)
+        progress, yaw = clock.now(), there.yaw
+        while put.response.status in NEW:
+            drive.look()
+            goal, exchange = robot.goal()
+            here = robot.in_map(drive.trace.odometry[-1].pose) if drive.trace.odometry else there
+            if abs(wrapped(here.yaw - yaw)) > _TURNED_RAD:
+                progress, yaw = clock.now(), here.yaw
+            ended = goal is None and exchange.response.status == HTTPStatus.NOT_FOUND
+            if ended or clock.now() > progress + robot.limits.goal_s:
+                drive.keep(robot.settle_s)
+                here = middle_of([robot.in_map(one.pose) for one in drive.trace.odometry[-SEVERAL:]] or [here])
+                self.trace = replace(self.trace, turned_off=(exchange, abs(wrapped(here.yaw - heading))))
+            if ended or self.trace.turned_off or (goal is not None and goal["goal_id"]["id"] != _REACHED):
+                break
 
     def _watch_for(self, before: Command) -> None:
         """Watch at the goal whether the robot resumes a velocity from before the goal, which has ended on the way."""

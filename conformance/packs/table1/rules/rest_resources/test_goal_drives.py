@@ -32,6 +32,10 @@ def goal_drives(trace: GoalReached) -> Iterator[Outcome]:
         f"the robot {trace.left_m:.2f} m away from it{turned}, having moved {trace.way_m:.2f} m",
         "not driven" if not far else "another heading" if there else "not reached",
     )
+    if trace.turned_off is not None and trace.reached_rad is not None:
+        exchange, off = trace.turned_off
+        expected = f"a heading within {trace.reached_rad:.2f} rad of that of a goal where the robot is"
+        yield Case(off < trace.reached_rad, exchange, expected, f"one that is {off:.2f} rad off", "does not turn")
 
 
 @rule("rest-resources/goal-ended", on=(goal_reached,))
