@@ -5,6 +5,7 @@ good robot's may be out as well, by one odometry message that one interface has 
 everything is done again, and only what is out after each change is recorded.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from http import HTTPStatus
@@ -88,23 +89,29 @@ def goals_over_soap(robot: Robot, subscribers: SoapService, effort: Effort) -> t
             if read is not None:
                 reads += for_good([read])
                 late += [replace(read, broken="")] if read.differs else []
-        for _ in range(3):
-            reads += _compare_goals(robot, subscribers)
+        # Also just after the same goal was put again, which changes nothing.
+        for first in (_nothing, partial(put_goal, robot, body), _nothing):
+            reads += _compare_goals(robot, subscribers, first)
     reads += late[-1:] if len(late) >= _GOALS else []
     robot.delete_goal()
     await_none(robot)
     return (*reads, *_compare_goals(robot, subscribers))
 
 
-def _compare_goals(robot: Robot, subscribers: SoapService) -> list[StateRead]:
+def _nothing() -> None:
+    """Do nothing before a request."""
+
+
+def _compare_goals(robot: Robot, subscribers: SoapService, first: Callable[[], object] = _nothing) -> list[StateRead]:
     """Read the goal over both interfaces until they agree, as one may learn of a change after the other."""
     patience = robot.patience(robot.settle_s)
-    return agreed(_read_goal(robot, subscribers) for _ in poll(robot.clock, 0.05, lambda: patience.over))
+    return agreed(_read_goal(robot, subscribers, first) for _ in poll(robot.clock, 0.05, lambda: patience.over))
 
 
-def _read_goal(robot: Robot, subscribers: SoapService) -> StateRead | None:
-    """Read the goal over REST, SOAP and REST; return None where it changed in the meantime."""
-    before, first = robot.goal()
+def _read_goal(robot: Robot, subscribers: SoapService, first: Callable[[], object] = _nothing) -> StateRead | None:
+    """Read the goal over REST, SOAP and REST, ``first`` just before SOAP; return None where it changed meanwhile."""
+    before, earlier = robot.goal()
+    first()
     exchange = ask(subscribers, "GetGoal")
     found, problem = returned(exchange)
     after, last = robot.goal()
@@ -114,7 +121,7 @@ def _read_goal(robot: Robot, subscribers: SoapService) -> StateRead | None:
         shown = [projected(goal, GOAL_AND_STATUS.schema) for goal in (before, after)]
         problem = problem or ("no goal" if between is None else disagreement(shown[0], between, shown[1], Slack()))
         return StateRead("goal", exchange, broken, problem)
-    if first.response.status == last.response.status == HTTPStatus.NOT_FOUND:
+    if earlier.response.status == last.response.status == HTTPStatus.NOT_FOUND:
         # No goal: an empty response, or a fault.
         return StateRead("goal", exchange, "", "a goal, where REST says that there is none" if found else "")
     return None
