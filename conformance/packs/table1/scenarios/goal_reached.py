@@ -136,11 +136,16 @@ class _Way:
         """Return the record so far."""
         return replace(self.trace, drive=self.drive.whole)
 
+    @property
+    def _turned_rad(self) -> float:
+        """Return by how much a heading has to change to count as progress, rad."""
+        return max(_TURNED_RAD, 2 * FARTHEST * self.robot.limits.noise.heading_rad)
+
     def drive_to(self, there: Pose, start: Pose) -> None:
         """Watch until the goal has ended, or the robot makes no progress."""
         robot, drive, clock = self.robot, self.drive, self.drive.clock
         limits, longest_s = robot.limits, max(_LONGEST_S, 2 * robot.limits.goal_s)
-        turned_rad = max(_TURNED_RAD, 2 * FARTHEST * limits.noise.heading_rad)
+        turned_rad = self._turned_rad
         reached_m, reached_rad = limits.arrival
         began = progress = clock.now()
         nearest, yaw, here = start.distance(there), start.yaw, start
@@ -214,15 +219,16 @@ class _Way:
         heading = wrapped(there.yaw + _ASIDE_RAD)
         put = put_goal(robot, goal_body(there._replace(yaw=heading), robot.statement.motion.frame, _REACHED))
         self.trace = replace(self.trace, again=put)
-        progress, yaw = clock.now(), there.yaw
+        began, yaw = clock.now(), there.yaw
+        progress = began
         while put.response.status in NEW:
             drive.look()
             goal, exchange = robot.goal()
             here = robot.in_map(drive.trace.odometry[-1].pose) if drive.trace.odometry else there
-            if abs(wrapped(here.yaw - yaw)) > _TURNED_RAD:
+            if abs(wrapped(here.yaw - yaw)) > self._turned_rad:
                 progress, yaw = clock.now(), here.yaw
             ended = goal is None and exchange.response.status == HTTPStatus.NOT_FOUND
-            if ended or clock.now() > progress + robot.limits.goal_s:
+            if ended or clock.now() > min(progress + robot.limits.goal_s, began + _LONGEST_S):
                 drive.keep(robot.settle_s)
                 here = middle_of([robot.in_map(one.pose) for one in drive.trace.odometry[-SEVERAL:]] or [here])
                 self.trace = replace(self.trace, turned_off=(exchange, abs(wrapped(here.yaw - heading))))

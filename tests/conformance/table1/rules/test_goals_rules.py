@@ -145,6 +145,13 @@ def test_a_goal_is_reached_within_its_tolerances(left_m, off_rad, reached_rad, w
     assert _holds(drives.goal_drives, replace(trace, undecided=True)) == []
 
 
+@pytest.mark.parametrize(("off_rad", "holds"), [(0.2, True), (2.0, False)])
+def test_a_goal_where_the_robot_is_turns_it(off_rad, holds):
+    trace = GoalReached(exchange(201), Pose(1.0, 0.0, 0.0), way_m=1.0, has_to_m=0.2, reached_m=0.3, reached_rad=0.3)
+    trace = replace(trace, read=exchange(404), ended=True, turned_off=(exchange(404), off_rad))
+    assert _holds(drives.goal_drives, trace) == [True, holds]
+
+
 @pytest.mark.parametrize(
     ("last", "fault"),
     [
