@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from conformance.contract.pack import DEFAULT_PACK, Contract
-from conformance.contract.requirement_sets import load_set, names
+from conformance.contract.requirement_sets import current, load_set, names
 
 _PACKAGE = Path(__file__).parents[1]
 # The rooms that decide what is asked and what is said of it.
@@ -71,9 +71,10 @@ def file_digest(path: Path) -> str:
 def known(pack: str | None = None) -> dict[str, Any]:
     """Return what a verifier needs to recognise this suite's certificates: digest, requirement sets, profiles."""
     contract = Contract.load(pack or DEFAULT_PACK)
+    sets = [load_set(contract, name) for name in names(contract)] or [current(contract, contract.ledger)]
     return {
         "suite": suite_digest(contract),
-        "requirement_sets": {name: load_set(contract, name).digest for name in names(contract)},
+        "requirement_sets": {one.name: one.digest for one in sets},
         "profiles": {name: list(classes) for name, classes in contract.profiles.items()},
     }
 

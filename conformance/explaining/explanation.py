@@ -20,7 +20,7 @@ NEEDS = {
     Prerequisite.MOTION: "permission to move the device (--allow-motion)",
     Prerequisite.OBSERVER: "a view of what requests cause: a ROS probe (--ros-domain-id), or the device's own list",
     Prerequisite.LIMITS: "limits in the statement",
-    Prerequisite.HOLD: "a hold time in the statement",
+    Prerequisite.HOLD: "a hold time in the statement (hold_s, of [limits] or of the motion map)",
     Prerequisite.RESOLVED: "declared tolerances that are small beside the limits",
     Prerequisite.SEEN: "a device that shows this by itself; others are not judged by it",
     Prerequisite.PROBE: "a ROS probe (--ros-domain-id)",

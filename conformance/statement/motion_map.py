@@ -158,7 +158,7 @@ class Velocity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         axes: by name, as templates name them.
         tolerance: how far the measured velocity may be off, in units per second.
         settle_s: time to reach a velocity, and to rest, s.
-        hold_s: so long after the last command the device goes on, and no longer; None: until it is told otherwise.
+        hold_s: how long the device goes on after the last command, s; None: until another command comes.
         beyond_limits: what the device does with a velocity beyond its limits: "refused", "clamped", or "undefined".
     """
 

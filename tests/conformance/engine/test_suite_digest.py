@@ -4,8 +4,10 @@ import shutil
 
 import pytest
 
+from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
-from conformance.engine.suite import JUDGING, suite_digest
+from conformance.contract.requirement_sets import judged_by
+from conformance.engine.suite import JUDGING, known, suite_digest
 from conformance.packs.table1.files import CONTRACT_DIR
 
 _OTHERS = ("fleet", "selftest", "cli", "explaining", "mutation", "packs", "commandline")
@@ -56,3 +58,13 @@ def test_the_contract_is_in_it(package, tmp_path_factory):
     before = suite_digest(Contract.load(own), package)
     (own / "openapi.yaml").write_text((own / "openapi.yaml").read_text() + "\n")
     assert suite_digest(Contract.load(own), package) != before
+
+
+def test_a_pack_without_frozen_sets_has_the_one_of_its_ledger(tmp_path):
+    description = {"openapi": "3.1.0", "info": {"title": "Lamp", "version": "1"}, "paths": {}}
+    write_described_pack(tmp_path / "pack", description, description)
+    contract = Contract.load(tmp_path / "pack")
+    scored = judged_by(contract, None)
+    assert scored is not None
+    assert known(str(contract.directory))["requirement_sets"] == {"unfrozen": scored.digest}
+    assert set(known()["requirement_sets"]) == {"1.2"}
