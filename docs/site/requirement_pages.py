@@ -49,7 +49,7 @@ _ORIGINS = {
     Origin.NORM: "It comes from a norm, so it binds every device of that kind.",
     Origin.DESCRIPTION: "It comes from a description (OpenAPI, WSDL), so it binds the device that is described.",
     Origin.WEAKNESS: "It comes from a catalogue of known weaknesses.",
-    Origin.CONTRACT: "It comes from the contract, so it binds robots that claim the contract.",
+    Origin.CONTRACT: "It comes from the contract, so it binds only robots that claim the contract.",
 }
 
 
