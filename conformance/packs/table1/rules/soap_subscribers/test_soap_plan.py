@@ -27,6 +27,8 @@ _PLAN = "soap-subscribers/plan"
 _TOLERANCE = 0.25
 # A path that is not told right after so many refusals, and is otherwise, is not told because of them.
 _REFUSALS = 3
+# Frames of these names are asked for one after another.
+_MARKS = ("first-frame", "second-frame")
 _LONG = "no_such_frame<&>\u00e9_" * 6
 
 
@@ -168,4 +170,16 @@ def test_no_plan(soap: SoapServices, subscribers: SoapService, judge: Judge) -> 
         arrives = path is not None and math.hypot(path.points[-1][0] - 1e7, path.points[-1][1] + 1e7) < 1
         judge_answer(
             judge, "soap-subscribers/plan-none", answer.fault is not None or arrives, answer, f"a fault for {what}"
+        )
+    for mark in _MARKS:
+        message = delivery_messages.request("GetPlan", x=here.x, y=here.y, frame_id=f"{_LONG}{mark}")
+        answer = call_valid(subscribers, message)
+        others = [one for one in _MARKS if one != mark and one.encode() in answer.exchange.response.body]
+        judge.check(
+            "soap-subscribers/plan-none",
+            not others,
+            answer.exchange,
+            "a response that names no frame of another request",
+            found=f"one that names {', '.join(others)}",
+            cause="another request's",
         )
