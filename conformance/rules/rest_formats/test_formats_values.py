@@ -14,6 +14,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.documents.json_schema import kind_of
 from conformance.documents.openapi import Operation, is_xml, operations_of
 from conformance.documents.representation import UnreadableError, local_name, parse_xml
+from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
@@ -112,7 +113,10 @@ def test_formats_carry_the_same_values_after_other_requests(api: RestInterface) 
         for call in calls:
             judge_same_values(api, call, list(call.operation.formats), before=partial(event, call))
     for call in reads(api):
-        judge_same_values(api, call, list(call.operation.formats), together=True)
+        try:
+            judge_same_values(api, call, list(call.operation.formats), together=True)
+        except NoAnswerError:
+            break  # whether several clients are served has a requirement of its own
     # A pause costs its time: only in longer runs, and the seed says for which resource.
     for call in run.effort.draw(calls, 1, f"{run.seed}/pause") if run.effort.name != "quick" else ():
         formats = run.effort.draw(call.operation.formats, 1, f"{run.seed}/formats")
