@@ -112,3 +112,17 @@ def test_a_list_keeps_its_entries_beside_other_clients(media_type, body, other):
     question = asked["/robot/navigation/services/", media_type]
     answer = Response(200, (("Content-Type", media_type),), body, 1.0)
     assert bool(question.mismatch(answer)) is other
+
+
+@pytest.mark.parametrize(("status", "asked"), [(200, True), (404, True), (500, False), (502, False)])
+def test_what_is_answered_by_a_crash_is_no_question(status, asked):
+    class Answering(Handler):
+        def answer(self):
+            self.send(status if self.path == "/goal/" else 404, b"")
+
+    goal = Question("/goal/", "application/json", lambda _: "")
+    with server_of(Answering) as server:
+        api = RestInterface(Run(contract=_CONTRACT), HttpClient(server.url, Connection()))
+        found = {one.path for one in questions(api, [goal])}
+        api.client.close()
+    assert (goal.path in found) is asked
