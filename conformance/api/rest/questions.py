@@ -66,10 +66,11 @@ def questions(api: RestInterface, more: Iterable[Question] = ()) -> list[Questio
 def misplaced(api: RestInterface, question: Question, answer: Response) -> str:
     """Return why a response cannot be the one to this question; empty where it can.
 
-    The question is sent alone once more: the robot's state may have changed meanwhile, as when a goal ends.
+    The question is sent alone once more: the robot's state may have changed meanwhile, as when a goal ends. A crash
+    is nobody's response; robustness/no-server-error judges it.
     """
     mismatch = question.mismatch(answer)
-    if not mismatch:
+    if not mismatch or answer.status in CRASHES:
         return ""
     alone = api.client.send("GET", question.path, headers=(("Accept", question.accept),)).response
     return "" if question.mismatch(alone) and alone.status == answer.status else mismatch

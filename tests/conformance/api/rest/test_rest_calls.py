@@ -82,6 +82,7 @@ def test_an_answer_is_another_one_s_unless_the_robot_gives_it_alone_as_well(alon
     goal = Question("/goal/", "application/json", lambda answer: "" if answer.status == 200 else f"{answer.status}")
     assert misplaced(api, goal, _answer(200)) == ""
     assert bool(misplaced(api, goal, _answer(404))) is misplaced_too
+    assert misplaced(api, goal, _answer(500)) == ""
 
 
 @pytest.mark.parametrize(
