@@ -44,7 +44,7 @@ _DEVICES = [
 ]
 
 
-def _certified(device, arguments, tmp_path, *, fault="", effort="quick"):
+def _certified(device, arguments, tmp_path, *, fault="", effort="quick", seed=1):
     """Return the result of a run, and the requirements that failed or warned."""
     if device is devices.behind_a_proxy and not devices.HAS_NGINX:
         pytest.fail("nginx is needed: apt-get install nginx-light")
@@ -52,7 +52,20 @@ def _certified(device, arguments, tmp_path, *, fault="", effort="quick"):
     token.write_text(devices.TOKEN)
     more = [str(token) if one == _FILE else one for one in arguments]
     with device(fault, tmp_path) as url:
-        done = ended(sys.executable, "-m", "roaas", "certify", url, "--effort", effort, "--out", str(out), *more)
+        done = ended(
+            sys.executable,
+            "-m",
+            "roaas",
+            "certify",
+            url,
+            "--effort",
+            effort,
+            "--seed",
+            f"{seed}",
+            "--out",
+            str(out),
+            *more,
+        )
     assert "Traceback" not in done.stdout + done.stderr
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
     blamed = {
@@ -79,3 +92,9 @@ def test_a_right_device_is_not_blamed(device, arguments, tmp_path):
 def test_a_fault_is_found(device, arguments, fault, requirement, tmp_path):
     done, _, blamed = _certified(device, arguments, tmp_path, fault=fault)
     assert requirement in blamed, done.stdout
+
+
+@pytest.mark.parametrize("seed", range(1, 4))
+def test_a_crash_now_and_then_is_one_finding(seed, tmp_path):
+    done, _, blamed = _certified(devices.unions, (), tmp_path, fault="500 now and then", seed=seed)
+    assert blamed == {"robustness/no-server-error": "fail"}, done.stdout

@@ -1,6 +1,7 @@
 """Six devices that are right and unusual, each with faults that a name turns on."""
 
 import asyncio
+import itertools
 import json
 import shutil
 import threading
@@ -47,7 +48,14 @@ def unions(fault: str, _: Path) -> Iterator[str]:
             return PlainTextResponse("no such camera", 404)
         return JSONResponse({"camera": "1" if fault == "a text for a number" else 1, "more": {"fps": 30}})
 
-    routes = [Route("/video/{camera}", one), Route("/names", lambda _: JSONResponse({"front": 1}))]
+    turns = itertools.count(1)
+
+    def named(_: Any) -> Any:
+        if fault == "500 now and then" and next(turns) % 7 == 0:
+            return PlainTextResponse("out of memory", 500)
+        return JSONResponse({"front": 1})
+
+    routes = [Route("/video/{camera}", one), Route("/names", named)]
     with serving_app(described_app(description(paths), routes)) as url:
         yield url
 
