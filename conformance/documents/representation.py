@@ -32,7 +32,7 @@ def read(media_type: str, body: bytes, schema: Schema) -> Any:
     A value that does not fit the schema stays as written (usually text), so that validation reports it.
 
     Raises:
-        UnreadableError: the body is not JSON, XML or YAML.
+        UnreadableError: the body is not JSON, XML or YAML, or is XML with text that belongs to no member.
     """
     try:
         if is_json(media_type):
@@ -41,7 +41,10 @@ def read(media_type: str, body: bytes, schema: Schema) -> Any:
                 raise UnreadableError(text.problem)
             return projected(text.value, schema)
         if is_xml(media_type):
-            return from_element(parse_xml(body), schema)
+            root = parse_xml(body)
+            if stray := _stray_text(root):
+                raise UnreadableError(stray)
+            return from_element(root, schema)
         return from_plain(parse_yaml(body), schema)
     except RecursionError as error:
         raise UnreadableError("a document that is nested too deeply to be read") from error
@@ -93,6 +96,14 @@ def by_itself(body: bytes) -> Any:
         return next(iter(yaml.load_all(body.decode("utf-8"), Loader=_ByItself)), None)
     except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
         raise UnreadableError(f"not YAML: {_short(error)}") from error
+
+
+def _stray_text(root: etree._Element) -> str:
+    """Return which text is between the child elements of another element; empty if none is."""
+    for element in root.iter():
+        if isinstance(element.tag, str) and xml.elements(element) and (text := xml.text_of(element).strip()):
+            return f"the text {text[:40]!r} between the child elements of <{local_name(element)}>"
+    return ""
 
 
 def local_name(element: etree._Element) -> str:

@@ -106,6 +106,9 @@ _mutant("format-xml-item-missing", "same-values", "XML responses lack the last i
 _mutant("format-xml-root", "xml-root", "The root element of XML responses is always <response>.").altered(
     _GET, tree(lambda root: setattr(root, "tag", "response")), _XML
 )
+_mutant("format-xml-stray", "xml", "In XML responses text stands between the fields.").altered(
+    _GET, tree(lambda root: setattr(root, "text", "ok")), _XML
+)
 _mutant("format-text-unreadable", "text", "Plain text responses are not YAML.").altered(_GET, _as_properties, _TEXT)
 _mutant("format-text-as-octets", "text", "Plain text responses have the media type application/octet-stream.").altered(
     _GET, header("Content-Type", "application/octet-stream"), _TEXT

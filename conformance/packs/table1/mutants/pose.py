@@ -47,6 +47,23 @@ class _Frozen:
         return response
 
 
+@_mutant(
+    "velocity-stale-once", "velocity-odometry", "The first GET of the velocity after 0.5 s returns the previous one."
+)
+class _Stale:
+    def __init__(self) -> None:
+        self._last: Response | None = None
+        self._at = -math.inf
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        if not rest("GET", VELOCITY)(request) or not _is_json(request) or response.status != 200:
+            return response
+        now, last = time.monotonic(), self._last
+        is_late, self._at, self._last = now > self._at + 0.5, now, response.copy()
+        return last if last is not None and is_late else response
+
+
 @_mutant("odometry-lost", "pose-fresh", "When the odometry stops, GET returns the last pose and velocity for ever.")
 class _Lost:
     def __init__(self) -> None:

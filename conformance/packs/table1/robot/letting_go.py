@@ -10,7 +10,7 @@ from typing import Final, Literal
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot import windows
 from conformance.packs.table1.robot.drive_trace import Turn
-from conformance.packs.table1.robot.robot import STILL, Velocity
+from conformance.packs.table1.robot.robot import STILL, Velocity, is_near
 
 # Of a tolerance: by so much a velocity that holds may be off.
 _OFF: Final = 1.5
@@ -24,6 +24,7 @@ COUNTED_ON_S: Final = 0.5
 JUDGED: Final = 0.95
 _COUNTED_ON: Final = 0.9
 _LATE_S: Final = 0.02
+_ROUNDING_S: Final = 1e-6
 # Readings that are farther apart than this share of the hold time say nothing of it.
 _GAP: Final = 0.25
 # Where no hold time is declared a velocity has to end within so long, s.
@@ -95,6 +96,20 @@ class LetGo:
             return True
         return bool(windows.shown(limits, self.turns[self.resumed : self.resumed + 1], STILL, count=1))
 
+    def stale(self, limits: Limits) -> Turn | None:
+        """Return the first reading after the pause if its velocity moves while the odometry around it has long rested.
+
+        A robot may smooth its velocity: only a pause counts that no robot moves to the end of.
+        """
+        if self.resumed is None or self.due is None or self.due < self.answered + self.longest(limits) - _ROUNDING_S:
+            return None
+        first, *later = self.turns[self.resumed : self.resumed + 2]
+        around = [one.odometry for one in (first, *later)]
+        rested = later and all(one is not None and is_near(limits, one.velocity, STILL) for one in around)
+        if not rested or first.velocity is None or is_near(limits, first.velocity, STILL, _OFF):
+            return None
+        return first
+
     def rests(self, limits: Limits) -> bool:
         """Return whether the newest samples show the robot at rest."""
         return bool(windows.shown(limits, self.turns[-_LOOKED_AT:], STILL))
@@ -123,9 +138,9 @@ class LetGo:
         """Return the first reading in which the velocity still held after it had to end, or None."""
         if limits.hold_s is None:
             return None
-        last = self.answered + self.longest(limits)
+        last, stale = self.answered + self.longest(limits), self.stale(limits)
         for count, turn in enumerate(self.turns, 1):
-            if turn.at > last and self.holds_by(limits, count):
+            if turn.at > last and turn is not stale and self.holds_by(limits, count):
                 return turn
         return None
 

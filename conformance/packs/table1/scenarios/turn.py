@@ -33,6 +33,8 @@ _AGAIN: Final = 0.25
 _SOON: Final = 0.45
 # Of the hold time: so long after its end the suite does not read the robot, if that is enough for it to come to rest.
 _BRIEF: Final = 0.2
+# After the last velocity of longer runs, so long: a robot must not show what it showed before a pause, s.
+_PAUSE_S: Final = 1.1
 # For so many times the hold time a linear part is renewed.
 _RENEWED: Final = 1.4
 # How often a measurement of how long a velocity holds is tried that a stall of the suite or a late response spoilt.
@@ -92,6 +94,7 @@ class _Turning:
     not_tested: list[tuple[str, str]] = field(default_factory=list)
     over_soap: list[Exchange] = field(default_factory=list)
     fastest: Velocity = STILL  # the fastest turn to the left that the robot has reached
+    pause_s: float = 0.0  # for so long after a hold time the suite is silent at least
     brief: bool = True  # whether the robot was at rest after each brief silence so far
 
     @property
@@ -133,7 +136,9 @@ class _Turning:
             # A small circle: either part has to end. The linear part is commanded last, and ends as well.
             bent, before = self._bent(bent)
             arc(robot, drive, bent, before)
-        for velocity, by in self._unrenewed(bent, run):
+        ways = self._unrenewed(bent, run)
+        for number, (velocity, by) in enumerate(ways, 1):
+            self.pause_s = _PAUSE_S if number == len(ways) and run.effort.name != "quick" else 0.0
             self.let_go(velocity, by)
         if robot.actuated(AHEAD) and robot.actuated(ABOUT):
             self._ahead_from_rest(renewed=run.effort.name != "quick")
@@ -243,7 +248,7 @@ class _Turning:
                     break
             elif self.brief and not let_go.rested_alone(limits):
                 self.brief = False
-            elif limits.hold_s is None or let_go.was_held(limits):
+            elif limits.hold_s is None or (let_go.was_held(limits) and not let_go.stale(limits)):
                 break
         if tries:
             self.tries.append(tuple(tries))
@@ -293,8 +298,9 @@ class _Turning:
                 return let_go
             if resumed is None and clock.now() > silent_from:
                 self._send_idle(full + (limits.hold_s or 0.0))
-                silent_s = (1 + _BRIEF) * (limits.hold_s or 0.0) if self.brief else let_go.longest(limits)
-                due = max(clock.now(), answered + silent_s)
+                hold_s = limits.hold_s or 0.0
+                silent_s = (1 + _BRIEF) * hold_s if self.brief else let_go.longest(limits)
+                due = max(clock.now(), answered + max(silent_s, hold_s + self.pause_s))
                 clock.sleep(due - clock.now())
                 resumed = len(let_go.turns)
                 ends = max(ends, clock.now() + _SAMPLES_S)

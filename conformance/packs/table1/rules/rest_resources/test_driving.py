@@ -1,5 +1,6 @@
 """Rules on drives: the robot accepts and reaches velocities, and its pose follows them."""
 
+import itertools
 from collections.abc import Iterator
 
 from conformance.packs.table1.robot.drive_rules import outcomes
@@ -8,7 +9,7 @@ from conformance.packs.table1.scenarios.trace import Driven
 from conformance.packs.table1.scenarios.turn import further_axes, turn
 from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
-from conformance.scenarios.rule import NotClaimed, Outcome, Rule, rule
+from conformance.scenarios.rule import Case, NotClaimed, Outcome, Rule, rule
 from conformance.scenarios.scenario import Scenario
 from conformance.verdict.run import Run
 
@@ -41,6 +42,19 @@ def velocity_both(trace: Driven, run: Run) -> Iterator[Outcome]:
 
 
 velocity_odometry = _shown("velocity-odometry", straight, turn, velocity_walk)
+
+
+@rule("rest-resources/velocity-odometry", on=(turn,))
+def velocity_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
+    """Judge that the velocity read first after a pause is not the one from before; once is chance."""
+    limits = said_of(run).limits
+    stale = [reading for one in itertools.chain.from_iterable(trace.let_go) if (reading := one.stale(limits))]
+    if len(stale) > 1:
+        expected = "the odometry's velocity, rest, in the first GET after a pause"
+        seen = f"{stale[-1].velocity}, and so after {len(stale)} pauses"
+        yield Case(False, stale[-1].velocity_exchange, expected, seen, "from before a pause")
+
+
 linear_put = _shown("linear-put", turn, velocity_walk)
 linear_keeps_angular = _shown("linear-keeps-angular", turn, velocity_walk)
 linear_agrees = _shown("linear-agrees", straight, turn, velocity_walk)
