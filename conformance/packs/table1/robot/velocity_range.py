@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from conformance.packs.table1.robot.abilities import ABOUT, AHEAD, handiest
+from conformance.packs.table1.robot.abilities import ABOUT, AHEAD, handiest, turn_beside
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import FARTHEST, Robot, Velocity
 
@@ -55,6 +55,22 @@ def handy(robot: Robot, share: float) -> Velocity:
 def both(robot: Robot) -> Velocity:
     """Return the fastest turn to the left beside the fastest drive, as far as the statement says how they depend."""
     return robot.drivable(Velocity(linear_x=fastest(robot, AHEAD, direction(robot)), angular_z=fastest(robot, ABOUT)))
+
+
+def along_arc(robot: Robot, turning: Velocity, share: float) -> tuple[Velocity, Velocity]:
+    """Return a turn along an arc, and another linear part beside which the robot can turn as fast.
+
+    The robot drives back and then ahead, unless it hardly drives back: then it drives ahead at two speeds. ``share``:
+    of the limit, how fast it drives.
+    """
+    limits, motion = robot.limits, robot.statement.motion
+    least, greatest = limits.range_of(AHEAD)
+    aside, other = (-share, share) if -least >= greatest / 2 else (share, share / 2)
+    parts = [robot.share_of_limits(one, 0.0).linear_x for one in (aside, other)]
+    turn = turning.angular_z
+    for part in parts:
+        turn = turn_beside(limits, motion, part, turn)
+    return Velocity(linear_x=parts[0], angular_z=turn), Velocity(linear_x=parts[1])
 
 
 def reach(drive: Drive, velocity: Velocity, *ids: str) -> bool:

@@ -9,7 +9,7 @@ from typing import Final
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
 from conformance.packs.table1.robot import drive_rules
-from conformance.packs.table1.robot.abilities import ABOUT, AHEAD, turn_beside
+from conformance.packs.table1.robot.abilities import ABOUT, AHEAD
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART
 from conformance.packs.table1.robot.goals import make_room
@@ -19,7 +19,7 @@ from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 from conformance.packs.table1.robot.soap_services import ask
 from conformance.packs.table1.robot.undisturbed import arc, renewed
 from conformance.packs.table1.robot.unrenewed import slow, unrenewed
-from conformance.packs.table1.robot.velocity_range import both, fastest, handy, reach, slowest_along
+from conformance.packs.table1.robot.velocity_range import along_arc, both, fastest, handy, reach, slowest_along
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S, SEVERAL
 from conformance.packs.table1.scenarios.trace import Driven
 from conformance.scenarios.scenario import PartialTraceError, scenario
@@ -134,7 +134,7 @@ class _Turning:
         bent = robot.drivable(Velocity(*(-part for part in left)))
         if robot.actuated(AHEAD) and robot.actuated(ABOUT):
             # A small circle: either part has to end. The linear part is commanded last, and ends as well.
-            bent, before = self._bent(bent)
+            bent, before = along_arc(robot, bent, _ASIDE)
             arc(robot, drive, bent, before)
         ways = self._unrenewed(bent, run)
         for number, (velocity, by) in enumerate(ways, 1):
@@ -161,20 +161,6 @@ class _Turning:
                 reach(drive, velocity)
         drive.stop(ends[0])
         self.let_go(robot.drivable(Velocity(*(_ASIDE * part for part in ends[0]))))
-
-    def _bent(self, turning: Velocity) -> tuple[Velocity, Velocity]:
-        """Return a turn along an arc, and another linear part beside which the robot can turn as fast.
-
-        The robot drives back and then ahead, unless it hardly drives back: then it drives ahead at two speeds.
-        """
-        limits, motion = self.robot.limits, self.robot.statement.motion
-        least, greatest = limits.range_of(AHEAD)
-        aside, other = (-_ASIDE, _ASIDE) if -least >= greatest / 2 else (_ASIDE, _ASIDE / 2)
-        parts = [self.robot.share_of_limits(share, 0.0).linear_x for share in (aside, other)]
-        turn = turning.angular_z
-        for part in parts:
-            turn = turn_beside(limits, motion, part, turn)
-        return Velocity(linear_x=parts[0], angular_z=turn), Velocity(linear_x=parts[1])
 
     def _fast(self) -> Velocity | None:
         """Turn left and right, both at the highest speed; return the second velocity if it is reached.

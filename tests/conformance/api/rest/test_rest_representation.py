@@ -63,6 +63,8 @@ def test_every_format_reads_as_the_same_value(media_type, body):
         ("application/json", '{"a": 1, "a": 1}'),
         ("application/xml", "<m>"),
         ("application/xml", '<!DOCTYPE m [<!ENTITY a "b">]><m>&a;</m>'),
+        ("application/xml", "<m>ok<name>12</name></m>"),
+        ("application/xml", "<m><parts><x>1</x>ok</parts></m>"),
         ("text/plain", "a: [1"),
         ("text/plain", "a: 1\n---\nb: 2\n"),
         ("application/json", "[" * 100_000),

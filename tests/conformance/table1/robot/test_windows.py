@@ -2,6 +2,7 @@
 
 import math
 import random
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -165,6 +166,25 @@ def test_a_robot_that_ends_only_when_it_is_asked_is_seen(hz):
     late = in_silence(1.9, hz).late(_LIMITS)
     assert late is not None
     assert late.at > 1.4
+
+
+@pytest.mark.parametrize(
+    ("shown", "odometry", "rested_s", "stale"),
+    [
+        (_FAST, STILL, 1.0, True),
+        (_FAST, STILL, 0.2, False),  # it may be smoothed
+        (_FAST, _FAST, 1.0, False),  # it has not ended: that is judged as a velocity that holds too long
+        (STILL, STILL, 1.0, False),
+    ],
+)
+def test_a_velocity_from_before_a_pause_is_stale_and_does_not_hold_too_long(shown, odometry, rested_s, stale):
+    before = tuple(turn(0.02 * index, 0.02 * index, _FAST) for index in range(1, 45))
+    first = replace(turn(1.0 + rested_s, 1.0 + rested_s, odometry), velocity=shown)
+    turns = (*before, first, *watched([STILL] * 9, 50))
+    seen = LetGo(_FAST, 0.0, 0.02, turns, len(before), 1.0 + rested_s)
+    assert (seen.stale(_LIMITS) is first) is stale
+    if stale:
+        assert seen.late(_LIMITS) is None
 
 
 def test_readings_far_apart_say_nothing_of_the_hold_time():
