@@ -8,10 +8,10 @@ from collections import Counter, deque
 from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
-from conformance.documents.representation import flattened, projected
+from conformance.documents.representation import UnreadableError, flattened, projected, read
 from conformance.packs.table1.robot.message_shapes import GOAL, read_as
 from conformance.packs.table1.robot.robot import GOAL_PATH
-from conformance.transport.exchange import Exchange, Listener
+from conformance.transport.exchange import Exchange, Listener, Request, Response
 
 # A value that is the old goal's after so many changes, and after most of those that change it, is so by rule.
 _OFTEN: Final = 3
@@ -49,6 +49,8 @@ class GoalObserver(Listener):
         """Take one exchange of the run; only those about the goal count."""
         if exchange.request.url != self._url:
             return
+        if exchange.request.method == "PUT" and exchange.request.raw is None:
+            self._judge_response(exchange)
         if exchange.request.method != "GET":
             self._before = self._since[-1] if self._since else self._before
             self._since = []
@@ -72,6 +74,20 @@ class GoalObserver(Listener):
             self._living |= {_whole(place) for place, value in one.items() if other.get(place) != value}
         elif self._before is not None and self._first is not None:
             self._look(self._before, self._since[0], self._since[1], self._first)
+
+    def _judge_response(self, exchange: Exchange) -> None:
+        """Judge that the response to a PUT has the id and the frame of the goal in the request, where it has any."""
+        sent, shown = _id_and_frame(exchange.request), _id_and_frame(exchange.response)
+        odd = next((two for one, two in zip(sent, shown, strict=True) if one and two and one != two), "")
+        if exchange.response.ok and all(shown):
+            self._judge.check(
+                "rest-resources/goal-id",
+                not odd,
+                exchange,
+                "the id and the frame of the goal in the response to its PUT",
+                found=f"{odd!r}",
+                cause="another goal in the response",
+            )
 
     def _compare(self) -> None:
         """Judge a GET by the GETs before and after it, if those agree and nothing changed the goal in between."""
@@ -108,6 +124,16 @@ class GoalObserver(Listener):
                 found=f"{place} is that of the goal before, in what is shown first of {self._stale[place]} goals",
                 cause=f"{place} of the goal before",
             )
+
+
+def _id_and_frame(message: Request | Response) -> tuple[str, str]:
+    """Return id and frame of a goal; empty where they are missing or cannot be read."""
+    try:
+        places = flattened(read(message.media_type, message.body or b"", GOAL.schema))
+    except UnreadableError:
+        return "", ""
+    id_, frame = places.get("goal_id.id"), places.get("goal.target_pose.header.frame_id")
+    return id_ if isinstance(id_, str) else "", frame if isinstance(frame, str) else ""
 
 
 def _whole(place: str) -> str:

@@ -1,4 +1,4 @@
-"""Judge every plan of a run, whichever check requests it: it ends where it was asked to, and leaps nowhere.
+"""Judge every plan of a run, whichever check requests it: its end and frame are the requested ones, and it never leaps.
 
 The allowed step length depends on the request, so that other checks judge it.
 """
@@ -28,11 +28,12 @@ _BACK: Final = 0.5
 _FAR_M: Final = 1e4
 _NEAR_M: Final = 0.01
 _TOLERANCE_M: Final = 0.1
-# What judges that a plan ends where it was asked to, by media type; the last is SOAP's. YAML takes too long to read.
-_ENDS: Final = {
-    "application/json": "rest-resources/plan-end",
-    "application/xml": "rest-formats/same-values",
-    "text/xml": "soap-subscribers/plan",
+# What judges that a plan ends where it was asked to, and in which frame, by media type; the last is SOAP's. YAML takes
+# too long to read.
+_JUDGED: Final = {
+    "application/json": ("rest-resources/plan-end", "rest-resources/plan-frame"),
+    "application/xml": ("rest-formats/same-values",) * 2,
+    "text/xml": ("soap-subscribers/plan",) * 2,
 }
 # Of fewer poses nobody knows the usual step.
 _FEWEST: Final = 6
@@ -52,7 +53,7 @@ class PlanObserver(Listener):
     def answered(self, exchange: Exchange) -> None:
         """Judge one exchange if it is a plan."""
         response = exchange.response
-        if not response.ok or response.media_type not in _ENDS:
+        if not response.ok or response.media_type not in _JUDGED:
             return
         if exchange.request.method == "GET" and exchange.request.url.startswith(self._url):
             asked = _once(parse_qsl(urlsplit(exchange.request.url).query))
@@ -64,8 +65,10 @@ class PlanObserver(Listener):
             return
         if value is None or GET_PLAN.problem(value):
             return  # which others judge
-        poses = plan_of(value).poses
+        plan = plan_of(value)
+        poses = plan.poses
         self._judge_end(exchange, asked, poses[-1])
+        self._judge_frame(exchange, asked.get("frame_id", ""), plan.frames)
         if response.media_type == "application/json":
             self._judge_leaps(exchange, poses)
 
@@ -76,12 +79,24 @@ class PlanObserver(Listener):
         if not (abs(there.x) < _FAR_M and abs(there.y) < _FAR_M and tolerance_m >= _NEAR_M):
             return
         self._judge.check(
-            _ENDS[exchange.response.media_type],
+            _JUDGED[exchange.response.media_type][0],
             end.distance(there) <= tolerance_m * 1.05 + _NEAR_M,
             exchange,
             f"a path that ends at ({there.x:.3f}, {there.y:.3f}) within {tolerance_m:g} m",
             found=f"one that ends at ({end.x:.3f}, {end.y:.3f})",
             cause="ends elsewhere",
+        )
+
+    def _judge_frame(self, exchange: Exchange, asked: str, frames: frozenset[str]) -> None:
+        """Judge that a path and its poses are in the frame in the request; all in one, where it names none."""
+        odd = sorted(frames - {asked}) if asked else sorted(frames)[1:]
+        self._judge.check(
+            _JUDGED[exchange.response.media_type][1],
+            not odd,
+            exchange,
+            f"a path and poses in the frame {asked!r}" if asked else "a path and poses in one frame",
+            found=f"the frame {odd[0]!r}" if odd else "",
+            cause="another frame",
         )
 
     def _judge_leaps(self, exchange: Exchange, poses: tuple[Pose, ...]) -> None:

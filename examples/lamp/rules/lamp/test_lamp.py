@@ -16,6 +16,7 @@ from conformance.verdict.evidence import Judge
 
 JSON = (("Content-Type", "application/json"),)
 FADES_S = 0.5
+TARGET = 0.8123456789  # with so many digits that none may be lost
 Trace = list[tuple[float, float, Exchange]]
 
 
@@ -46,21 +47,21 @@ def test_state(api: RestInterface, judge: Judge) -> None:
 @pytest.mark.requirement("lamp/out-of-range")
 def test_out_of_range(api: RestInterface, judge: Judge) -> None:
     """Check that a brightness outside 0 to 1 is answered 422 and leaves the target unchanged."""
-    put(api, 0.25)
-    for wrong in (1.01, -0.01, 1e308):
+    for before, wrong in ((0.25, 1.01), (0.5, -0.01), (0.75, 1e308)):
+        put(api, before)
         refusal, after = put(api, wrong), shown(api.client.send("GET", "/lamp"))
-        kept = after.get("target") == 0.25
+        kept = after.get("target") == before
         holds = refusal.response.status == 422 and kept
-        judge.check("lamp/out-of-range", holds, refusal, f"422 for {wrong}, and the target 0.25 afterwards")
+        judge.check("lamp/out-of-range", holds, refusal, f"422 for {wrong}, and the target {before} afterwards")
 
 
 @scenario(needs={Need.REST, Need.MOTION})
 def fading(api: RestInterface) -> Trace:
-    """Set the lamp from 0 to 0.8 and read its state every 20 ms while it fades."""
+    """Set the lamp from 0 to the target and read its state every 20 ms while it fades."""
     put(api, 0.0)
     WALL_CLOCK.sleep(FADES_S)
     begun = WALL_CLOCK.now()
-    taken = put(api, 0.8)  # its response is the first reading
+    taken = put(api, TARGET)  # its response is the first reading
     trace = [(WALL_CLOCK.now() - begun, shown(taken).get("brightness", -1.0), taken)]
     for _ in poll_for(WALL_CLOCK, 0.02, FADES_S):
         exchange = api.client.send("GET", "/lamp")
@@ -72,18 +73,25 @@ def fading(api: RestInterface) -> Trace:
 def target(trace: Trace) -> Iterator[Outcome]:
     """Judge whether the response to the PUT and every reading during the fade report the requested target."""
     for _, _, exchange in trace:
-        yield Case(shown(exchange).get("target") == 0.8, exchange, "the target 0.8 that was sent")
+        yield Case(shown(exchange).get("target") == TARGET, exchange, f"the target {TARGET} that was sent")
 
 
 @rule("lamp/fades", on=(fading,))
 def fades(trace: Trace) -> Iterator[Outcome]:
     """Judge whether the lamp has reached the requested brightness in the last reading."""
     at, brightness, exchange = trace[-1]
-    yield Case(abs(brightness - 0.8) < 0.01, exchange, f"0.8 after {FADES_S} s", f"{brightness:.2f} after {at:.2f} s")
+    yield Case(
+        abs(brightness - TARGET) < 0.01, exchange, f"{TARGET} after {FADES_S} s", f"{brightness:.2f} after {at:.2f} s"
+    )
 
 
 @rule("lamp/in-between", on=(fading,))
 def in_between(trace: Trace) -> Iterator[Outcome]:
     """Judge whether every brightness during the fade lies between the old and the new target."""
     for at, brightness, exchange in trace:
-        yield Case(0 <= brightness <= 0.8, exchange, "a brightness from 0 to 0.8", f"{brightness:.2f} after {at:.2f} s")
+        yield Case(
+            0 <= brightness <= TARGET,
+            exchange,
+            f"a brightness from 0 to {TARGET}",
+            f"{brightness:.2f} after {at:.2f} s",
+        )
