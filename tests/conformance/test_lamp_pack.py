@@ -122,7 +122,10 @@ def test_two_results_are_compared(results):
 def test_the_plan_sends_nothing(closed_port):
     done = roaas("certify", "--contract", LAMP, "--rest", closed_port, "--plan")
     assert done.exit_code == 0
-    assert "scenario fading: Set the lamp from 0 to the target and read its state every 20 ms while it fades." in done.output
+    assert (
+        "scenario fading: Set the lamp from 0 to the target and read its state every 20 ms while it fades."
+        in done.output
+    )
 
 
 def test_a_fleet_is_judged_by_the_pack(tmp_path):

@@ -135,12 +135,13 @@ class Device(device.Device):
         """Return what judges every exchange with the robot's resources."""
         from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliveries  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.goal_observer import GoalObserver  # noqa: PLC0415 - see the class
+        from conformance.packs.table1.robot.list_observer import ListObserver  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.observer import Observer  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.plan_observer import PlanObserver  # noqa: PLC0415 - see the class
 
         accepted = AcceptedDeliveries(api)
         self.accepted.append(accepted)
-        return (Observer(api, self.clock), GoalObserver(api), PlanObserver(api), accepted)
+        return (Observer(api, self.clock), GoalObserver(api), PlanObserver(api), ListObserver(api), accepted)
 
     def halt(self, api: device.Rest) -> None:
         """Cancel and stop what the robot may be doing, without waiting until it stands still."""

@@ -9,21 +9,22 @@ import math
 import time
 from collections import Counter
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 from urllib.parse import unquote
 
 from conformance.api.rest.interface import RestInterface
+from conformance.documents.openapi import is_json
+from conformance.documents.representation import UnreadableError, flattened, read
 from conformance.documents.xml import NotXmlError, elements, parse, text_of
 from conformance.documents.xml_names import clark, local
 from conformance.packs.table1.delivery import COFFEE, COORDINATES, MESSAGE_FIELDS, PATH_NAMES
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_messages import NAMESPACE
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
-from conformance.packs.table1.robot.message_shapes import read_as
 from conformance.packs.table1.robot.probe.client import ARRIVES_S
 from conformance.packs.table1.robot.robot import ACCEPT_JSON, DELIVERIES
 from conformance.packs.table1.statement import said_of
-from conformance.transport.exchange import Exchange, Listener, Request
+from conformance.transport.exchange import Exchange, Listener, Request, Response
 
 # So many deliveries may wait to be looked for, and the oldest of them for so long, s.
 _MANY: Final = 10
@@ -79,8 +80,7 @@ class AcceptedDeliveries(Listener):
         """Take one exchange of the run: a delivery, or the list of them."""
         request = exchange.request
         if request.method == "GET" and request.url == self._url:
-            if exchange.response.media_type == "application/json":
-                self._look(exchange)
+            self._look(exchange)
             return
         if not exchange.response.ok or not self._has_list:
             return
@@ -115,14 +115,19 @@ class AcceptedDeliveries(Listener):
         return _delivery(code, rest[1::2]) if tuple(rest[::2]) == PATH_NAMES else None
 
     def _look(self, exchange: Exchange) -> None:
-        """Judge the deliveries that were accepted before the list was asked for."""
-        value, problem = read_as(exchange.response, LIST)
-        if problem:
+        """Judge a list in any format by the one before, and by JSON the deliveries that were accepted before it."""
+        value = _listed(exchange.response)
+        if value is None:
             return
-        shown = [json.dumps([entry["request"], entry["accepted"], entry["interface"]]) for entry in value]
+        shown = [
+            json.dumps([entry["request"], entry["accepted"], entry["interface"]], sort_keys=True) for entry in value
+        ]
+        is_default = is_json(exchange.response.media_type)
+        self._judge_kept(exchange, shown, "rest-delivery/list" if is_default else "rest-formats/same-values")
+        if not is_default:
+            return
         entries = Counter(shown)
         listed = Counter((Delivery.of(entry["request"]), str(entry["interface"])) for entry in value)
-        self._judge_kept(exchange, shown)
         first = self._before is None and not self._waiting
         before = entries if first else self._before or Counter()
         for entry in (entries - before).elements():
@@ -145,7 +150,7 @@ class AcceptedDeliveries(Listener):
             elif whole:
                 self._judge(one, there=False)
 
-    def _judge_kept(self, exchange: Exchange, entries: list[str]) -> None:
+    def _judge_kept(self, exchange: Exchange, entries: list[str], requirement: str) -> None:
         """Judge whether a list has each entry of the one before, unchanged; a full one may lack the oldest."""
         received_s = exchange.response.received_s
         asked_s = received_s - exchange.response.elapsed_ms / 1000
@@ -162,7 +167,7 @@ class AcceptedDeliveries(Listener):
         wrong = [entry for entry, there in zip(before, kept, strict=False) if not there][:1]
         expected, found = "the entries of the list that was read before", "".join(wrong)
         self._api.run.judge.check(
-            "rest-delivery/list", not wrong, exchange, expected, found=found and f"none with {found}", cause="changed"
+            requirement, not wrong, exchange, expected, found=found and f"none with {found}", cause="changed"
         )
         if not wrong:
             self._lists = [*self._lists[-_LISTS:], (received_s, entries)]
@@ -187,6 +192,19 @@ class AcceptedDeliveries(Listener):
                 found="" if there else f"no entry by {one.interface} with {one.delivery}",
                 cause="" if there else f"missing after {one.interface}",
             )
+
+
+def _listed(response: Response) -> Any:
+    """Return the list in a response, numbers as doubles; None where it has none, which others judge."""
+    if not response.ok:
+        return None
+    try:
+        value = read(response.media_type, response.body, LIST.schema)
+    except UnreadableError:
+        return None
+    if LIST.problem(value):
+        return None
+    return [{**entry, **{name: flattened(entry[name]) for name in ("request", "accepted")}} for entry in value]
 
 
 def _is_repeatable(request: Request) -> bool:

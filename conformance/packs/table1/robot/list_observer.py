@@ -1,0 +1,103 @@
+"""Judge every list of a run that is read over SOAP, whichever check requests it, by the lists over REST around it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from conformance.api.rest.interface import RestInterface
+from conformance.documents.json_schema import Shape
+from conformance.documents.representation import from_element
+from conformance.packs.table1.robot.agreement import entries_of
+from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
+from conformance.packs.table1.robot.message_shapes import SERVICES as SERVICES_SHAPE
+from conformance.packs.table1.robot.message_shapes import read_as
+from conformance.packs.table1.robot.robot import SENSORS, SERVICES
+from conformance.packs.table1.robot.soap_services import returned
+from conformance.transport.exchange import Exchange, Listener
+
+#: Path, shape and requirement of each list, by what is in a SOAP response with it.
+_LISTS: Final[Mapping[bytes, tuple[str, Shape, str]]] = {
+    b"GetSensorsResponse": (SENSORS, SENSORS_SHAPE, "equivalence/sensors"),
+    b"GetNavigationServicesResponse": (SERVICES, SERVICES_SHAPE, "equivalence/services"),
+}
+
+
+@dataclass
+class _Seen:
+    """What was read of one list.
+
+    Attributes:
+        path, shape, requirement: as above.
+        listed: the entries over REST, as read last; None: not read yet.
+        received_s: when they were received, s of the monotonic clock.
+        others: other entries over SOAP since then.
+    """
+
+    path: str
+    shape: Shape
+    requirement: str
+    listed: list[str] | None = None
+    received_s: float = 0.0
+    others: list[tuple[list[str], Exchange]] = field(default_factory=list)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of an entry's fields."""
+        return tuple(self.shape.schema["items"]["properties"])
+
+
+class ListObserver(Listener):
+    """Listens to all exchanges of one run and judges the lists over SOAP.
+
+    One that differs counts where REST shows the same entries before and after it: a robot's graph may change.
+
+    Args:
+        api: the robot's REST interface.
+    """
+
+    def __init__(self, api: RestInterface) -> None:
+        self._judge = api.run.judge
+        self._seen = {name: _Seen(*what) for name, what in _LISTS.items()}
+        self._by_url = {api.client.url(seen.path): seen for seen in self._seen.values()}
+
+    def answered(self, exchange: Exchange) -> None:
+        """Take one exchange of the run; only those with a list count."""
+        request, response = exchange.request, exchange.response
+        if request.method == "GET" and request.url in self._by_url and response.media_type == "application/json":
+            self._over_rest(self._by_url[request.url], exchange)
+        elif request.method == "POST" and response.ok:
+            for name, seen in self._seen.items():
+                if name in response.body:
+                    self._over_soap(seen, exchange)
+
+    def _over_rest(self, seen: _Seen, exchange: Exchange) -> None:
+        value, problem = read_as(exchange.response, seen.shape)
+        if problem:
+            return
+        listed, (others, seen.others) = entries_of(value, seen.names), (seen.others, [])
+        for entries, other in others if listed == seen.listed else ():
+            if _sent_s(exchange) < other.response.received_s:
+                continue
+            odd = sorted(set(entries) ^ set(listed)) or ["an entry twice"]
+            self._judge.check(
+                seen.requirement,
+                holds=False,
+                exchange=other,
+                expected=f"the entries of GET {seen.path} before and after it",
+                found=f"{len(entries)} entries for {len(listed)}; in one only: {', '.join(odd[:3])}",
+                cause="other entries",
+            )
+        seen.listed, seen.received_s = listed, exchange.response.received_s
+
+    def _over_soap(self, seen: _Seen, exchange: Exchange) -> None:
+        found, problem = returned(exchange)
+        if problem or seen.listed is None or _sent_s(exchange) < seen.received_s:
+            return
+        schema = seen.shape.schema["items"]
+        entries = entries_of([from_element(one, schema) for one in found], seen.names)
+        if entries != seen.listed:
+            seen.others.append((entries, exchange))
+
+
+def _sent_s(exchange: Exchange) -> float:
+    return exchange.response.received_s - exchange.response.elapsed_ms / 1000
