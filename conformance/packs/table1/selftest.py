@@ -163,8 +163,9 @@ class _FullQueue:
 
 _OPEN_PLACES = (
     OpenPlace(
-        r"(freeze|delay|scale|ulp|swap):[gG]etPlan:answer(\.return)?\.plan(\.poses\[\])?\.header\.stamp(\.\w+)?:\w+"
-        r"|negate:[gG]etPlan:answer(\.return)?\.plan(\.poses\[\])?\.header\.stamp\.sec:\w+",
+        r"(freeze|delay|scale|ulp|swap)(@[\w-]+)?:[gG]etPlan:answer(\.return)?\.plan(\.poses\[\])?"
+        r"\.header\.stamp(\.\w+)?:\w+"
+        r"|negate(@[\w-]+)?:[gG]etPlan:answer(\.return)?\.plan(\.poses\[\])?\.header\.stamp\.sec:\w+",
         "A planner chooses the stamp of its plan: the contract names its frame and its poses (contract.md#plans). Each "
         "request makes a new plan, so formats need not agree on the stamp.",
     ),
@@ -174,7 +175,12 @@ _OPEN_PLACES = (
         "response does not depend on the tolerance. Of other planners, plan-end judges the path by the tolerance sent.",
     ),
     OpenPlace(
-        r"ulp:putGoal:answer\.goal\.target_pose\.pose\.(position|orientation)\.\w+:\w+",
+        r"forward(@[\w-]+)?:[gG]etPlan:request\.(?!start_yaw)\w+:\w+"
+        r"|(default|scale|negate|ulp|single|round|clamp)(@[\w-]+)?:[gG]etPlan:request\.start_yaw:\w+",
+        "A path starts at the asked position (contract.md#plans); what start_yaw does to it, no clause says.",
+    ),
+    OpenPlace(
+        r"ulp(@[\w-]+)?:putGoal:answer\.goal\.target_pose\.pose\.(position|orientation)\.\w+:\w+",
         "A robot responds with the goal as it understood it: it may bring a quaternion to unit length, and transform a "
         "pose to another frame and back (contract.md#goals requires the goal, not its last bit).",
     ),
@@ -197,16 +203,20 @@ _OPEN_PLACES = (
         "When a delivery counts as accepted, to the nanosecond, is the robot's own affair (contract.md#deliveries).",
     ),
     OpenPlace(
-        r"[\w-]+@first:[gG]et(Sensors|NavigationServices):answer(\.return)?\[\]\.\w+:\w+",
+        r"[\w-]+@first:[gG]et(Sensors|NavigationServices):answer(\.return)?(\[\]\.\w+)?:\w+",
         "The lists show what is on the robot's graph, which may change after any response: one that differs from all "
         "later ones is no breach (contract.md#sensors-and-services).",
+    ),
+    OpenPlace(
+        r"(truncate|freeze|delay|fold|strip)(@[\w-]+)?:putGoal:answer\.status\.text:\w+",
+        "The text of a status is in the robot's own words (contract.md#goals names the codes).",
     ),
     OpenPlace(
         r"body-empty(@[\w-]+)?:putGoal:body:\w+",
         "A goal is acknowledged by the status (contract.md#goals); no clause requires a response body.",
     ),
     OpenPlace(
-        r"single(@[\w-]+)?:putGoal:request\.goal\.target_pose\.pose\.(position|orientation)\.\w+:\w+",
+        r"(single|ulp)(@[\w-]+)?:putGoal:request\.goal\.target_pose\.pose\.(position|orientation)\.\w+:\w+",
         "A robot responds with the goal as it understood it, and may have transformed it (contract.md#goals): only "
         "deliveries are the same to the last bit.",
     ),
