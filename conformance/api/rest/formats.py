@@ -17,8 +17,8 @@ from conformance.transport.parallel import MOST_CLIENTS, Outgoing, send_together
 
 # A robot at rest jitters; a difference in so many turns in a row is no jitter.
 _TURNS = 10
-# In so many of these turns a response of several at one moment has to differ: it may have been the first of them.
-_TOGETHER = 8
+# In so many of these turns a response has to differ of those that come at once: it may have been the first of them.
+_AT_ONCE = 8
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,39 @@ class Disagreement:
 
 # By format and place.
 Found = dict[tuple[str, str], Disagreement]
+#: Reads a resource in these formats; returns each with its exchange.
+Reader = Callable[[RestInterface, Call, list[str]], list[tuple[str, Exchange]]]
+
+
+def in_turn(api: RestInterface, call: Call, media_types: list[str]) -> list[tuple[str, Exchange]]:
+    """Read a resource in each format, one after another."""
+    return [(name, call.send(api, ("Accept", name))) for name in media_types]
+
+
+def each_after(event: Callable[[], object]) -> Reader:
+    """Return a reader that calls ``event`` before each format, and prefers it to the others, as many clients do."""
+
+    def read_each(api: RestInterface, call: Call, media_types: list[str]) -> list[tuple[str, Exchange]]:
+        found: list[tuple[str, Exchange]] = []
+        for name in media_types:
+            event()
+            rather = [f"{other};q=0.2" for other in call.operation.formats if other != name]
+            found.append((name, call.send(api, ("Accept", ", ".join((name, *rather))))))
+        return found
+
+    return read_each
+
+
+def at_once(api: RestInterface, call: Call, media_types: list[str]) -> list[tuple[str, Exchange]]:
+    """Read a resource in each format at the same moment, by several clients; a busy robot may leave some out."""
+    names = [*media_types, *itertools.repeat(JSON, MOST_CLIENTS)][:MOST_CLIENTS]
+    round_ = [Outgoing(api.client, "GET", call.path, (("Accept", name),)) for name in names]
+    attempts = zip(media_types, send_together([round_])[0], strict=False)
+    return [(name, one) for name, one in attempts if isinstance(one, Exchange)]
 
 
 def _nothing() -> None:
-    """Do nothing before a request."""
+    """Do nothing before a comparison."""
 
 
 def disagreements(
@@ -49,24 +78,22 @@ def disagreements(
     call: Call,
     media_types: list[str],
     renew: Callable[[], object] = _nothing,
-    before: Callable[[], object] = _nothing,
-    *,
-    together: bool = False,
+    reader: Reader = in_turn,
 ) -> tuple[list[Disagreement], Exchange]:
     """Read a resource as JSON, in the other formats, and as JSON again, repeatedly until all agree.
 
     Only values that are equal in both JSON responses are compared, as others change by themselves. A disagreement is a
-    value that differs at the same place every time, or nearly so among requests that are sent ``together``.
+    value that differs at the same place every time, or nearly so where all formats are read at once.
 
     Returns:
         The disagreements, and the last JSON exchange.
     """
     suspects: Found = {}
     times: Counter[tuple[str, str]] = Counter()
-    least = _TOGETHER if together else _TURNS
+    least = _AT_ONCE if reader is at_once else _TURNS
     for left in reversed(range(_TURNS)):
         renew()
-        found, exchange = one_turn(api, call, media_types, before, together=together)
+        found, exchange = one_turn(api, call, media_types, reader)
         suspects |= found
         times.update(found.keys())
         if all(count + left < least for count in times.values()):
@@ -75,30 +102,17 @@ def disagreements(
 
 
 def one_turn(
-    api: RestInterface,
-    call: Call,
-    media_types: list[str],
-    before: Callable[[], object] = _nothing,
-    *,
-    together: bool = False,
+    api: RestInterface, call: Call, media_types: list[str], reader: Reader = in_turn
 ) -> tuple[Found, Exchange]:
-    """Read a resource once as JSON, in the other formats, each after a call of ``before``, and as JSON again.
-
-    With ``before``, each of these requests prefers its format to the others, as clients do that take any of them. With
-    ``together``, several clients send them at the same moment.
+    """Read a resource once as JSON, in the other formats, and as JSON again.
 
     Returns:
         The disagreements by format and place (empty if the JSON is invalid, which other checks report), and the last
-        JSON
-        exchange.
+        JSON exchange.
     """
     schema = call.operation.shape or {}
     first = call.send(api, ("Accept", JSON))
-    others = _at_once(api, call, media_types) if together else []
-    for name in () if together else media_types:
-        before()
-        rather = [f"{other};q=0.2" for other in call.operation.formats if other != name and before is not _nothing]
-        others.append((name, call.send(api, ("Accept", ", ".join((name, *rather))))))
+    others = reader(api, call, media_types)
     last = call.send(api, ("Accept", JSON))
     snapshots = [_snapshot(item, JSON, schema) for item in (first, last)]
     if any(shown is None for shown in snapshots):
@@ -111,22 +125,12 @@ def one_turn(
     }, last
 
 
-def _at_once(api: RestInterface, call: Call, media_types: list[str]) -> list[tuple[str, Exchange]]:
-    """Read a resource in each format at the same moment, beside others; a busy robot may leave some out."""
-    names = [*media_types, *itertools.repeat(JSON, MOST_CLIENTS)][:MOST_CLIENTS]
-    round_ = [Outgoing(api.client, "GET", call.path, (("Accept", name),)) for name in names]
-    attempts = zip(media_types, send_together([round_])[0], strict=False)
-    return [(name, one) for name, one in attempts if isinstance(one, Exchange)]
-
-
 def judge_same_values(
     api: RestInterface,
     call: Call,
     media_types: list[str],
     renew: Callable[[], object] = _nothing,
-    before: Callable[[], object] = _nothing,
-    *,
-    together: bool = False,
+    reader: Reader = in_turn,
 ) -> Exchange:
     """Judge whether the formats of a resource agree; return the last JSON exchange.
 
@@ -135,10 +139,9 @@ def judge_same_values(
         call: reads the resource.
         media_types: the formats to compare with JSON.
         renew: called before each comparison to keep the state constant.
-        before: called before each reading in one of these formats.
-        together: read in these formats at the same moment.
+        reader: reads the resource in these formats.
     """
-    found, exchange = disagreements(api, call, media_types, renew, before, together=together)
+    found, exchange = disagreements(api, call, media_types, renew, reader)
     if exchange.response.ok:
         expect(api.run.judge, "rest-formats/same-values", found[0].exchange if found else exchange).that(
             not found,

@@ -9,7 +9,7 @@ import pytest
 from conformance.api.expectation import expect
 from conformance.api.rest.applicable import answered, reads
 from conformance.api.rest.calls import Call, root_name
-from conformance.api.rest.formats import judge_same_values
+from conformance.api.rest.formats import at_once, each_after, judge_same_values
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.json_schema import kind_of
 from conformance.documents.openapi import Operation, is_xml, operations_of
@@ -111,16 +111,16 @@ def test_formats_carry_the_same_values_after_other_requests(api: RestInterface) 
     calls = [call for call in run.effort.subsample(reads(api), 5) if len(call.operation.formats) > 1]
     for event in run.effort.draw(events, 3, f"{run.seed}/events"):
         for call in calls:
-            judge_same_values(api, call, list(call.operation.formats), before=partial(event, call))
+            judge_same_values(api, call, list(call.operation.formats), reader=each_after(partial(event, call)))
     for call in reads(api):
         try:
-            judge_same_values(api, call, list(call.operation.formats), together=True)
+            judge_same_values(api, call, list(call.operation.formats), reader=at_once)
         except NoAnswerError:
             break  # whether several clients are served has a requirement of its own
     # A pause costs its time: only in longer runs, and the seed says for which resource.
     for call in run.effort.draw(calls, 1, f"{run.seed}/pause") if run.effort.name != "quick" else ():
         formats = run.effort.draw(call.operation.formats, 1, f"{run.seed}/formats")
-        judge_same_values(api, call, formats, before=partial(time.sleep, _PAUSE_S))
+        judge_same_values(api, call, formats, reader=each_after(partial(time.sleep, _PAUSE_S)))
 
 
 @pytest.mark.phase("aside")

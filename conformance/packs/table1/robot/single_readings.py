@@ -190,6 +190,7 @@ class BesideOdometry(Generic[_Value]):
         if not self._neighbours([one.stamp for one in all_[-2 * _AROUND :]]):
             return
         nearest = _between(reading.value, [one.value for one in all_])
+        noun = "pose" if isinstance(nearest, Place) else "velocity"
         fits = _fits(self._limits, reading.value, nearest)
         self.judged += 1
         self.out += not fits
@@ -197,7 +198,7 @@ class BesideOdometry(Generic[_Value]):
             yield Case(
                 fits,
                 reading.exchange,
-                f"a value that the odometry had before or after; the nearest is {nearest}",
+                f"a {noun} that the odometry had before or after; the nearest is {nearest}",
                 f"{reading.value}, and out so {self.out} times",
                 "out now and then",
             )

@@ -17,7 +17,6 @@ from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.run import Run
 
 _BASE = "http://robot:7003"
-_JSON = (("Content-Type", "application/json"),)
 _BLAMED = {"rest-delivery/list", "equivalence/delivery-rest"}
 
 
@@ -47,11 +46,22 @@ class Robot:
         entry = self._listed[which]
         self._listed[which] = entry | {"request": entry["request"] | {"source_y": 0.75}}
 
-    def show(self, after_s: float = 10.0) -> None:
-        """Show the list."""
+    def show(self, after_s: float = 10.0, media_type: str = "application/json") -> None:
+        """Show the list; JSON is YAML as well."""
         self._now += after_s
         request = Request("GET", f"{_BASE}{DELIVERIES}")
-        self._answered(request, Response(200, _JSON, json.dumps(self._listed).encode(), 1.0))
+        shown = self._xml() if media_type == "application/xml" else json.dumps(self._listed).encode()
+        self._answered(request, Response(200, (("Content-Type", media_type),), shown, 1.0))
+
+    def _xml(self) -> bytes:
+        """Return the list with numbers in the notation of another program: without a fraction if they need none."""
+
+        def written(name: str, value: object) -> str:
+            if isinstance(value, dict):
+                value = "".join(written(*item) for item in value.items())
+            return f"<{name}>{f'{value:g}' if isinstance(value, float) else value}</{name}>"
+
+        return written("deliveries", {f"item{number}": one for number, one in enumerate(self._listed)}).encode()
 
     def _answered(self, request: Request, response: Response) -> None:
         self._now += 0.01
@@ -154,3 +164,13 @@ def test_an_entry_that_changes_unless_it_may_have_been_pushed_out(held, which, b
     robot.show()
     robot.show()
     assert robot.blamed == ({"rest-delivery/list"} if blamed else set())
+
+
+@pytest.mark.parametrize("media_type", ["application/xml", "text/plain"])
+def test_an_entry_that_differs_in_another_format(media_type):
+    robot = Robot(*map(_some, range(3)))
+    robot.show(media_type=media_type)
+    assert not robot.blamed
+    robot.change(1)
+    robot.show(media_type=media_type)
+    assert robot.blamed == {"rest-formats/same-values"}

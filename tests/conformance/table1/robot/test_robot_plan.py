@@ -97,6 +97,18 @@ def test_every_plan_ends_where_it_was_asked_to(asked, cases, failures):
     assert judge.refuted().get(_END, 0) == failures
 
 
+@pytest.mark.parametrize(("frame", "failures"), [("", 0), ("&frame_id=map", 0), ("&frame_id=odom", 1)])
+def test_every_plan_is_in_the_frame_that_was_asked_for(frame, failures):
+    judge = _seen(_straight(0.1), path=f"/robot/navigation/service/plan?x=1.9&y=0.0{frame}").judge
+    assert judge.refuted().get("rest-resources/plan-frame", 0) == failures
+
+
+def test_a_pose_in_another_frame_is_found_where_none_was_asked_for():
+    body = json.dumps({"plan": {"header": header(), "poses": [{"header": header("odom"), "pose": pose(1.9)}]}}).encode()
+    judge = _seen([], body=body).judge
+    assert judge.refuted().get("rest-resources/plan-frame", 0) == 1
+
+
 @pytest.mark.parametrize("x", ["1.9", "0.0"])
 def test_a_plan_over_soap_ends_where_it_was_asked_to(x):
     poses = "".join(
@@ -112,7 +124,7 @@ def test_a_plan_over_soap_ends_where_it_was_asked_to(x):
     run = Run(statement=Statement())
     observer = PlanObserver(RestInterface(run, HttpClient(_BASE + "/", Connection())))
     observer.answered(Exchange(request, Response(200, (("Content-Type", "text/xml"),), answer, 1.0)))
-    assert run.judge.counts([_SOAP]) == {_SOAP: 1}
+    assert run.judge.counts([_SOAP]) == {_SOAP: 2}  # its end and its frame
     assert run.judge.refuted().get(_SOAP, 0) == (x != "1.9")
 
 
