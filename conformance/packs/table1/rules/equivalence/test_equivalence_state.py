@@ -1,15 +1,19 @@
 """REST and SOAP must show the same state."""
 
+import itertools
+from collections import defaultdict
 from collections.abc import Callable
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
+from conformance.api.rest.snapshot import steady
 from conformance.api.soap.service import SoapService
 from conformance.documents.json_schema import Shape
-from conformance.documents.representation import from_element
+from conformance.documents.representation import flattened, from_element, projected
 from conformance.packs.table1.robot.agreement import Slack, disagreement, entries_of, unstamped
+from conformance.packs.table1.robot.delivery_messages import request
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, TWIST
 from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
@@ -17,9 +21,11 @@ from conformance.packs.table1.robot.message_shapes import SERVICES as SERVICES_S
 from conformance.packs.table1.robot.plan import plan_of, query, reachable
 from conformance.packs.table1.robot.robot import POSE, SENSORS, SERVICES, STILL, Robot, Velocity
 from conformance.packs.table1.robot.single_readings import BesideOdometry
-from conformance.packs.table1.robot.soap_services import ask, returned
+from conformance.packs.table1.robot.soap_services import ask, outgoing, returned
 from conformance.packs.table1.robot.state_over_soap import STATES, answered, compare
 from conformance.scenarios.rule import record
+from conformance.transport.exchange import Exchange
+from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
@@ -35,6 +41,11 @@ _READ: Final = 4
 # Of so many states one is read over SOAP just after a request that is refused, and one just after one that acts.
 _TURNS: Final = 5
 _NOT_ACCEPTABLE: Final = (("Accept", "image/png"),)
+# So often each state is read over REST before and after; so many rounds of several clients; in so many of their
+# responses a value differs by rule: noise in coarse steps may have been the same before and after.
+_ALONE: Final = 4
+_ROUNDS: Final = 10
+_MOST: Final = 0.8
 # Between the headings of plans, rad: small ones are among them.
 _STEP: Final = 0.07
 # How far ahead a plan in the odometry's frame leads, m.
@@ -61,6 +72,47 @@ def test_pose_and_velocity(robot: Robot, subscribers: SoapService, judge: Judge,
                 found = compare(robot, subscribers, name, first=partial(_event, robot, turn))
                 outcomes = (case for read in found for case in read.cases)
                 record(judge, f"equivalence/{name}", outcomes)
+
+
+@pytest.mark.phase("resting")
+@pytest.mark.requirement("equivalence/pose", "equivalence/velocity")
+def test_pose_and_velocity_at_one_moment(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
+    """Read pose and velocity over SOAP by several clients at once: what REST steadily shows is in most responses."""
+    for name, (path, operation, shape) in STATES.items():
+        alone = [robot.read(path, shape)[0] for _ in range(_ALONE)]
+        question = outgoing(subscribers, request(operation))
+        came = send_together([[question] * MOST_CLIENTS] * effort.cases(_ROUNDS))
+        alone += [robot.read(path, shape)[0] for _ in range(_ALONE)]
+        if None in alone:
+            return  # which the observers have judged
+        known = steady(flattened(projected(value, shape.schema)) for value in alone)
+        readings: list[tuple[Exchange, dict[str, Any]]] = []
+        for exchange in itertools.chain(*came):
+            if isinstance(exchange, Exchange) and not is_busy(exchange):
+                value, problem = answered(exchange, shape)
+                # Of a fault nobody knows whose it is; other problems are judged in any response.
+                readings += [] if problem or shape.problem(value) else [(exchange, flattened(value))]
+        place, odd = _oddest(known, readings)
+        judge.check(
+            f"equivalence/{name}",
+            len(odd) <= _MOST * len(readings),
+            odd[0][0] if odd else None,
+            f"the {place} that GET {path} shows before and after it, {known.get(place)!r}",
+            found=f"{odd[0][1]!r}, and another value in {len(odd)} of {len(readings)} responses" if odd else "",
+            cause=f"{place} at once",
+        )
+
+
+def _oddest(
+    known: dict[str, Any], readings: list[tuple[Exchange, dict[str, Any]]]
+) -> tuple[str, list[tuple[Exchange, Any]]]:
+    """Return the place where most readings differ from the known values, and what these show there."""
+    odd: defaultdict[str, list[tuple[Exchange, Any]]] = defaultdict(list)
+    for exchange, leaves in readings:
+        for place, wanted in known.items():
+            if leaves.get(place, wanted) != wanted:
+                odd[place].append((exchange, leaves[place]))
+    return max(odd.items(), key=lambda item: len(item[1]), default=("", []))
 
 
 @pytest.mark.phase("resting")
