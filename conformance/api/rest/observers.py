@@ -63,7 +63,7 @@ class Observer(Listener):
             return  # a server's own response (RFC 9110 13, 14), which no description declares; a part is no document
         if answer.body and not context.is_head and is_json(answer.media_type):
             self._judge_json(exchange, answer)
-        if answer.ok and answer.body and (is_xml(answer.media_type) or answer.media_type == "text/plain"):
+        if answer.body and (is_xml(answer.media_type) or answer.media_type == "text/plain"):
             wrong = _other_charset(answer)
             expected = "content in the charset that Content-Type names"
             expect(api.run.judge, "rest-formats/charset", exchange).that(not wrong, expected, wrong)
@@ -182,10 +182,11 @@ def _is_conditional(request: Request) -> bool:
 def _other_charset(answer: Response) -> str:
     """Return why the body is not in the charset of Content-Type; empty if it is.
 
-    Without charset, XML declares its encoding itself, and plain text is UTF-8. A byte order mark is ignored.
+    Without charset, XML declares its encoding itself, and plain text is UTF-8, unless it is a server's own error. A
+    byte order mark is ignored.
     """
     named = _CHARSET.search(answer.header("content-type") or "")
-    if named is None and is_xml(answer.media_type):
+    if named is None and (is_xml(answer.media_type) or not answer.ok):
         return ""
     charset = named[1] if named else "utf-8"
     found = f"Content-Type {answer.header('content-type')!r} with bytes that are not {charset}"

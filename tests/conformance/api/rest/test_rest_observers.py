@@ -149,6 +149,20 @@ def test_the_charset_is_that_of_the_content(charset, body, expected):
 
 
 @pytest.mark.parametrize(
+    ("content_type", "body", "expected"),
+    [
+        ("application/problem+xml; charset=utf-16", b"<problem/>", {"rest-formats/charset"}),
+        ("application/problem+xml", b"<problem/>", set()),
+        ("text/plain; charset=utf-16", b"no", {"rest-formats/charset"}),
+        ("text/plain", "\u00e9".encode("latin-1"), set()),  # of a server in front, which names none
+    ],
+)
+def test_the_charset_of_an_error_is_that_of_the_content(content_type, body, expected):
+    found = seen("GET", "/robot/velocity/", 422, [DATE, VARY, ("Content-Type", content_type)], body)
+    assert found & {"rest-formats/charset"} == expected
+
+
+@pytest.mark.parametrize(
     ("headers", "body", "accept", "expected"),
     [
         ([DATE, ("Content-Type", "text/html")], "no", "*/*", {"http/problem-type"}),
