@@ -10,7 +10,8 @@ from typing import Final, Literal
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot import windows
 from conformance.packs.table1.robot.drive_trace import Turn
-from conformance.packs.table1.robot.robot import STILL, Velocity, is_near
+from conformance.packs.table1.robot.geometry import wrapped
+from conformance.packs.table1.robot.robot import FARTHEST, STILL, Velocity, is_near
 
 # Of a tolerance: by so much a velocity that holds may be off.
 _OFF: Final = 1.5
@@ -25,6 +26,9 @@ JUDGED: Final = 0.95
 _COUNTED_ON: Final = 0.9
 _LATE_S: Final = 0.02
 _ROUNDING_S: Final = 1e-6
+# By so much a pose of a robot at rest may be off, m and rad.
+_PLACE_M: Final = 0.05
+_HEADING_RAD: Final = 0.1
 # Readings that are farther apart than this share of the hold time say nothing of it.
 _GAP: Final = 0.25
 # Where no hold time is declared a velocity has to end within so long, s.
@@ -96,19 +100,37 @@ class LetGo:
             return True
         return bool(windows.shown(limits, self.turns[self.resumed : self.resumed + 1], STILL, count=1))
 
-    def stale(self, limits: Limits) -> Turn | None:
-        """Return the first reading after the pause if its velocity moves while the odometry around it has long rested.
+    def _rested(self, limits: Limits) -> tuple[Turn, Turn] | None:
+        """Return the first two readings after a pause at whose end no robot moves, if the odometry of both rests.
 
-        A robot may smooth its velocity: only a pause counts that no robot moves to the end of.
+        A robot may smooth its velocity, and thus move on in its readings after a shorter pause.
         """
         if self.resumed is None or self.due is None or self.due < self.answered + self.longest(limits) - _ROUNDING_S:
             return None
-        first, *later = self.turns[self.resumed : self.resumed + 2]
-        around = [one.odometry for one in (first, *later)]
-        rested = later and all(one is not None and is_near(limits, one.velocity, STILL) for one in around)
-        if not rested or first.velocity is None or is_near(limits, first.velocity, STILL, _OFF):
+        two = self.turns[self.resumed : self.resumed + 2]
+        rested = all(one.odometry is not None and is_near(limits, one.odometry.velocity, STILL) for one in two)
+        return (two[0], two[1]) if rested and len(two) > 1 else None
+
+    def stale_velocity(self, limits: Limits) -> Turn | None:
+        """Return the first reading after a long pause if its velocity is not the one of the odometry around it."""
+        first, _ = self._rested(limits) or (None, None)
+        if first is None or first.velocity is None or is_near(limits, first.velocity, STILL, _OFF):
             return None
         return first
+
+    def stale_pose(self, limits: Limits) -> Turn | None:
+        """Return the first reading after a long pause if its pose is not the one that comes next."""
+        first, later = self._rested(limits) or (None, None)
+        if first is None or later is None or first.odometry is None or later.odometry is None:
+            return None
+        one, two, noise = first.odometry.pose, later.odometry.pose, limits.noise
+        near = one.distance(two) <= _PLACE_M + FARTHEST * noise.position_m
+        turned = abs(wrapped(one.yaw - two.yaw)) > _HEADING_RAD + FARTHEST * noise.heading_rad
+        return None if near and not turned else first
+
+    def is_stale(self, limits: Limits) -> bool:
+        """Return whether the first reading after a long pause is not as the robot is."""
+        return bool(self.stale_velocity(limits) or self.stale_pose(limits))
 
     def rests(self, limits: Limits) -> bool:
         """Return whether the newest samples show the robot at rest."""
@@ -138,7 +160,7 @@ class LetGo:
         """Return the first reading in which the velocity still held after it had to end, or None."""
         if limits.hold_s is None:
             return None
-        last, stale = self.answered + self.longest(limits), self.stale(limits)
+        last, stale = self.answered + self.longest(limits), self.stale_velocity(limits)
         for count, turn in enumerate(self.turns, 1):
             if turn.at > last and turn is not stale and self.holds_by(limits, count):
                 return turn

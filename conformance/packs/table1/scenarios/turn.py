@@ -234,7 +234,7 @@ class _Turning:
                     break
             elif self.brief and not let_go.rested_alone(limits):
                 self.brief = False
-            elif limits.hold_s is None or (let_go.was_held(limits) and not let_go.stale(limits)):
+            elif limits.hold_s is None or (let_go.was_held(limits) and not let_go.is_stale(limits)):
                 break
         if tries:
             self.tries.append(tuple(tries))

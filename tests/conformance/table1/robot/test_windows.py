@@ -182,9 +182,22 @@ def test_a_velocity_from_before_a_pause_is_stale_and_does_not_hold_too_long(show
     first = replace(turn(1.0 + rested_s, 1.0 + rested_s, odometry), velocity=shown)
     turns = (*before, first, *watched([STILL] * 9, 50))
     seen = LetGo(_FAST, 0.0, 0.02, turns, len(before), 1.0 + rested_s)
-    assert (seen.stale(_LIMITS) is first) is stale
+    assert (seen.stale_velocity(_LIMITS) is first) is stale
     if stale:
         assert seen.late(_LIMITS) is None
+
+
+@pytest.mark.parametrize(
+    ("pose", "stale"),
+    [(Pose(0.0, 0.0, 0.0), False), (Pose(0.06, 0.0, 0.0), False), (Pose(0.3, 0.0, 0.0), True), (Pose(0, 0, 0.5), True)],
+)
+def test_a_pose_that_differs_after_a_pause_is_stale(pose, stale):
+    before = tuple(turn(0.02 * index, 0.02 * index, _FAST) for index in range(1, 45))
+    first = turn(2.0, 2.0, STILL)
+    first = replace(first, odometry=replace(first.odometry, pose=pose))
+    seen = LetGo(_FAST, 0.0, 0.02, (*before, first, *watched([STILL] * 9, 50)), len(before), 2.0)
+    assert (seen.stale_pose(_LIMITS) is first) is stale
+    assert seen.is_stale(_LIMITS) is stale
 
 
 def test_readings_far_apart_say_nothing_of_the_hold_time():

@@ -48,11 +48,23 @@ velocity_odometry = _shown("velocity-odometry", straight, turn, velocity_walk)
 def velocity_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that the velocity read first after a pause is not the one from before; once is chance."""
     limits = said_of(run).limits
-    stale = [reading for one in itertools.chain.from_iterable(trace.let_go) if (reading := one.stale(limits))]
+    stale = [reading for one in itertools.chain.from_iterable(trace.let_go) if (reading := one.stale_velocity(limits))]
     if len(stale) > 1:
         expected = "the odometry's velocity, rest, in the first GET after a pause"
         seen = f"{stale[-1].velocity}, and so after {len(stale)} pauses"
         yield Case(False, stale[-1].velocity_exchange, expected, seen, "from before a pause")
+
+
+@rule("rest-resources/pose-motion", on=(turn,))
+def pose_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
+    """Judge that the pose read first after a pause is the one that the resting robot has in the next GET."""
+    limits = said_of(run).limits
+    readings = [one.stale_pose(limits) for one in itertools.chain.from_iterable(trace.let_go)]
+    stale = [one.odometry for one in readings if one is not None and one.odometry is not None]
+    if len(stale) > 1:
+        expected = "the pose at which the robot rests, in the first GET after a pause"
+        seen = f"{stale[-1].pose}, and another one so after {len(stale)} pauses"
+        yield Case(False, stale[-1].exchange, expected, seen, "from before a pause")
 
 
 linear_put = _shown("linear-put", turn, velocity_walk)
