@@ -76,17 +76,16 @@ class GoalObserver(Listener):
             self._look(self._before, self._since[0], self._since[1], self._first)
 
     def _judge_response(self, exchange: Exchange) -> None:
-        """Judge that the response to a PUT has the id and the frame of the goal in the request, where it has any."""
-        sent, shown = _id_and_frame(exchange.request), _id_and_frame(exchange.response)
-        odd = next((two for one, two in zip(sent, shown, strict=True) if one and two and one != two), "")
-        if exchange.response.ok and all(shown):
+        """Judge that the response to a PUT has the id of the goal in the request, where it has any."""
+        sent, shown = _id_of(exchange.request), _id_of(exchange.response)
+        if exchange.response.ok and sent and shown:
             self._judge.check(
                 "rest-resources/goal-id",
-                not odd,
+                shown == sent,
                 exchange,
-                "the id and the frame of the goal in the response to its PUT",
-                found=f"{odd!r}",
-                cause="another goal in the response",
+                f"the goal's id {sent!r} in the response to its PUT",
+                found=f"{shown!r}",
+                cause="another id in the response",
             )
 
     def _compare(self) -> None:
@@ -126,14 +125,13 @@ class GoalObserver(Listener):
             )
 
 
-def _id_and_frame(message: Request | Response) -> tuple[str, str]:
-    """Return id and frame of a goal; empty where they are missing or cannot be read."""
+def _id_of(message: Request | Response) -> str:
+    """Return the id of a goal; empty where it is missing or cannot be read."""
     try:
-        places = flattened(read(message.media_type, message.body or b"", GOAL.schema))
+        found = flattened(read(message.media_type, message.body, GOAL.schema)).get("goal_id.id")
     except UnreadableError:
-        return "", ""
-    id_, frame = places.get("goal_id.id"), places.get("goal.target_pose.header.frame_id")
-    return id_ if isinstance(id_, str) else "", frame if isinstance(frame, str) else ""
+        return ""
+    return found if isinstance(found, str) else ""
 
 
 def _whole(place: str) -> str:

@@ -88,8 +88,12 @@ class PlanObserver(Listener):
         )
 
     def _judge_frame(self, exchange: Exchange, asked: str, frames: frozenset[str]) -> None:
-        """Judge that a path and its poses are in the frame in the request; all in one, where it names none."""
-        odd = sorted(frames - {asked}) if asked else sorted(frames)[1:]
+        """Judge that a path and its poses are in the frame in the request; all in one, where it names none.
+
+        A leading slash is no part of a frame's name (tf2 drops it).
+        """
+        named = {frame.removeprefix("/") for frame in frames}
+        odd = sorted(named - {asked.removeprefix("/")}) if asked else sorted(named)[1:]
         self._judge.check(
             _JUDGED[exchange.response.media_type][1],
             not odd,

@@ -1,7 +1,7 @@
 import json
 
 import pytest
-from toy_messages import goal, header
+from toy_messages import goal
 
 from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.robot.goal_observer import GoalObserver
@@ -79,14 +79,7 @@ def test_another_goal_may_follow_and_that_before_it_be_put_again(api):
 
 
 @pytest.mark.parametrize(
-    ("shown", "wrong"),
-    [
-        (goal("<b>&amp;"), 0),
-        (goal("another"), 1),
-        (goal("<b>&amp;") | {"goal": {"target_pose": goal("")["goal"]["target_pose"] | {"header": header("odom")}}}, 1),
-        ({"goal_id": {"id": "another"}}, 0),  # no whole goal, which others judge
-        ({}, 0),
-    ],
+    ("shown", "wrong"), [(goal("<b>&amp;"), 0), (goal("another"), 1), ({"goal_id": {"id": "another"}}, 1), ({}, 0)]
 )
 def test_the_response_to_a_put_has_the_goal_of_its_request(api, shown, wrong):
     sent = Request("PUT", f"{_BASE}/robot/navigation/action/goal/", _JSON, json.dumps(goal("<b>&amp;")).encode())
