@@ -1,4 +1,4 @@
-"""Judge every plan of a run, whichever check requests it: its end and frame are the requested ones, and it never leaps.
+"""Judge every plan of a run, whichever check requests it: its end, start and frame, and that it never leaps.
 
 The allowed step length depends on the request, so that other checks judge it.
 """
@@ -14,7 +14,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.documents.representation import UnreadableError, local_name, parse_xml, read
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.message_shapes import GET_PLAN
-from conformance.packs.table1.robot.plan import plan_of
+from conformance.packs.table1.robot.plan import START_OFF, plan_of
 from conformance.packs.table1.robot.robot import PLAN
 from conformance.packs.table1.robot.state_over_soap import answered
 from conformance.transport.exchange import Exchange, Listener, Response
@@ -28,12 +28,11 @@ _BACK: Final = 0.5
 _FAR_M: Final = 1e4
 _NEAR_M: Final = 0.01
 _TOLERANCE_M: Final = 0.1
-# What judges that a plan ends where it was asked to, and in which frame, by media type; the last is SOAP's. YAML takes
-# too long to read.
+# What judges a plan's end, start and frame, by media type; the last is SOAP's. YAML takes too long to read.
 _JUDGED: Final = {
-    "application/json": ("rest-resources/plan-end", "rest-resources/plan-frame"),
-    "application/xml": ("rest-formats/same-values",) * 2,
-    "text/xml": ("soap-subscribers/plan",) * 2,
+    "application/json": ("rest-resources/plan-end", "rest-resources/plan-start", "rest-resources/plan-frame"),
+    "application/xml": ("rest-formats/same-values",) * 3,
+    "text/xml": ("soap-subscribers/plan",) * 3,
 }
 # Of fewer poses nobody knows the usual step.
 _FEWEST: Final = 6
@@ -68,6 +67,7 @@ class PlanObserver(Listener):
         plan = plan_of(value)
         poses = plan.poses
         self._judge_end(exchange, asked, poses[-1])
+        self._judge_start(exchange, asked, poses[0])
         self._judge_frame(exchange, asked.get("frame_id", ""), plan.frames)
         if response.media_type == "application/json":
             self._judge_leaps(exchange, poses)
@@ -87,6 +87,20 @@ class PlanObserver(Listener):
             cause="ends elsewhere",
         )
 
+    def _judge_start(self, exchange: Exchange, asked: Mapping[str, str], start: Pose) -> None:
+        """Judge that a path starts at the position in the request, where it has one."""
+        given = Pose(_number(asked.get("start_x", "")), _number(asked.get("start_y", "")), 0.0)
+        if not (abs(given.x) < _FAR_M and abs(given.y) < _FAR_M):
+            return
+        self._judge.check(
+            _JUDGED[exchange.response.media_type][1],
+            start.distance(given) <= START_OFF,
+            exchange,
+            f"a path that starts within {START_OFF:g} m of ({given.x:.3f}, {given.y:.3f})",
+            found=f"one that starts at ({start.x:.3f}, {start.y:.3f})",
+            cause="starts elsewhere",
+        )
+
     def _judge_frame(self, exchange: Exchange, asked: str, frames: frozenset[str]) -> None:
         """Judge that a path and its poses are in the frame in the request; all in one, where it names none.
 
@@ -95,7 +109,7 @@ class PlanObserver(Listener):
         named = {frame.removeprefix("/") for frame in frames}
         odd = sorted(named - {asked.removeprefix("/")}) if asked else sorted(named)[1:]
         self._judge.check(
-            _JUDGED[exchange.response.media_type][1],
+            _JUDGED[exchange.response.media_type][2],
             not odd,
             exchange,
             f"a path and poses in the frame {asked!r}" if asked else "a path and poses in one frame",

@@ -108,6 +108,17 @@ def test_odometry_that_was_held_up_once_fails_nobody(at, lost, rest):
     assert False not in found.values()
 
 
+def test_a_robot_on_a_machine_with_too_much_to_do_is_not_blamed():
+    """Of its samples two in three are delayed; of each delay it makes no more than 0.1 s of the way."""
+    heading, at, trace = 0.0, 0.0, []
+    for number in range(60):
+        lapse = (0.02, 0.1, 0.28)[number % 3]
+        at += lapse
+        heading += 0.8 * min(lapse, 0.1)
+        trace.append(Odometry(at, at, at, Pose(0.0, 0.0, heading), Velocity(angular_z=0.8), _EVIDENCE))
+    assert False not in judged(trace, [one.velocity for one in trace]).values()
+
+
 @pytest.mark.parametrize("at", [5, 37, 70])
 def test_odometry_that_was_held_up_once_excuses_nobody(at):
     found = judged(*_held_up(1.2, at, 0.0, lambda pose: pose._replace(yaw=0.7 * pose.yaw), rest=100))

@@ -97,6 +97,22 @@ def test_every_plan_ends_where_it_was_asked_to(asked, cases, failures):
     assert judge.refuted().get(_END, 0) == failures
 
 
+@pytest.mark.parametrize(
+    ("start", "cases", "failures"),
+    [
+        ("", 0, 0),
+        ("&start_x=0.2&start_y=0", 1, 0),
+        ("&start_x=0.0&start_y=0.3", 1, 1),
+        ("&start_x=0.3", 0, 0),  # half a position, which the robot may refuse
+        ("&start_x=1e9&start_y=0", 0, 0),
+    ],
+)
+def test_every_plan_starts_where_it_was_asked_to(start, cases, failures):
+    judge = _seen(_straight(0.1), path=f"/robot/navigation/service/plan?x=1.9&y=0.0{start}").judge
+    assert judge.counts(["rest-resources/plan-start"]) == {"rest-resources/plan-start": cases}
+    assert judge.refuted().get("rest-resources/plan-start", 0) == failures
+
+
 @pytest.mark.parametrize(("frame", "failures"), [("", 0), ("&frame_id=map", 0), ("&frame_id=odom", 1)])
 def test_every_plan_is_in_the_frame_that_was_asked_for(frame, failures):
     judge = _seen(_straight(0.1), path=f"/robot/navigation/service/plan?x=1.9&y=0.0{frame}").judge
