@@ -51,8 +51,8 @@ def velocity_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
     stale = [reading for one in itertools.chain.from_iterable(trace.let_go) if (reading := one.stale_velocity(limits))]
     if len(stale) > 1:
         expected = "the odometry's velocity, rest, in the first GET after a pause"
-        seen = f"{stale[-1].velocity}, and so after {len(stale)} pauses"
-        yield Case(False, stale[-1].velocity_exchange, expected, seen, "from before a pause")
+        seen = f"{stale[-1].velocity}; another velocity than the odometry's after {len(stale)} pauses"
+        yield Case(False, stale[-1].velocity_exchange, expected, seen, "after a pause")
 
 
 @rule("rest-resources/pose-motion", on=(turn,))
@@ -63,8 +63,8 @@ def pose_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
     stale = [one.odometry for one in readings if one is not None and one.odometry is not None]
     if len(stale) > 1:
         expected = "the pose at which the robot rests, in the first GET after a pause"
-        seen = f"{stale[-1].pose}, and another one so after {len(stale)} pauses"
-        yield Case(False, stale[-1].exchange, expected, seen, "from before a pause")
+        seen = f"{stale[-1].pose}; another pose than the next GET's after {len(stale)} pauses"
+        yield Case(False, stale[-1].exchange, expected, seen, "after a pause")
 
 
 linear_put = _shown("linear-put", turn, velocity_walk)
