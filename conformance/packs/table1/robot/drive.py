@@ -15,9 +15,9 @@ from conformance.packs.table1.robot import drive_rules, windows
 from conformance.packs.table1.robot.drive_trace import ALL, Command, Reach, Sighting, Trace, Turn
 from conformance.packs.table1.robot.letting_go import COUNTED_ON_S, Way, certain_s
 from conformance.packs.table1.robot.renewing import Renewing
-from conformance.packs.table1.robot.robot import STILL, VELOCITY, Robot, Velocity
+from conformance.packs.table1.robot.robot import ACCEPT_JSON, LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.windows import SEVERAL
-from conformance.packs.table1.robot.xml_commands import put_velocity_as_xml
+from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
 
@@ -67,18 +67,23 @@ class Drive:
             whole = {part: {axis: int(value) for axis, value in side.items()} for part, side in velocity.twist.items()}
             exchange = self.robot.put(VELOCITY, whole)
         else:
-            as_xml = put_velocity_as_xml(self.robot, velocity) if xml else None
+            as_xml = put_as_xml(self.robot, VELOCITY, velocity.twist) if xml else None
             exchange = as_xml if as_xml and as_xml.response.ok else self.robot.put_velocity(velocity, fresh=fresh)
         return self._commanded(Command(velocity, sent, self.clock.now(), exchange, integers=integers))
 
-    def command_linear(self, velocity: Velocity) -> bool:
+    def command_linear(self, velocity: Velocity, *, xml: bool = False) -> bool:
         """PUT the linear part of a velocity; return whether the response conforms to the contract.
+
+        Args:
+            velocity: a velocity within the robot's limits.
+            xml: send it as XML, if the robot sends its own as XML and takes it.
 
         Raises:
             NotPossibleError: the robot pursues a goal, so that it cannot be driven.
         """
         sent = self.clock.now()
-        exchange = self.robot.put_linear(velocity)
+        as_xml = put_as_xml(self.robot, LINEAR, velocity.linear) if xml else None
+        exchange = as_xml if as_xml and as_xml.response.ok else self.robot.put_linear(velocity)
         return self._commanded(Command(velocity, sent, self.clock.now(), exchange, linear_only=True))
 
     def commanded(self, velocity: Velocity, sent: float, exchange: Exchange) -> None:
@@ -92,13 +97,15 @@ class Drive:
         return drive_rules.answer_of(command).holds
 
     def _renew(self) -> None:
-        """Send the last command again to the same resource, as a full PUT could hide a partial PUT's fault."""
+        """Send the last command again as it was sent: another resource or format could hide a fault of this one."""
         last = self.trace.last_command
         if last is None:
             return
-        sent = self.clock.now()
-        put = self.robot.put_linear if last.linear_only else self.robot.put_velocity
-        exchange = put(last.velocity)
+        request, sent = last.exchange.request, self.clock.now()
+        headers = (("Content-Type", request.media_type), *ACCEPT_JSON)
+        exchange = self.robot.rest.send(
+            "PUT", LINEAR if last.linear_only else VELOCITY, headers=headers, body=request.body
+        )
         again = Command(last.velocity, sent, self.clock.now(), exchange, linear_only=last.linear_only, renewal=True)
         self.trace = self.trace.commanded(again)
 

@@ -5,6 +5,7 @@ reading after each change counts, and a fault must show after each of several ch
 sample that came between two reads.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -16,10 +17,11 @@ from conformance.api.rest.formats import Disagreement, Found, disagreements, one
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.packs.table1.robot.drive import Drive
-from conformance.packs.table1.robot.goal import await_goal, await_none, goal_body, put_goal
+from conformance.packs.table1.robot.goal import arrived, await_goal, await_none, goal_body, put_goal
 from conformance.packs.table1.robot.goals import choose_goals, make_room
 from conformance.packs.table1.robot.plan import reachable
 from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, PLAN, POSE, STILL, VELOCITY, Robot, Velocity
+from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange
@@ -31,6 +33,8 @@ _CHANGES: Final = 3
 DIGITS: Final = "123"
 # Over a slow link, or a robot that arrives soon, a goal may be over when it is read.
 _TRIES: Final = 3
+# Each goal at one place has another heading, rad.
+_TURNED_RAD: Final = 0.37
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,14 @@ class FormatsRead:
         if found is None:
             return cls(operation.template, operation.id, exchange)
         return cls(operation.template, operation.id, found.exchange, found.description)
+
+
+@dataclass(frozen=True)
+class XmlPut:
+    """A goal that was PUT as XML, and where the robot's JSON differs from it; empty if nowhere."""
+
+    exchange: Exchange
+    differs: str
 
 
 @scenario(needs={Need.REST, Need.MOTION})
@@ -92,25 +104,38 @@ def formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> tuple
 
 
 @scenario(needs={Need.REST, Need.MOTION})
-def formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> tuple[FormatsRead, ...]:
-    """PUT several goals and read each in all formats, from the first reading on."""
+def formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> tuple[FormatsRead | XmlPut, ...]:
+    """PUT several goals, every other one as XML, and read each in all formats, from the first reading on."""
     call = _reader(api, GOAL_PATH)
-    if effort.name == "quick" or call is None:
-        return ()  # one goal is looked at in any case
-
-    def put() -> Iterator[Call]:
-        for number, pose in enumerate(choose_goals(robot, 1.5, 1 + _CHANGES)):
-            body = goal_body(pose, robot.statement.motion.frame, f"formats {number}")
+    if call is None:
+        return ()
+    poses = choose_goals(robot, 1.5, 2)
+    trace: list[FormatsRead | XmlPut] = []
+    suspects: Found | None = None
+    for number in range(effort.cases(12)):
+        pose = poses[number % 2]
+        pose = pose._replace(yaw=math.remainder(pose.yaw + number * _TURNED_RAD, math.tau))
+        body = goal_body(pose, robot.statement.motion.frame, f"formats {number}")
+        as_xml = put_as_xml(robot, GOAL_PATH, body) if number % 2 else None
+        if as_xml is None or not as_xml.response.ok:
+            as_xml = None
             put_goal(robot, body)
-            await_goal(robot, body)
-            # Where the goal before was out, this one gets the time that commands may take.
-            robot.clock.sleep(robot.settle_s if number > 1 else 0.0)
-            yield call
-
-    compared = _first(api, put())
+        goal, differs, _ = await_goal(robot, body)
+        if as_xml is not None and not (goal is None and arrived(robot, pose)):
+            trace.append(XmlPut(as_xml, differs))
+        # Where the goals before were out, this one gets the time that commands may take.
+        robot.clock.sleep(robot.settle_s if suspects else 0.0)
+        found, exchange = one_turn(api, call, _others(call))
+        # A format that shows another goal may learn of this one later, but it must show one goal.
+        other_goal = {name for name, place in found if place == "goal_id.id"}
+        odd = {key: one for key, one in found.items() if key[0] not in other_goal and not key[1].startswith("status.")}
+        trace += [FormatsRead.of(call, one.exchange, one) for one in odd.values()]
+        suspects = found if suspects is None else {key: one for key, one in found.items() if key in suspects}
+        if exchange.response.ok:
+            trace.append(FormatsRead.of(call, exchange))
     robot.delete_goal()
     await_none(robot)
-    return compared
+    return (*trace, *(FormatsRead.of(call, one.exchange, one) for one in (suspects or {}).values()))
 
 
 @scenario(needs={Need.REST, Need.MOTION})

@@ -12,7 +12,7 @@ from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.robot import LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.standstill import Standstill, read_rest, watch_rest
 from conformance.packs.table1.robot.standstill_trace import Rest
-from conformance.packs.table1.robot.xml_commands import put_velocity_as_xml
+from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.packs.table1.scenarios.plans import is_refused
 from conformance.scenarios.scenario import PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
@@ -96,7 +96,7 @@ class _Player:
         robot = self.robot
         for velocity in self.effort.alternatives(list(_beyond(robot)), 8):
             self._send(velocity)
-        put_velocity_as_xml(robot, Velocity(angular_z=_BEYOND_ANY))
+        put_as_xml(robot, VELOCITY, Velocity(angular_z=_BEYOND_ANY).twist)
         for path, value in ((VELOCITY, _fast(robot).twist), (LINEAR, _fast(robot).linear)):
             for method, target in _elsewhere(robot, path):
                 self._send_elsewhere(method, target, value)

@@ -6,6 +6,7 @@ from conformance.documents.representation import UnreadableError, by_itself
 from conformance.packs.table1.scenarios.formats import (
     DIGITS,
     FormatsRead,
+    XmlPut,
     formats_in_motion,
     formats_of_goals,
     formats_of_plans,
@@ -16,11 +17,21 @@ from conformance.transport.exchange import Exchange
 
 
 @rule("rest-formats/same-values", on=(formats_in_motion, formats_of_goals, formats_of_plans))
-def same_values(trace: tuple[FormatsRead, ...]) -> Iterator[Outcome]:
+def same_values(trace: tuple[FormatsRead | XmlPut, ...]) -> Iterator[Outcome]:
     """Judge that all formats of a resource have the same values."""
     for one in trace:
+        if isinstance(one, XmlPut):
+            continue
         expected = f"the same values in all formats of {one.template}"
         yield Case(not one.differs, one.exchange, expected, one.differs, cause=one.operation)
+
+
+@rule("rest-formats/xml-input", on=(formats_of_goals,))
+def xml_input(trace: tuple[FormatsRead | XmlPut, ...]) -> Iterator[Outcome]:
+    """Judge that a goal in XML is the goal that the robot then has."""
+    for one in trace:
+        if isinstance(one, XmlPut):
+            yield Case(not one.differs, one.exchange, "the goal that was sent", one.differs, cause="putGoal effect")
 
 
 @rule("rest-formats/text-quoted", on=(goal_as_text,))
