@@ -14,8 +14,8 @@ from conformance.observe.clock import WALL_CLOCK
 from conformance.packs.table1.robot import drive_rules, windows
 from conformance.packs.table1.robot.drive_trace import ALL, Command, Reach, Sighting, Trace, Turn
 from conformance.packs.table1.robot.letting_go import COUNTED_ON_S, Way, certain_s
-from conformance.packs.table1.robot.renewing import Renewing
-from conformance.packs.table1.robot.robot import ACCEPT_JSON, LINEAR, STILL, VELOCITY, Robot, Velocity
+from conformance.packs.table1.robot.renewing import Renewing, renewed
+from conformance.packs.table1.robot.robot import LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.windows import SEVERAL
 from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.scenarios.scenario import NotPossibleError
@@ -97,17 +97,9 @@ class Drive:
         return drive_rules.answer_of(command).holds
 
     def _renew(self) -> None:
-        """Send the last command again as it was sent: another resource or format could hide a fault of this one."""
         last = self.trace.last_command
-        if last is None:
-            return
-        request, sent = last.exchange.request, self.clock.now()
-        headers = (("Content-Type", request.media_type), *ACCEPT_JSON)
-        exchange = self.robot.rest.send(
-            "PUT", LINEAR if last.linear_only else VELOCITY, headers=headers, body=request.body
-        )
-        again = Command(last.velocity, sent, self.clock.now(), exchange, linear_only=last.linear_only, renewal=True)
-        self.trace = self.trace.commanded(again)
+        if last is not None:
+            self.trace = self.trace.commanded(renewed(self.robot, last))
 
     @property
     def holds_until(self) -> float:

@@ -6,12 +6,13 @@ after the response to the last one. So the renewals do not wait for each other.
 
 import math
 import threading
+from dataclasses import replace
 from types import TracebackType
 from typing import Final, Self
 
 from conformance.packs.table1.robot.drive_trace import Command
 from conformance.packs.table1.robot.letting_go import certain_s
-from conformance.packs.table1.robot.robot import Robot
+from conformance.packs.table1.robot.robot import ACCEPT_JSON, LINEAR, VELOCITY, Robot
 from conformance.transport.exchange import NoAnswerError
 from conformance.transport.parallel import MOST_CLIENTS
 
@@ -20,6 +21,19 @@ _EVERY: Final = 0.25
 _CLOSEST_S: Final = 0.05
 # Of the usual response time: so long a renewal is taken to be under way, and longer where others keep it waiting.
 _UNDER_WAY: Final = 1.5
+
+
+def renewed(robot: Robot, command: Command) -> Command:
+    """Send a command again as it was sent, as another resource or format could hide a fault of this one.
+
+    Raises:
+        NoAnswerError: there is no response.
+    """
+    request, sent = command.exchange.request, robot.clock.now()
+    path = LINEAR if command.linear_only else VELOCITY
+    headers = (("Content-Type", request.media_type), *ACCEPT_JSON)
+    exchange = robot.rest.send("PUT", path, headers=headers, body=request.body)
+    return replace(command, sent=sent, answered=robot.clock.now(), exchange=exchange, renewal=True)
 
 
 class Renewing:
@@ -81,19 +95,13 @@ class Renewing:
     def _renew(self, first: int, number: int) -> None:
         """Send every ``number``-th renewal, on a connection of its own."""
         robot, last = self._robot.apart(), self._command
-        put = robot.put_linear if last.linear_only else robot.put_velocity
         turn = 1 + first
         try:
             while not self._over.wait(max(0.0, self._begun + turn * self._every_s - robot.clock.now())):
-                sent = robot.clock.now()
                 try:
-                    exchange = put(last.velocity)
+                    self.commands.append(renewed(robot, last))
                 except NoAnswerError:
                     return
-                again = Command(
-                    last.velocity, sent, robot.clock.now(), exchange, linear_only=last.linear_only, renewal=True
-                )
-                self.commands.append(again)
                 late = math.ceil((robot.clock.now() - self._begun) / self._every_s - turn)
                 turn += number * max(1, math.ceil(late / number))
         finally:

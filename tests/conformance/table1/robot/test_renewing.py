@@ -1,17 +1,24 @@
 import threading
 import time
+from contextlib import closing
 from dataclasses import replace
 
 import pytest
 from toy_body import interface_of
 from toy_messages import STILL, ZERO, exchange
+from toy_server import serving
 
+from conformance.api.rest.interface import RestInterface
 from conformance.observe.polling import poll_for
+from conformance.packs.table1.limits import DeclaredLimits
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import Command
-from conformance.packs.table1.robot.renewing import Renewing
+from conformance.packs.table1.robot.renewing import Renewing, renewed
+from conformance.packs.table1.robot.robot import LINEAR, Robot, Velocity
 from conformance.packs.table1.robot.robot import STILL as STILL_VELOCITY
-from conformance.packs.table1.robot.robot import Robot, Velocity
+from conformance.packs.table1.statement import Statement
+from conformance.transport.client import Connection, HttpClient
+from conformance.verdict.run import Run
 
 _HOLD_S, _SLOW_S = 0.4, 0.15
 _WANTED = Velocity(linear_x=0.3)
@@ -98,3 +105,28 @@ def test_rest_needs_no_renewal(body, drive):
     with drive.held(STILL_VELOCITY) as lasted:
         assert lasted(drive.clock.now())
     assert body.puts == 1
+
+
+class XmlBody:
+    """A robot that shows and takes XML, and never moves."""
+
+    def __init__(self) -> None:
+        self.taken: list[tuple[str, bytes]] = []
+
+    def answer(self, method: str, path: str, sent: bytes) -> tuple[int, object]:
+        if method == "PUT":
+            self.taken.append((path, sent))
+        return 200, b"<twist><linear><x>0</x></linear></twist>"
+
+
+def test_a_velocity_in_xml_is_renewed_in_xml():
+    body = XmlBody()
+    declared = DeclaredLimits(linear_m_s=0.7, angular_rad_s=2.5, settle_s=0.3)
+    with serving(body.answer, "application/xml") as url, closing(HttpClient(url, Connection())) as client:
+        drive = Drive(Robot(RestInterface(Run(statement=Statement(declared=declared), allow_motion=True), client)))
+        drive.command_linear(_WANTED, xml=True)
+        drive.trace = drive.trace.commanded(renewed(drive.robot, drive.trace.commands[-1]))
+    first, again = body.taken
+    assert first == again == (LINEAR, first[1])
+    assert b"<x>0.3</x>" in first[1]
+    assert [one.renewal for one in drive.trace.commands] == [False, True]
