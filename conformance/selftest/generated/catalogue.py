@@ -66,7 +66,7 @@ def _classes(place: Place) -> tuple[str, ...]:
     """Return the conformance classes whose checks read a field, most likely killer first."""
     own = place.exchange.classes
     if place.medium == "xml":
-        return ("rest-formats", "strict-input") if place.part == "request" else ("rest-formats", "http")
+        return ("rest-formats", "strict-input", *own) if place.part == "request" else ("rest-formats", "http")
     if place.part == "request":
         return (*own, "strict-input")
     if place.medium == "soap":

@@ -13,7 +13,7 @@ from typing import Final
 
 from conformance.api.rest.applicable import reads
 from conformance.api.rest.calls import JSON, Call
-from conformance.api.rest.formats import Disagreement, Found, disagreements, one_turn
+from conformance.api.rest.formats import Disagreement, Found, disagreements, each_after, one_turn
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.packs.table1.robot.drive import Drive
@@ -179,8 +179,11 @@ def formats_of_plans(api: RestInterface, robot: Robot, effort: Effort) -> tuple[
 
 
 def _compared(api: RestInterface, call: Call, renew: Callable[[], object]) -> list[FormatsRead]:
-    """Read a resource in all formats until they agree, a few times; return nothing where it has no JSON."""
-    found, exchange = disagreements(api, call, _others(call), renew)
+    """Read a resource in all formats until they agree, a few times; return nothing where it has no JSON.
+
+    Each format is preferred to the others, as some clients do.
+    """
+    found, exchange = disagreements(api, call, _others(call), renew, each_after(renew))
     return [FormatsRead.of(call, exchange, found[0] if found else None)] if exchange.response.ok else []
 
 
