@@ -9,7 +9,8 @@ from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.representation import UnreadableError, flattened, projected, read
-from conformance.packs.table1.robot.message_shapes import GOAL, read_as
+from conformance.packs.table1.robot.goal import difference
+from conformance.packs.table1.robot.message_shapes import GOAL, GOAL_POSE, read_as
 from conformance.packs.table1.robot.robot import GOAL_PATH
 from conformance.transport.exchange import Exchange, Listener, Request, Response
 
@@ -76,17 +77,35 @@ class GoalObserver(Listener):
             self._look(self._before, self._since[0], self._since[1], self._first)
 
     def _judge_response(self, exchange: Exchange) -> None:
-        """Judge that the response to a PUT has the id of the goal in the request, where it has any."""
-        sent, shown = _id_of(exchange.request), _id_of(exchange.response)
-        if exchange.response.ok and sent and shown:
+        """Judge that the response to a PUT has the goal in the request, as far as it has one.
+
+        A robot may have transformed the pose to another frame.
+        """
+        sent, shown = _goal_in(exchange.request), _goal_in(exchange.response)
+        if not exchange.response.ok or not shown:
+            return
+        id_, other = (one.get("goal_id", {}).get("id") for one in (sent, shown))
+        if id_ and other:
             self._judge.check(
                 "rest-resources/goal-id",
-                shown == sent,
+                other == id_,
                 exchange,
-                f"the goal's id {sent!r} in the response to its PUT",
-                found=f"{shown!r}",
+                f"the goal's id {id_!r} in the response to its PUT",
+                found=f"{other!r}",
                 cause="another id in the response",
             )
+        target, understood = _target(sent), _target(shown)
+        if target is None or understood is None or target["header"]["frame_id"] != understood["header"]["frame_id"]:
+            return
+        differs = difference(shown, {"goal": sent["goal"]})
+        self._judge.check(
+            "rest-resources/goal-put",
+            not differs,
+            exchange,
+            "the pose in the request, as both are in the same frame",
+            found=differs,
+            cause="another pose in the response",
+        )
 
     def _compare(self) -> None:
         """Judge a GET by the GETs before and after it, if those agree and nothing changed the goal in between."""
@@ -125,13 +144,25 @@ class GoalObserver(Listener):
             )
 
 
-def _id_of(message: Request | Response) -> str:
-    """Return the id of a goal; empty where it is missing or cannot be read."""
+def _goal_in(message: Request | Response) -> dict[str, Any]:
+    """Return the goal in a message; empty where it has none that can be read."""
     try:
-        found = flattened(read(message.media_type, message.body, GOAL.schema)).get("goal_id.id")
+        found = read(message.media_type, message.body, GOAL.schema)
     except UnreadableError:
-        return ""
-    return found if isinstance(found, str) else ""
+        return {}
+    named = isinstance(found, dict) and isinstance(found.get("goal_id", {}), dict)
+    return found if named else {}
+
+
+def _target(goal: dict[str, Any]) -> Any:
+    """Return the pose of a goal with its frame; None where it is not complete."""
+    try:
+        target = goal["goal"]["target_pose"]
+        return (
+            target if isinstance(target["header"]["frame_id"], str) and not GOAL_POSE.problem(target["pose"]) else None
+        )
+    except (KeyError, TypeError):
+        return None
 
 
 def _whole(place: str) -> str:

@@ -53,6 +53,7 @@ GET_PLAN: Final = Shape(_answer_of("getPlan"))
 DELIVERIES: Final = Shape(_answer_of("getDeliveries"))
 # The status of a goal has a requirement of its own.
 GOAL: Final = Shape(_without(_GOAL, "status"))
+GOAL_POSE: Final = Shape(_GOAL["properties"]["goal"]["properties"]["target_pose"]["properties"]["pose"])
 STATUS: Final = Shape(_GOAL["properties"]["status"])
 GOAL_AND_STATUS: Final = Shape(_GOAL)
 # What is told of a goal that has ended (contract.md#goals).

@@ -85,3 +85,22 @@ def test_the_response_to_a_put_has_the_goal_of_its_request(api, shown, wrong):
     sent = Request("PUT", f"{_BASE}/robot/navigation/action/goal/", _JSON, json.dumps(goal("<b>&amp;")).encode())
     GoalObserver(api).answered(Exchange(sent, Response(202, _JSON, json.dumps(shown).encode(), 1.0)))
     assert api.run.judge.refuted().get("rest-resources/goal-id", 0) == wrong
+
+
+def turned(x: float, frame: str = "map") -> dict:
+    shown = goal("1", x=x)
+    # The same orientation, at another length and with the other sign.
+    shown["goal"]["target_pose"]["pose"]["orientation"] = {"x": 0.0, "y": 0.0, "z": 0.0, "w": -2.0}
+    shown["goal"]["target_pose"]["header"]["frame_id"] = frame
+    return shown
+
+
+@pytest.mark.parametrize(
+    ("shown", "wrong"),
+    [(turned(0.123456), 0), (turned(0.12), 1), (turned(0.12, "odom"), 0), ({"goal_id": {"id": "1"}}, 0), ([1], 0)],
+)
+def test_the_response_to_a_put_has_the_pose_of_its_request_in_the_same_frame(api, shown, wrong):
+    body = {"goal": goal("1", x=0.123456)["goal"]}
+    sent = Request("PUT", f"{_BASE}/robot/navigation/action/goal/", _JSON, json.dumps(body).encode())
+    GoalObserver(api).answered(Exchange(sent, Response(202, _JSON, json.dumps(shown).encode(), 1.0)))
+    assert api.run.judge.refuted().get("rest-resources/goal-put", 0) == wrong
