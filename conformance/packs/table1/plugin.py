@@ -138,10 +138,12 @@ class Device(device.Device):
         from conformance.packs.table1.robot.list_observer import ListObserver  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.observer import Observer  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.plan_observer import PlanObserver  # noqa: PLC0415 - see the class
+        from conformance.packs.table1.robot.soap_pose_observer import SoapPoseObserver  # noqa: PLC0415 - see the class
 
         accepted = AcceptedDeliveries(api)
         self.accepted.append(accepted)
-        return (Observer(api, self.clock), GoalObserver(api), PlanObserver(api), ListObserver(api), accepted)
+        others = (GoalObserver, PlanObserver, ListObserver, SoapPoseObserver)
+        return (Observer(api, self.clock), *(one(api) for one in others), accepted)
 
     def halt(self, api: device.Rest) -> None:
         """Cancel and stop what the robot may be doing, without waiting until it stands still."""
