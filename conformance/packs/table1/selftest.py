@@ -212,6 +212,10 @@ _OPEN_PLACES = (
         "The text of a status is in the robot's own words (contract.md#goals names the codes).",
     ),
     OpenPlace(
+        r"ulp(@[\w-]+)?:putGoal:answer\.status\.code:\w+",
+        "Which code of an active goal the response to its PUT shows, no clause says.",
+    ),
+    OpenPlace(
         r"body-empty(@[\w-]+)?:putGoal:body:\w+",
         "A goal is acknowledged by the status (contract.md#goals); no clause requires a response body.",
     ),
