@@ -8,7 +8,7 @@ from typing import Any
 from conformance.mutation.changes import Make, Where, becomes, guarded, inputs, plain, rest, soap, success, unwanted
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
-from conformance.mutation.xml_trees import each, gone, named
+from conformance.mutation.xml_trees import each, gone, named, says
 from conformance.packs.table1.delivery import COFFEE, COORDINATES, PATH_NAMES
 from conformance.packs.table1.mutants.delivery import OnlyOnce, segments
 from conformance.packs.table1.mutants.distortion import (
@@ -217,6 +217,12 @@ _soap_state("same-services", "services", "SOAP lacks the last service.").xml(
     soap("GetNavigationServices"), each("return", gone, slice(-1, None))
 )
 _soap_state("same-goal", "goal", "GetGoal never returns a goal.").instead(soap("GetGoal"), _NO_GOAL)
+_soap_state("same-goal-sometimes", "goal", "One goal in seven over SOAP is 1 cm off.").xml(
+    soap("GetGoal"), _shift("position", 0.01), nth=7
+)
+_soap_state("same-pose-stamp-stuck", "pose", "One pose in 20 over SOAP has a stamp of the first second.").xml(
+    soap("GetPose"), each("sec", says("1")), nth=20
+)
 _soap_state("same-plan", "plan", "The plan over SOAP differs from the plan over REST.").xml(
     soap("GetPlan"), _straighter
 )

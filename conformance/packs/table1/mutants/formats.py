@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import Make, When, altered, header, problem, rest, success, text
+from conformance.mutation.changes import Make, When, altered, header, problem, rest, secretly, success, text
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import each, named, says, tree
@@ -85,6 +85,10 @@ def _no_id(request: Request) -> None:
     request.body = re.sub(rb"<goal_id>.*</goal_id>", b"", request.body, flags=re.DOTALL)
 
 
+def _unsigned(request: Request) -> None:
+    request.body = request.body.replace(b">-", b">")
+
+
 def _json_problem(response: Response) -> None:
     detail = re.sub(rb"<[^>]+>", b" ", response.body).decode("utf-8", "replace").replace('"', "'")
     made = problem(response.status, detail if response.media_type.endswith("xml") else "no")
@@ -140,6 +144,11 @@ _mutant("format-large-xml", "xml-input", "XML bodies over 32 KiB return 413.").i
     lambda request: _xml_put(request) and len(request.body) > _SMALL, problem(413, "too large")
 )
 _mutant("format-xml-id-lost", "xml-input", "A goal that is sent as XML gets another id.").rewritten(_xml_put, _no_id)
+_mutant(
+    "format-xml-velocity-unsigned",
+    "rest-resources/velocity-converges",
+    "A velocity that is sent as XML is obeyed without its signs.",
+).made(secretly(lambda request: _xml_put(request) and request.path == VELOCITY, _unsigned))
 _mutant(
     "format-text-unquoted",
     "text-quoted",

@@ -148,6 +148,9 @@ _mutant("goal-outcome-untold", "goal-outcome", "The 404 after a goal does not sa
 _mutant("goal-outcome-always-success", "goal-outcome", "A cancelled goal is reported as succeeded.").json(
     _GET, lambda told: told.get("last_goal", {"status": {}})["status"].update(code=4), status(404)
 )
+_mutant("goal-put-rounded", "goal-put", "The response to a goal's PUT rounds its position to 0.1 m.").json(
+    _PUT, _guarded(field(_X, lambda x: round(x, 1)))
+)
 _mutant("goal-get-swapped", "goal-get", "GET returns the goal with x and y swapped.").json(_GET, swapped(_X, _Y))
 _mutant("goal-none-empty", "goal-none", "Without a goal, GET returns 200 with null.").altered(
     _GET, page(200, b"null", JSON), status(404)

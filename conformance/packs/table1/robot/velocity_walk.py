@@ -33,7 +33,6 @@ class VelocityMachine(RuleBasedStateMachine):
         self._walk = walk
         self._robot, self._drive = walk.robot, walk.drive
         self._wanted = STILL
-        self._commands = 0
 
     def teardown(self) -> None:
         """Stop the robot."""
@@ -82,20 +81,21 @@ class VelocityMachine(RuleBasedStateMachine):
 
     def _full(self, wanted: Velocity) -> bool:
         self._wanted = wanted
-        commanded = self._drive.command(wanted, xml=self._as_xml())
+        commanded = self._drive.command(wanted, xml=self._as_xml(wanted))
         return commanded and self._drive.reach(wanted, "rest-resources/velocity-converges")
 
-    def _as_xml(self) -> bool:
-        """Return whether the next command is sent as XML: every other one is, where the robot takes it."""
-        self._commands += 1
-        return self._commands % 2 == 0
+    def _as_xml(self, wanted: Velocity) -> bool:
+        """Return whether to send a velocity as XML: every other one of the same signs is, where the robot takes it."""
+        signs = tuple((part > 0) - (part < 0) for part in wanted)
+        self._walk.commands[signs] += 1
+        return self._walk.commands[signs] % 2 == 1
 
     def _linear(self, ahead: float) -> bool:
         wanted = self._wanted._replace(linear_x=ahead)
         if self._robot.drivable(wanted) != wanted:
             return True  # too narrow a circle for the angular part, or too fast a curve
         self._drive.refresh(self._wanted)
-        if not self._drive.command_linear(wanted, xml=self._as_xml()):
+        if not self._drive.command_linear(wanted, xml=self._as_xml(wanted)):
             return False
         self._wanted = wanted
         if not self._drive.reach(wanted, "rest-resources/linear-put", part=LINEAR_PART):

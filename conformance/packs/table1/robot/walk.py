@@ -1,5 +1,6 @@
 """State shared by the random walks of a check: they end by a failure, an unreachable robot, or when all is done."""
 
+from collections import Counter
 from collections.abc import Callable
 
 from conformance.packs.table1.robot.drive import Drive
@@ -22,6 +23,7 @@ class Walk:
     Attributes:
         robot: the robot.
         drive: its velocity commands and readings.
+        commands: number of velocities commanded so far, by the signs of their components.
         ended: why no further step is made: a requirement failed, the planned steps are done, the time is up, or the
             robot is busy.
         unreachable: the request without a response that ended the walk, if any.
@@ -32,6 +34,7 @@ class Walk:
         """Plan a walk that takes about ``share`` of the effort's budget: its steps are counted, not timed."""
         self.robot = robot
         self.drive = Drive(robot)
+        self.commands: Counter[tuple[int, ...]] = Counter()
         self.drive.trace = trace or self.drive.trace
         self.ended = ""
         self.unreachable: NoAnswerError | None = None
