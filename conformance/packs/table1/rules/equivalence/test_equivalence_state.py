@@ -1,7 +1,6 @@
 """REST and SOAP must show the same state."""
 
 import itertools
-from collections import defaultdict
 from collections.abc import Callable
 from decimal import Decimal
 from functools import partial
@@ -43,10 +42,14 @@ _READ: Final = 4
 _TURNS: Final = 5
 _NOT_ACCEPTABLE: Final = (("Accept", "image/png"),)
 # So often each state is read over REST before and after; so many rounds of several clients; in so many of their
-# responses a value differs by rule: noise in coarse steps may have been the same before and after.
+# responses a value differs by rule. Noise in coarse steps, of odometry that seldom comes, may have been the same before
+# and after, but not so often.
 _ALONE: Final = 4
 _ROUNDS: Final = 10
 _MOST: Final = 0.8
+_REPEATS: Final = 3
+# By place: a response that differs, the known value, and the other one.
+_Odd = dict[str, tuple[Exchange, Any, Any]]
 # Between the headings of plans, rad: small ones are among them.
 _STEP: Final = 0.07
 # How far ahead a plan in the odometry's frame leads, m.
@@ -79,41 +82,51 @@ def test_pose_and_velocity(robot: Robot, subscribers: SoapService, judge: Judge,
 @pytest.mark.requirement("equivalence/pose", "equivalence/velocity")
 def test_pose_and_velocity_at_one_moment(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """Read pose and velocity over SOAP by several clients at once: what REST steadily shows is in most responses."""
-    for name, (path, operation, shape) in STATES.items():
-        alone = [robot.read(path, shape)[0] for _ in range(_ALONE)]
-        question = outgoing(subscribers, request(operation))
-        came = send_together([[question] * MOST_CLIENTS] * effort.cases(_ROUNDS))
-        alone += [robot.read(path, shape)[0] for _ in range(_ALONE)]
-        if None in alone:
-            return  # which the observers have judged
-        known = steady(flattened(projected(value, shape.schema)) for value in alone)
-        readings: list[tuple[Exchange, dict[str, Any]]] = []
-        for exchange in itertools.chain(*came):
-            if isinstance(exchange, Exchange) and not is_busy(exchange):
-                value, problem = answered(exchange, shape)
-                # Of a fault nobody knows whose it is; other problems are judged in any response.
-                readings += [] if problem or shape.problem(value) else [(exchange, flattened(value))]
-        place, odd = _oddest(known, readings)
+    for name, (path, _, _) in STATES.items():
+        odd: _Odd = {}
+        for number in range(_REPEATS):
+            found = _odd_at_one_moment(robot, subscribers, name, effort)
+            if found is None:
+                return  # which the observers have judged
+            odd = {place: one for place, one in found.items() if not number or place in odd}
+            if not odd:
+                break
+        place, (exchange, known, seen) = next(iter(odd.items()), ("", (None, None, None)))
         judge.check(
             f"equivalence/{name}",
-            len(odd) <= _MOST * len(readings),
-            odd[0][0] if odd else None,
-            f"the {place} that GET {path} shows before and after it, {known.get(place)!r}",
-            found=f"another value in {len(odd)} of {len(readings)} responses, such as {odd[0][1]!r}" if odd else "",
+            not odd,
+            exchange,
+            f"the {place} that GET {path} shows before and after it, {known!r}",
+            found=f"another value in most responses to clients at the same moment, such as {seen!r}" if odd else "",
             cause=f"{place} at once",
         )
 
 
-def _oddest(
-    known: dict[str, Any], readings: list[tuple[Exchange, dict[str, Any]]]
-) -> tuple[str, list[tuple[Exchange, Any]]]:
-    """Return the place where most readings differ from the known values, and what these show there."""
-    odd: defaultdict[str, list[tuple[Exchange, Any]]] = defaultdict(list)
-    for exchange, leaves in readings:
-        for place, wanted in known.items():
-            if leaves.get(place, wanted) != wanted:
-                odd[place].append((exchange, leaves[place]))
-    return max(odd.items(), key=lambda item: len(item[1]), default=("", []))
+def _odd_at_one_moment(robot: Robot, subscribers: SoapService, name: str, effort: Effort) -> _Odd | None:
+    """Read a state by several clients at once; return where most differ from what REST shows before and after.
+
+    None: the readings over REST cannot be read.
+    """
+    path, operation, shape = STATES[name]
+    alone = [robot.read(path, shape)[0] for _ in range(_ALONE)]
+    question = outgoing(subscribers, request(operation))
+    came = send_together([[question] * MOST_CLIENTS] * effort.cases(_ROUNDS))
+    alone += [robot.read(path, shape)[0] for _ in range(_ALONE)]
+    if None in alone:
+        return None
+    known = steady(flattened(projected(value, shape.schema)) for value in alone)
+    readings: list[tuple[Exchange, dict[str, Any]]] = []
+    for exchange in itertools.chain(*came):
+        if isinstance(exchange, Exchange) and not is_busy(exchange):
+            value, problem = answered(exchange, shape)
+            # Of a fault nobody knows whose it is; other problems are judged in any response.
+            readings += [] if problem or shape.problem(value) else [(exchange, flattened(value))]
+    odd: _Odd = {}
+    for place, wanted in known.items():
+        others = [(exchange, leaves[place]) for exchange, leaves in readings if leaves.get(place, wanted) != wanted]
+        if len(others) > _MOST * len(readings):
+            odd[place] = (others[0][0], wanted, others[0][1])
+    return odd
 
 
 @pytest.mark.phase("resting")
