@@ -3,15 +3,21 @@
 from collections.abc import Mapping
 from typing import Any
 
-from conformance.api.rest.calls import XML
+from conformance.api.rest.calls import JSON, XML
 from conformance.documents.representation import UnreadableError, local_name, parse_xml
 from conformance.documents.writing import xml_bytes
-from conformance.packs.table1.robot.robot import ACCEPT_JSON, Robot
+from conformance.packs.table1.robot.robot import Robot
 from conformance.transport.exchange import Exchange
 
 
-def put_as_xml(robot: Robot, path: str, value: Mapping[str, Any]) -> Exchange | None:
+def put_as_xml(robot: Robot, path: str, value: Mapping[str, Any], *, accept: str = JSON) -> Exchange | None:
     """PUT a value as XML; return None where the robot sends no XML from there.
+
+    Args:
+        robot: the robot.
+        path: path of the resource.
+        value: the value, as JSON would have it.
+        accept: media type of the response.
 
     Raises:
         NoAnswerError: there is no response.
@@ -24,4 +30,4 @@ def put_as_xml(robot: Robot, path: str, value: Mapping[str, Any]) -> Exchange | 
     except UnreadableError:
         return None
     body = xml_bytes(value, local_name(form), form)
-    return robot.rest.send("PUT", path, headers=(("Content-Type", XML), *ACCEPT_JSON), body=body)
+    return robot.rest.send("PUT", path, headers=(("Content-Type", XML), ("Accept", accept)), body=body)

@@ -12,7 +12,7 @@ from functools import partial
 from typing import Final
 
 from conformance.api.rest.applicable import reads
-from conformance.api.rest.calls import JSON, Call
+from conformance.api.rest.calls import JSON, XML, Call
 from conformance.api.rest.formats import Disagreement, Found, disagreements, each_after, one_turn
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
@@ -116,7 +116,8 @@ def formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> tuple[
         pose = poses[number % 2]
         pose = pose._replace(yaw=math.remainder(pose.yaw + number * _TURNED_RAD, math.tau))
         body = goal_body(pose, robot.statement.motion.frame, f"formats {number}")
-        as_xml = put_as_xml(robot, GOAL_PATH, body) if number % 2 else None
+        accept = (JSON, XML)[number // 2 % 2]
+        as_xml = put_as_xml(robot, GOAL_PATH, body, accept=accept) if number % 2 else None
         if as_xml is None or not as_xml.response.ok:
             as_xml = None
             put_goal(robot, body)
