@@ -154,6 +154,9 @@ _mutant(
     "text-quoted",
     "Plain text responses never quote ids, so that YAML may read them as other types.",
 ).altered(_GET, text(r"(?m)^(\s*id: )['\"]([^'\"\\]*)['\"]", r"\1\2"), _TEXT)
+_mutant("format-text-null", "text-quoted", "Plain text responses do not quote the ids null and true.").altered(
+    _GET, text(r"(?m)^(\s*id: )['\"](null|true)['\"]", r"\1\2"), _TEXT
+)
 _mutant("format-xml-whole-seconds", "same-values", "In XML, the pose's stamp has nanosec 0.").xml(
     rest("GET", POSE), each("nanosec", says("0")), _XML
 )

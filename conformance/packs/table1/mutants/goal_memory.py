@@ -132,6 +132,24 @@ class _OnlyOnce:
         return response
 
 
+@_mutant("goal-cancelled-for-good", "goal-id-again", "PUT of a goal with a cancelled goal's id returns 200, no more.")
+class _CancelledForGood:
+    def __init__(self) -> None:
+        self._last = ""
+        self._cancelled: set[str] = set()
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        id_ = (identity(request) or "") if _PUT(request) else ""
+        if id_ in self._cancelled:
+            return plain(200)(request)
+        response = forward(request)
+        if id_ and success(response):
+            self._last = id_
+        elif _DELETE(request) and success(response) and self._last:
+            self._cancelled.add(self._last)
+        return response
+
+
 @_mutant(
     "goal-replaced-for-good", "goal-put", "PUT of a goal whose id a replaced goal had returns 200 and changes nothing."
 )

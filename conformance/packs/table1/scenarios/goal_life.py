@@ -94,6 +94,9 @@ class _Player:
         await_motion(robot)
         if not self._cancel(back):
             meanwhile(robot, ID, lambda _, pose, __: self._cancel(pose))
+        self.life = replace(self.life, again=put_new(robot, goal_body(back, frame, ID), back))
+        robot.delete_goal()
+        await_none(robot)
         standstill.attempted(
             "safety/cancel-stays",
             _AFTER,

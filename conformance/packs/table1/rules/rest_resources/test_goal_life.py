@@ -57,6 +57,16 @@ def goal_put(trace: GoalLife) -> Iterator[Outcome]:
         yield Case(one.exchange.response.status in NEW, one.exchange, "201 or 202 for a new goal")
 
 
+@rule("rest-resources/goal-id-again", on=(goal_life,))
+def goal_id_again(trace: GoalLife) -> Iterator[Outcome]:
+    """Judge that the id of a cancelled goal can be used again."""
+    if (again := trace.again) is not None:
+        new = again.exchange.response.status in NEW
+        yield Case(new, again.exchange, "201 or 202 for a goal whose id was that of a cancelled goal")
+        if new and not again.ended:
+            yield _shown(again)
+
+
 @rule("rest-resources/goal-get", on=(goal_life,))
 def goal_get(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that GET shows the goal that was sent, and does so after a velocity that was refused."""
