@@ -181,3 +181,24 @@ _mutant(
     "OPTIONS of a delivery's path publishes the delivery.",
     observer=True,
 ).made(_ordered_by("OPTIONS"))
+
+
+@_mutant(
+    "input-delivery-with-a-slash",
+    "delivery-refused",
+    "A delivery with a slash at the end of its path returns 404 and is published.",
+    observer=True,
+)
+def _slash(request: Request, forward: Forward) -> Response:
+    if deliveries(request) and request.path.endswith("/"):
+        sent(request, forward, "PUT", request.path[:-1])
+        return problem(404, "nothing is there")(request)
+    return forward(request)
+
+
+@_mutant("input-goal-without-slash", "goal-refused", "A goal to the path without its slash returns 404 and is taken.")
+def _no_slash(request: Request, forward: Forward) -> Response:
+    if rest("PUT", GOAL.rstrip("/"))(request):
+        sent(request, forward, "PUT", GOAL, parsed(request.body))
+        return problem(404, "nothing is there")(request)
+    return forward(request)

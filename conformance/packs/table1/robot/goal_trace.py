@@ -140,6 +140,8 @@ class GoalReached:
         undecided: whether the robot still made progress when the time was over, or another client's goal ended it.
         turned: a drive after the goal that shows whether the robot resumes a velocity from before it; or None.
         start: where a plan begins after the goal; or None.
+        start_over_soap: the same for a plan over SOAP.
+        over_soap: the last GetGoal after the goal had ended, and whether it shows a goal; or None.
         again: the PUT of the same goal, or of one that only turns, after it had ended; or None.
         turned_off: the last GET of the goal that only turns, and by how much the heading is off at its end, rad; or
             None.
@@ -161,6 +163,8 @@ class GoalReached:
     undecided: bool = False
     turned: Trace | None = None
     start: Start | None = None
+    start_over_soap: Start | None = None
+    over_soap: tuple[Exchange, bool] | None = None
     again: Exchange | None = None
     turned_off: tuple[Exchange, float] | None = None
 

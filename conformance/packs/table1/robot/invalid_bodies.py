@@ -1,5 +1,6 @@
 """Request bodies that differ from a valid one in a single respect."""
 
+from collections.abc import Iterator
 from typing import Any
 
 from conformance.api.rest.calls import JSON
@@ -28,3 +29,10 @@ def invalid_bodies(api: RestInterface, path: str, valid: dict[str, Any], number:
 def put_body(robot: Robot, path: str, media_type: str, body: bytes) -> Exchange:
     """PUT a body of a media type, and return the exchange."""
     return robot.rest.send("PUT", path, headers=(("Content-Type", media_type),), body=body)
+
+
+def elsewhere(robot: Robot, path: str) -> Iterator[tuple[str, str]]:
+    """Yield methods that a resource does not have, and PUT without its slash (contract.md#addresses), with the path."""
+    allowed = robot.rest.send("OPTIONS", path).response.header("Allow") or ""
+    yield from ((method, path) for method in ("POST", "PATCH") if method not in allowed)
+    yield "PUT", path.rstrip("/")

@@ -8,9 +8,12 @@ from statistics import median
 from typing import Any, Final
 from urllib.parse import urlencode
 
+from conformance.api.soap.service import SoapService
+from conformance.packs.table1.robot import soap_services
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, read_as
 from conformance.packs.table1.robot.robot import PLAN, Robot
+from conformance.packs.table1.robot.state_over_soap import answered
 from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
 
@@ -90,6 +93,15 @@ def ask(
     exchange = robot.get(query(**parameters))
     message, problem = read_as(exchange.response, GET_PLAN)
     return problem, None if problem else plan_of(message), exchange
+
+
+def ask_over_soap(robot: Robot, subscribers: SoapService, goal: Pose) -> tuple[Plan | None, Exchange]:
+    """Request a plan from where the robot is over SOAP; return None where the response has none."""
+    frame = robot.statement.motion.frame
+    named = {} if frame == "map" else {"frame_id": frame}
+    exchange = soap_services.ask(subscribers, "GetPlan", x=goal.x, y=goal.y, **named)
+    message, problem = answered(exchange, GET_PLAN)
+    return None if problem or GET_PLAN.problem(message) else plan_of(message), exchange
 
 
 def reachable(robot: Robot, here: Pose, distance: float, count: int = 1) -> list[Pose]:

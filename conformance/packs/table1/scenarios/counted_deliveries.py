@@ -45,6 +45,7 @@ _OLD_VERSION: Final = _of(COURIER, 120)
 _MANDATORY: Final = _of(COURIER, 130)
 _STRANGER: Final = _of(COURIER, 140)
 _OTHER_MEDIA: Final = _of(COURIER, 150)
+_SLASH: Final = _of(COURIER, 160)
 _STRANGE: Final = "http://example.com/unknown"
 # The requests after refused ones, over either interface.
 _AFTER_REST: Final = _of(3, 90)
@@ -54,7 +55,7 @@ _AFTER_SOAP_COFFEE: Final = _of(COFFEE, 110)
 
 @dataclass(frozen=True)
 class ByMethod:
-    """A valid delivery's path, requested with another method than PUT."""
+    """A valid delivery's path, requested with another method than PUT, or with a slash at its end."""
 
     method: str
     delivery: Delivery
@@ -200,6 +201,7 @@ def _invalid(api: RestInterface, soap: SoapServices) -> CountedDeliveries:
     for number, method in enumerate(api.run.effort.alternatives(methods, 3)):
         delivery = _of(3, 200 + 10 * number)
         by_method.append(ByMethod(method, delivery, rest.send(method, delivery.rest_path, fresh=True)))
+    by_method.append(ByMethod("PUT", _SLASH, rest.send("PUT", f"{_SLASH.rest_path}/", fresh=True)))
     rejected: list[Rejected] = []
     if soap.publishers is not None:
         rejected = _rejected_soap(soap.publishers)

@@ -6,6 +6,10 @@ from dataclasses import dataclass, replace
 from http import HTTPStatus
 from typing import Any, Final
 
+from conformance.api.soap.callable_services import SoapServices
+from conformance.api.soap.service import SoapService
+from conformance.observe.polling import poll
+from conformance.packs.table1.robot import soap_services
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import Command
 from conformance.packs.table1.robot.geometry import Pose, middle_of, wrapped
@@ -13,7 +17,7 @@ from conformance.packs.table1.robot.goal import NEW, await_none, goal_body, put_
 from conformance.packs.table1.robot.goal_trace import GoalReached
 from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.message_shapes import ODOMETRY
-from conformance.packs.table1.robot.plan import ask, start_of
+from conformance.packs.table1.robot.plan import ask, ask_over_soap, start_of
 from conformance.packs.table1.robot.robot import FARTHEST, POSE, Robot
 from conformance.packs.table1.robot.windows import SEVERAL
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
@@ -34,6 +38,7 @@ _DETOUR: Final = 1.3
 # Another heading at the goal, rad.
 _ASIDE_RAD: Final = 2.0
 _LOOKED_S: Final = 1.0
+_STEP_S: Final = 0.05
 _DISPLACED: Final = "displaced"
 _REACHED: Final = "reached"
 # What counts as progress.
@@ -42,16 +47,16 @@ _TURNED_RAD: Final = 0.05
 
 
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.DRIVE)
-def goal_reached(robot: Robot, run: Run, _prepared: None) -> GoalReached:
+def goal_reached(robot: Robot, run: Run, soap: SoapServices, _prepared: None) -> GoalReached:
     """PUT a goal nearby, wait until the robot is there, and PUT the same goal again.
 
     A robot that goes on with another client's goal, for example a delivery that has waited, is sent once more.
     """
-    trace = _sent(robot, run.effort, run.seed)
-    return _sent(robot, run.effort, run.seed) if trace.other else trace
+    trace = _sent(robot, soap.subscribers, run.effort, run.seed)
+    return _sent(robot, soap.subscribers, run.effort, run.seed) if trace.other else trace
 
 
-def _sent(robot: Robot, effort: Effort, seed: int) -> GoalReached:
+def _sent(robot: Robot, subscribers: SoapService | None, effort: Effort, seed: int) -> GoalReached:
     """Return the record of one goal."""
     here = robot.map_pose()
     if here is None:
@@ -59,6 +64,8 @@ def _sent(robot: Robot, effort: Effort, seed: int) -> GoalReached:
     there, other = choose_goals(robot, max(_AWAY_M, 2 * robot.limits.arrival[0]), 2)
     if effort.name != "quick":
         there = _turned(robot, here, there, random.Random(f"{seed}/heading"))  # noqa: S311 - no secret
+    if subscribers is not None:
+        ask_over_soap(robot, subscribers, there)  # a plan that always starts where this one does is seen afterwards
     before = _turning_before(robot, effort)
     # Cancelled: a robot that has deliveries to make drops them, and does not begin with them between two drives.
     put_goal(robot, goal_body(other, robot.statement.motion.frame, "cancelled"))
@@ -69,7 +76,9 @@ def _sent(robot: Robot, effort: Effort, seed: int) -> GoalReached:
     trace = GoalReached(put, there)
     if put.response.status not in NEW:
         return trace
-    way = _Way(robot, Drive(robot), trace)
+    if subscribers is not None:
+        soap_services.ask(subscribers, "GetGoal")  # what is kept from now is seen when the goal has ended
+    way = _Way(robot, subscribers, Drive(robot), trace)
     try:
         way.drive_to(there, here)
         motion = robot.statement.motion
@@ -128,6 +137,7 @@ class _Way:
     """The robot's way to its goal."""
 
     robot: Robot
+    subscribers: SoapService | None
     drive: Drive
     trace: GoalReached
 
@@ -206,12 +216,32 @@ class _Way:
         if plan is not None and arrived is not None:
             found = start_of(robot, plan, arrived, exchange, lambda: ask(robot, start)[1])
             self.trace = replace(self.trace, start=found)
+        if self.subscribers is not None and trace.ended:
+            self._over_soap(self.subscribers, start)
         if turns and trace.there is not None:
             self._turn_at(trace.there)
         else:
             self.trace = replace(self.trace, again=put_goal(robot, body))
         await_none(robot, 0.1)
         robot.delete_goal()
+
+    def _over_soap(self, subscribers: SoapService, start: Pose) -> None:
+        """Read the goal over SOAP until there is none, and request a plan back."""
+        robot = self.robot
+        patience = robot.patience(robot.settle_s)
+        for _ in poll(robot.clock, _STEP_S, lambda: patience.over):
+            exchange = soap_services.ask(subscribers, "GetGoal")
+            shown = bool(soap_services.returned(exchange)[0])
+            if not shown:
+                break
+        arrived = robot.map_pose()
+        plan, asked = ask_over_soap(robot, subscribers, start)
+        found = None
+        if plan is not None and arrived is not None:
+            found = start_of(robot, plan, arrived, asked, lambda: ask_over_soap(robot, subscribers, start)[0])
+        # Another client's goal may have come.
+        other = robot.goal()[0] is not None
+        self.trace = replace(self.trace, start_over_soap=found, over_soap=None if other else (exchange, shown))
 
     def _turn_at(self, there: Pose) -> None:
         """PUT a goal under the same id where the robot is, with another heading, and watch whether it turns there."""

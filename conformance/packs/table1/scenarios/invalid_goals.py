@@ -12,9 +12,10 @@ from conformance.observe.polling import poll_for
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import arrived, await_goal, await_none, difference, goal_body, put_goal
 from conformance.packs.table1.robot.goals import choose_goals
-from conformance.packs.table1.robot.invalid_bodies import invalid_bodies, put_body
+from conformance.packs.table1.robot.invalid_bodies import elsewhere, invalid_bodies, put_body
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.robot import GOAL_PATH, Robot
+from conformance.packs.table1.scenarios.plans import is_refused
 from conformance.scenarios.scenario import PartialTraceError, scenario
 from conformance.scenarios.stage import Need
 from conformance.transport.exchange import Exchange
@@ -52,6 +53,7 @@ def invalid_goals(api: RestInterface, robot: Robot) -> tuple[InvalidGoal, ...]:
     sent: list[InvalidGoal] = []
     try:
         _send_without(robot, bodies, sent)
+        _send_elsewhere(robot, body_of(goal_body(near, frame, "not to be followed either")), sent)
         _send_during(robot, bodies, other, sent)
     except Exception as error:
         raise PartialTraceError(tuple(sent)) from error
@@ -64,6 +66,19 @@ def _send_without(robot: Robot, bodies: list[_Body], sent: list[InvalidGoal]) ->
         differs = "" if robot.goal()[0] is None else "this goal as the active one"
         sent.append(InvalidGoal(what, during=False, exchange=exchange, differs=differs))
         if differs:
+            robot.delete_goal()
+            await_none(robot)
+
+
+def _send_elsewhere(robot: Robot, body: bytes, sent: list[InvalidGoal]) -> None:
+    """Send a valid goal by a method or to a path that the robot must refuse."""
+    for method, path in elsewhere(robot, GOAL_PATH):
+        exchange = robot.rest.send(method, path, headers=(("Content-Type", JSON),), body=body, fresh=True)
+        there = robot.goal()[0] is not None
+        if is_refused(exchange):  # else it is a vendor's own, or a redirect
+            differs = "this goal as the active one" if there else ""
+            sent.append(InvalidGoal(f"{method} {path}", during=False, exchange=exchange, differs=differs))
+        if there:
             robot.delete_goal()
             await_none(robot)
 

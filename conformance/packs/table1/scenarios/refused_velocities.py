@@ -8,6 +8,7 @@ from typing import Any, Final
 from conformance.api.rest.calls import JSON
 from conformance.observe.polling import poll_for
 from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.invalid_bodies import elsewhere
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.robot import LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.standstill import Standstill, read_rest, watch_rest
@@ -98,7 +99,7 @@ class _Player:
             self._send(velocity)
         put_as_xml(robot, VELOCITY, Velocity(angular_z=_BEYOND_ANY).twist)
         for path, value in ((VELOCITY, _fast(robot).twist), (LINEAR, _fast(robot).linear)):
-            for method, target in _elsewhere(robot, path):
+            for method, target in elsewhere(robot, path):
                 self._send_elsewhere(method, target, value)
         if not robot.limits_declared:
             self.trace = replace(self.trace, settled=watch_rest(Drive(robot), _AFTER, robot.limits.settle_s))
@@ -156,13 +157,6 @@ class _Player:
 
 def _fast(robot: Robot) -> Velocity:
     return robot.drivable(robot.share_of_limits(0.4, 0.4))
-
-
-def _elsewhere(robot: Robot, path: str) -> Iterator[tuple[str, str]]:
-    """Yield methods that the resource does not have, and the path without its slash (contract.md#addresses)."""
-    allowed = robot.rest.send("OPTIONS", path).response.header("Allow") or ""
-    yield from ((method, path) for method in ("POST", "PATCH") if method not in allowed)
-    yield "PUT", path.rstrip("/")
 
 
 def _only(component: int, value: float) -> Velocity:

@@ -65,4 +65,5 @@ pose_turning = _beside(
     lambda value: Place.of(pose_of(value["pose"]["pose"])),
     lambda odometry: Place.of(odometry.pose),
 )
+twist_turning = _beside("GetPose", ODOMETRY, lambda value: Velocity.of(value["twist"]["twist"]), attrgetter("velocity"))
 velocity_turning = _beside("GetVelocity", TWIST, Velocity.of, attrgetter("velocity"))

@@ -70,6 +70,21 @@ def plan_start(trace: GoalReached) -> Iterator[Outcome]:
         yield trace.start.case
 
 
+@rule("soap-subscribers/plan", on=(goal_reached,))
+def plan_start_over_soap(trace: GoalReached) -> Iterator[Outcome]:
+    """Judge the same of a plan over SOAP."""
+    if trace.start_over_soap is not None:
+        yield trace.start_over_soap.case
+
+
+@rule("equivalence/goal", on=(goal_reached,))
+def no_goal_over_soap(trace: GoalReached) -> Iterator[Outcome]:
+    """Judge that GetGoal shows no goal that has ended."""
+    if trace.over_soap is not None:
+        exchange, shown = trace.over_soap
+        yield Case(not shown, exchange, "no goal, as GET of the goal has none", "a goal that was reached", "ended")
+
+
 @rule("rest-resources/velocity-odometry", on=(goal_reached,))
 def velocity_odometry(trace: GoalReached, run: Run) -> Iterator[Outcome]:
     """Judge that velocity and odometry agree during the drive."""

@@ -28,8 +28,8 @@ def delivery_refused(trace: CountedDeliveries) -> Iterator[Outcome]:
     seen = trace.seen or ()
     for one in trace.by_method:
         accepted = one.exchange.response.ok and one.method not in SAFE_METHODS
-        expected = f"no DeliveryRequestMsg on ROS after {one.method}: only PUT starts a delivery"
-        yield Case(one.delivery not in seen or accepted, one.exchange, expected, cause=one.method)
+        expected = "no DeliveryRequestMsg on ROS: only a PUT to the path that the contract has starts a delivery"
+        yield Case(one.delivery not in seen or accepted, one.exchange, expected, "a message", one.method)
     yield from _without_effect(trace, lambda _: True)
     unknown = [one for one in seen if one not in trace.known]
     # The robot may have other clients: a single delivery that resembles none of the suite's may be theirs.
