@@ -73,7 +73,7 @@ class SoapPoseObserver(Listener):
                 back_s <= _BACK_S or self._backwards < _SEVERAL,
                 exchange,
                 "stamps that do not run backwards, as in REST's responses",
-                found=f"a stamp {back_s:.3f} s before the one in the response before; so {self._backwards} times",
+                found=f"a stamp {back_s:.3f} s earlier than in the previous response; {self._backwards} times so far",
                 cause="stamp",
             )
         self._last = stamp

@@ -72,7 +72,7 @@ def plan_start(trace: GoalReached) -> Iterator[Outcome]:
 
 @rule("soap-subscribers/plan", on=(goal_reached,))
 def plan_start_over_soap(trace: GoalReached) -> Iterator[Outcome]:
-    """Judge the same of a plan over SOAP."""
+    """Judge that a plan over SOAP begins at the robot's new position."""
     if trace.start_over_soap is not None:
         yield trace.start_over_soap.case
 
