@@ -95,7 +95,7 @@ class GoalLife:
         now_s: the stamp of the robot's odometry after that, s; None: it could not be read.
         took_s: the time from the PUT to that reading, s.
         reused: the PUT of another pose under the first goal's id, after that goal had been replaced.
-        again: the PUT of the goal that was cancelled last, under the same id.
+        again: the same PUT once more, after that goal had been cancelled.
         renamed: whether the robot accepted the second goal only with an id; None: it accepted it without one.
         cancelled: DELETEs of the active goal; empty: the goal had ended before.
         cancels: all DELETEs that were sent while a goal was active, also where the goal had ended when they arrived.

@@ -91,12 +91,12 @@ class _Player:
         second["goal"]["target_pose"]["header"]["stamp"] = {"sec": 0, "nanosec": 0}
         self._displace(second, back)
         self.life = replace(self.life, reused=put_new(robot, goal_body(back, frame, ID), back))
+        robot.delete_goal()
+        await_none(robot)
+        self.life = replace(self.life, again=put_new(robot, goal_body(back, frame, ID), back))
         await_motion(robot)
         if not self._cancel(back):
             meanwhile(robot, ID, lambda _, pose, __: self._cancel(pose))
-        self.life = replace(self.life, again=put_new(robot, goal_body(back, frame, ID), back))
-        robot.delete_goal()
-        await_none(robot)
         standstill.attempted(
             "safety/cancel-stays",
             _AFTER,
