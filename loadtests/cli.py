@@ -28,7 +28,14 @@ from loadtests.settings.cli_options import KNEE_SEARCHES, CliOptions
 from loadtests.settings.errors import SettingsError
 from loadtests.settings.option_types import COUNTS, RATES, SHARE
 from loadtests.settings.settings import STEP_S, Settings
-from loadtests.settings.settle import DEFAULT_AGAINST_S, DEFAULT_DURATION_S, DEFAULT_RATE, DEFAULT_WARMUP_S, settle
+from loadtests.settings.settle import (
+    AGAINST_LOOKS,
+    DEFAULT_AGAINST_S,
+    DEFAULT_DURATION_S,
+    DEFAULT_RATE,
+    DEFAULT_WARMUP_S,
+    settle,
+)
 
 DEFAULT_OUT = "out"  # as `roaas certify` does
 #: Threads of NumPy's linear algebra wait for one another by spinning, ten times as long on a busy machine.
@@ -117,7 +124,8 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
     "--duration",
     "duration_s",
     type=float,
-    help=f"Seconds to measure (default {DEFAULT_DURATION_S:g}; with --against {DEFAULT_AGAINST_S:g}).",
+    help=f"Seconds to measure (default {DEFAULT_DURATION_S:g}; with --against {DEFAULT_AGAINST_S:g}, up to "
+    f"{AGAINST_LOOKS[-1]} times as long while it is inconclusive).",
 )
 @click.option(
     "--warmup", "warmup_s", type=float, help=f"Seconds of load beforehand, not counted (default {DEFAULT_WARMUP_S:g})."

@@ -8,6 +8,7 @@ import traceback
 from contextlib import ExitStack
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import gevent
@@ -19,8 +20,9 @@ from conformance.packs.table1.ros_process import ProbeError
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Robot
 from loadtests.clients.wsdl import WsdlError, with_addresses
+from loadtests.engine.deciding import until_decided
 from loadtests.engine.planning import duel_plan
-from loadtests.engine.watching import Watch, tell, tell_plan
+from loadtests.engine.watching import Watch, show_web_ui, tell, tell_plan
 from loadtests.measuring.distributed_executor import DistributedExecutor, Executor
 from loadtests.measuring.end_to_end import end_to_end
 from loadtests.measuring.errors import GeneratorError
@@ -154,7 +156,7 @@ class Run:
                     self.collector = Collector(lambda: executor.recorder, plan.operations)
                     stack.callback(serve(self.collector, generator.web_host, generator.metrics_port).stop)
                 if generator.web_port is not None:
-                    self._web(executor, generator.web_host, generator.web_port)
+                    show_web_ui(executor, generator.web_host, generator.web_port)
                 executor.prepare(self.robots, plan, settings.scenario)
             except GeneratorError as error:
                 raise RunAborted(
@@ -211,8 +213,11 @@ class Run:
             if self._over:
                 break
             self._carry_out(plan, executor)
-            self.outcome.cpu_share = max(busiest(executor.members) or 0.0, self.outcome.cpu_share or 0.0)
-        return plan
+        other = self.settings.against
+        if other is None:
+            return plan
+        part = partial(self._carry_out, executor=executor)
+        return until_decided(plan, other, executor.recorder, part, lambda: self._over, tell)
 
     def _start_anew(self, command: str | None, plan: Plan) -> None:
         """Restart the robot with a command, if there is one, and wait until the robot responds."""
@@ -246,15 +251,6 @@ class Run:
             return DistributedExecutor(generator, folder, tell, lambda: self.outcome.interrupted)
         return LocalExecutor()
 
-    @staticmethod
-    def _web(executor: Executor, host: str, port: int) -> None:
-        """Show Locust's web UI, which only watches the run."""
-        web = executor.environment.create_web_ui(host, port)
-        gevent.sleep(0.2)
-        if web.greenlet.ready():
-            raise GeneratorError(f"the web UI's port {port} is in use: choose another with --web-port")
-        tell(f"Locust's web UI: http://{host}:{port}")
-
     def _carry_out(self, plan: Plan, executor: Executor) -> None:
         """Carry out a plan until its end, Ctrl-C or the robot's death."""
         self._number(plan)
@@ -262,6 +258,7 @@ class Run:
         self.outcome.carried.append(carried)
         ceiling = self.settings.limits.max_rate if not plan.open_model else None
         executor.run(plan, ceiling, lambda elapsed: self._watch.look(carried, executor.recorder, elapsed))
+        self.outcome.cpu_share = max(busiest(executor.members) or 0.0, self.outcome.cpu_share or 0.0)
 
     def _number(self, plan: Plan) -> None:
         """Register the series of a plan's segments in the metrics."""

@@ -3,7 +3,11 @@
 import os
 import sys
 
+import gevent
+
 from loadtests.engine.liveness import Liveness
+from loadtests.measuring.distributed_executor import Executor
+from loadtests.measuring.errors import GeneratorError
 from loadtests.result.outcome import Carried, Outcome
 from loadtests.schedule.plan import Plan
 from loadtests.statistics.recorder import Recorder
@@ -23,6 +27,19 @@ def tell_plan(plan: Plan, pacing: str) -> None:
         f"{' and '.join(plan.interfaces)} at {load} for {plan.load.duration_s:g} s after {plan.load.warmup_s:g} s of "
         f"warm-up, {plan.blocks} blocks, paced by {pacing}"
     )
+
+
+def show_web_ui(executor: Executor, host: str, port: int) -> None:
+    """Show Locust's web UI, which only watches the run.
+
+    Raises:
+        GeneratorError: the port is in use.
+    """
+    web = executor.environment.create_web_ui(host, port)
+    gevent.sleep(0.2)
+    if web.greenlet.ready():
+        raise GeneratorError(f"the web UI's port {port} is in use: choose another with --web-port")
+    tell(f"Locust's web UI: http://{host}:{port}")
 
 
 class Watch:

@@ -55,7 +55,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     generator = _generator(outcome, measured)
     pacing = executor.pacing if executor else ""
     machine, spoilt = conditions(outcome.before, Moment.now())
-    deviation = between_runs(machine, os.cpu_count() or 1, len(measured.plans))
+    deviation = between_runs(machine, os.cpu_count() or 1, len(measured.repeats))
     comparisons = soap_over_rest(measured, deviation)
     reasons, notes = ([str(aborted)], []) if aborted else verdict.invalid_because(generator, plan, pacing, spoilt)
     reasons = _endings(outcome, plan) + reasons + outcome.invalid
@@ -101,7 +101,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "finished": _stamp(datetime.now(UTC)),
         "environment": describe(outcome.robots[0], settings.output, outcome.findings.servers, outcome.robot_process)
         | {"machine": machine},
-        "plan": plan_words(settings, plan, pacing),
+        "plan": plan_words(settings, plan, pacing, 1 + max(one.part for one in measured.plans)),
         "generator": generator,
         "workers": workers,
         "series": series,
@@ -165,7 +165,8 @@ def _endings(outcome: Outcome, plan: Plan) -> list[str]:
         found.append(f"no request succeeded from {outcome.dead_at:.1f} s on")
     if outcome.interrupted:
         done = sum(carried.elapsed_s for carried in outcome.carried)
-        whole = outcome.settings.repeats.number * plan.length_s
+        begun_s = sum(carried.plan.length_s for carried in outcome.carried)
+        whole = max(begun_s, outcome.settings.repeats.number * plan.length_s)
         found.append(f"interrupted after {done:.1f} of {whole:.1f} s")
     return found
 
@@ -175,7 +176,7 @@ def _against(outcome: Outcome, measured: Measured, controls: list[AaControl]) ->
     settings = outcome.settings.against
     if settings is None:
         return None
-    return against(measured, controls, settings.tolerance, outcome.robots[1].shown)
+    return against(measured, controls, settings.tolerance, len(settings.looks), outcome.robots[1].shown)
 
 
 def _end_to_end(outcome: Outcome) -> dict[str, Any]:

@@ -19,19 +19,19 @@ _SCENARIO = (
 )
 
 
-def plan_words(settings: Settings, plan: Plan, pacing: str) -> dict[str, Any]:
-    """Return the `plan` of latency.json."""
+def plan_words(settings: Settings, plan: Plan, pacing: str, parts: int) -> dict[str, Any]:
+    """Return the `plan` of latency.json; an undecided comparison had several parts of the plan's length."""
     load, after, called = plan.load, settings.steps, plan.offered("rest", "wire")
     return {
         "model": "open" if plan.open_model else "closed",
         "arrivals": load.arrivals if plan.open_model else None,
         "rate": load.rate,
         "users": load.users,
-        "duration_s": load.duration_s,
+        "duration_s": load.duration_s * parts,
         "warmup_s": load.warmup_s,
         "block_s": round(plan.block_s, 6),
         "gap_s": 0.0 if plan.scenario else GAP_S,
-        "blocks": plan.blocks,
+        "blocks": plan.blocks * parts,
         "seed": load.seed,
         "timeout_s": plan.timeout_s,
         "operations": [plan.operations[number] for number in called] if plan.scenario else list(plan.operations),

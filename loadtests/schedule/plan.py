@@ -111,6 +111,7 @@ class Plan:
         step_rate: a step of the stepped load instead of a comparison: arrivals per second; 0 in the closed model.
         connections: users started in total; in the closed model as many take part as the load says.
         repeat: which repeat of the comparison this is; repeats after the first begin with new connections.
+        part: which part of the repeat this is: a comparison that is not decided goes on over the same connections.
         offset_s: when it starts, in seconds of load since the first one's start.
         least_block_s: BLOCK_S, or SHORT_BLOCK_S where the robot is known to be quick.
         weights: how often each operation is called; empty: all equally often.
@@ -130,6 +131,7 @@ class Plan:
     settle_s: float = field(default=0.5)
     robots: int = 1
     repeat: int = 0
+    part: int = 0
     offset_s: float = 0.0
     least_block_s: float = BLOCK_S
     weights: tuple[int, ...] = ()
@@ -175,7 +177,7 @@ class Plan:
         arrivals = _ARRIVALS_PER_BLOCK * turns_of_all(self.weights, len(self.operations))
         least = max(self.least_block_s, self.load.duration_s / _MAX_BLOCKS, arrivals / (self.load.rate or math.inf))
         most = int(self.load.duration_s / least + 1e-9)
-        rng = np.random.default_rng([self.load.seed, 1, self.repeat])
+        rng = np.random.default_rng([self.load.seed, 1, self.repeat, self.part])
         made: list[Segment] = []
         for number in count():
             turn = self._round(number, swapped=bool(rng.integers(2)))
@@ -205,11 +207,16 @@ class Plan:
 
     def again(self) -> Self:
         """Return the next repeat, after this one, with its random order drawn anew."""
+        return replace(self._after(), repeat=self.repeat + 1)
+
+    def more(self) -> Self:
+        """Return the next part of the same repeat, without a warm-up, with its random order drawn anew."""
+        return replace(self._after(), part=self.part + 1, load=replace(self.load, warmup_s=0.0))
+
+    def _after(self) -> Self:
+        """Return this plan again, after itself."""
         return replace(
-            self,
-            repeat=self.repeat + 1,
-            first_segment=self.first_segment + len(self.segments),
-            offset_s=self.offset_s + self.length_s,
+            self, first_segment=self.first_segment + len(self.segments), offset_s=self.offset_s + self.length_s
         )
 
     @cached_property

@@ -137,10 +137,17 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Against:
-    """The robot to compare with, and the share by which the robot under load may be slower."""
+    """The comparison with another robot.
+
+    Attributes:
+        robot: the other one.
+        tolerance: the share by which the robot under load may be slower.
+        looks: after how many durations the comparison is judged: it goes on from one to the next while it is undecided.
+    """
 
     robot: Robot
     tolerance: float
+    looks: tuple[int, ...] = (1,)
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Settings from options and statement: options win over the statement, which wins over the defaults."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -14,8 +15,9 @@ from loadtests.settings.target import Target
 
 DEFAULT_RATE = 200.0
 DEFAULT_DURATION_S = 20.0
-# Two robots share the time. In 20 s, one comparison in seven of a robot with itself was unclear.
+# Two robots share the time. It goes on, up to four times as long, while the comparison is undecided.
 DEFAULT_AGAINST_S = 40.0
+AGAINST_LOOKS = (1, 2, 4)
 DEFAULT_WARMUP_S = 2.0
 DEFAULT_STEP_RATES = (100.0, 200.0, 400.0, 800.0, 1600.0, 3200.0, 6400.0, 12800.0)
 #: Limits on operations that move the robot, unless its statement's [load] says otherwise.
@@ -75,7 +77,7 @@ def settle(options: CliOptions, statement: Statement, target: Target | None = No
         streams=target.streams,
         scenario=target.scenario,
     )
-    return settings if options.against is None else _compared(settings, options.against, target, options.tolerance)
+    return settings if options.against is None else _compared(settings, options, options.against, target)
 
 
 @dataclass(frozen=True)
@@ -126,8 +128,9 @@ def _end_to_end(
     return EndToEnd(domain_id, most_rate, duration_s)
 
 
-def _compared(settings: Settings, other: Statement, target: Target, tolerance: float) -> Settings:
+def _compared(settings: Settings, options: CliOptions, other: Statement, target: Target) -> Settings:
     """Return the settings of a run against another robot, whose own limits apply as well."""
+    tolerance = options.tolerance
     if settings.steps.asked:
         raise SettingsError(
             "--against compares two robots; --steps, --knee and --connections load one: run them one after the other"
@@ -141,8 +144,16 @@ def _compared(settings: Settings, other: Statement, target: Target, tolerance: f
     return replace(
         settings,
         limits=replace(settings.limits, max_rate=min(ceilings, default=None)),
-        against=Against(target.other or target.robot, tolerance),
+        against=Against(target.other or target.robot, tolerance, _looks(options, load, settings, allowed)),
     )
+
+
+def _looks(options: CliOptions, load: Load, settings: Settings, other: _Allowed) -> tuple[int, ...]:
+    """Return after how many durations a comparison is judged: once, where somebody has said how long it shall take."""
+    if options.duration_s is not None or options.repeats.number > 1:
+        return (1,)
+    longest_s = min(settings.limits.max_duration_s or math.inf, other.duration_s or math.inf)
+    return tuple(look for look in AGAINST_LOOKS if look * load.duration_s <= longest_s) or (1,)
 
 
 def _steps(options: CliOptions, statement: Statement, *, moves: bool) -> Steps:

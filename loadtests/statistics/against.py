@@ -5,7 +5,8 @@ the whole interval of a ratio lies beyond the tolerance, and as not slower where
 between the run is unclear. One ratio of several suffices to call a robot slower, which makes a false positive likelier
 with each: the lower bounds are widened until all of them hold together (Bonferroni, on the logarithmic scale). To clear
 a robot every median has to lie within the tolerance, which needs no such correction (an intersection-union test:
-Berger, Technometrics 24, 1982).
+Berger, Technometrics 24, 1982). A run that goes on while it is unclear is judged several times, and each time could go
+wrong: both bounds are widened by the number of times (Armitage, McPherson and Rowe 1969; Bonferroni).
 """
 
 import math
@@ -45,11 +46,13 @@ class Against(msgspec.Struct, kw_only=True):
 
     Attributes:
         robot: the other robot's addresses.
+        looks: how often at most the run was judged, by which the verdicts' intervals are widened.
         series: the other robot's figures.
     """
 
     robot: dict[str, str | None]
     tolerance: float
+    looks: int = 1
     verdict: str
     changes: list[Change]
     series: list[dict[str, Any]]
@@ -62,10 +65,12 @@ class Judge:
     Attributes:
         tolerance: by which share this robot may be slower, 0.05 for 5 %.
         together: how many ratios are judged in the run.
+        looks: how often at most the run is judged.
     """
 
     tolerance: float
     together: int
+    looks: int = 1
 
     def verdict(self, ratio: float | None, interval: list[float] | None, control: list[float] | None) -> str:
         """Judge a ratio by its interval; `control` is the interval of the A/A control, where there is one."""
@@ -74,18 +79,20 @@ class Judge:
         beyond = 1 + self.tolerance
         if control is not None and (control[0] > beyond or control[1] < 1 / beyond):
             return UNCLEAR  # this robot differs from itself by more than the tolerance
-        if self._lowest(ratio, interval[0]) > beyond:
+        low, high = interval
+        if _widened(ratio, low, self.together * self.looks) > beyond:
             return SLOWER
-        return NOT_SLOWER if interval[1] <= beyond else UNCLEAR
+        return NOT_SLOWER if _widened(ratio, high, self.looks) <= beyond else UNCLEAR
 
-    def _lowest(self, ratio: float, low: float) -> float:
-        """Return the lower bound at the confidence at which the bounds of all ratios hold together."""
-        alone, all_of_them = (NormalDist().inv_cdf(1 - (1 - _CONFIDENCE) / 2 / n) for n in (1, max(1, self.together)))
-        return ratio * math.exp(math.log(max(low, 1e-9) / ratio) * all_of_them / alone)
+
+def _widened(ratio: float, bound: float, together: int) -> float:
+    """Return a bound of a ratio's interval at the confidence at which so many such bounds hold together."""
+    alone, all_of_them = (NormalDist().inv_cdf(1 - (1 - _CONFIDENCE) / 2 / n) for n in (1, max(1, together)))
+    return ratio * math.exp(math.log(max(bound, 1e-9) / ratio) * all_of_them / alone)
 
 
 def against(
-    measured: Measured, controls: Sequence[AaControl], tolerance: float, robot: dict[str, str | None]
+    measured: Measured, controls: Sequence[AaControl], tolerance: float, looks: int, robot: dict[str, str | None]
 ) -> Against:
     """Compare this robot with the other one.
 
@@ -93,10 +100,11 @@ def against(
         measured: the records of both.
         controls: this robot's A/A controls in the same run.
         tolerance: the share by which this robot may be slower.
+        looks: how often at most the run is judged.
         robot: the other robot's addresses.
     """
     names = measured.plan.series_names()
-    judge = Judge(tolerance, len(names) * len(JUDGED))
+    judge = Judge(tolerance, len(names) * len(JUDGED), looks)
     known = {(entry.operation, entry.interface, entry.client, entry.quantile): entry.ci95 for entry in controls}
     changes = []
     for name in names:
@@ -108,7 +116,8 @@ def against(
                 change.verdict = judge.verdict(change.ratio, change.ci95, known.get((*name, quantile)))
             changes.append(change)
     series = [_series(measured, name) for name in names]
-    return Against(robot=robot, tolerance=tolerance, verdict=_overall(changes), changes=changes, series=series)
+    overall = _overall(changes)
+    return Against(robot=robot, tolerance=tolerance, looks=looks, verdict=overall, changes=changes, series=series)
 
 
 def _overall(changes: Sequence[Change]) -> str:

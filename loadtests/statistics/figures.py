@@ -164,16 +164,16 @@ def rounds_of(replicates: Replicates | None, pair_s: float) -> dict[str, Any] | 
 
 def _repeats(measured: Measured, name: SeriesName) -> list[dict[str, Any]]:
     """Return the service time's figures of each repeat alone; empty if the run had no repeats."""
-    if len(measured.plans) == 1:
+    if len(measured.repeats) == 1:
         return []
-    found = []
-    for plan in measured.plans:
-        units = [unit for unit in measured.units(name, "service") if unit.repeat == plan.repeat]
+    found, seed = [], measured.plan.load.seed
+    for repeat in measured.repeats:
+        units = [unit for unit in measured.units(name, "service") if unit.repeat == repeat]
         whole = Histogram.sum_of(unit.sides[0] for unit in units)
         figures = plain_quantiles(whole)
-        intervals = {q: figure_interval_ms(units, q, plan.load.seed).interval for q in _WITH_INTERVAL}
+        intervals = {q: figure_interval_ms(units, q, seed).interval for q in _WITH_INTERVAL}
         found.append(
-            {"repeat": plan.repeat, "count": whole.total}
+            {"repeat": repeat, "count": whole.total}
             | {q: figures[q] for q in intervals}
             | {"ci95_ms": {q: rounded_interval(interval) for q, interval in intervals.items()}}
         )

@@ -38,7 +38,7 @@ class Block(NamedTuple):
     """The records of one operation in one segment.
 
     Attributes:
-        plan: the repeat's plan.
+        plan: of the repeat, or of this part of it.
         number: of the segment, over all plans.
         segment: when, and over which interface.
         cell: the recorded times and errors.
@@ -51,8 +51,8 @@ class Block(NamedTuple):
 
     @property
     def pair(self) -> tuple[int, int]:
-        """Return the repeat and the pair's number: blocks that are compared with one another have the same."""
-        return self.plan.repeat, self.segment.pair
+        """Return the repeat and the pair's number in the run: blocks that are compared with one another share them."""
+        return self.plan.repeat, self.plan.first_segment + self.segment.pair
 
     @property
     def start_s(self) -> float:
@@ -64,7 +64,7 @@ class Measured:
     """The cells of one run, or of several repeats of the run, by series.
 
     Args:
-        plans: the plan of each repeat, in order.
+        plans: the plan of each repeat, or of each of its parts, in order.
         recorder: the records.
     """
 
@@ -72,6 +72,11 @@ class Measured:
         self.plans = list(plans)
         self.plan = self.plans[0]
         self.recorder = recorder
+
+    @property
+    def repeats(self) -> list[int]:
+        """Return the numbers of the repeats."""
+        return list(dict.fromkeys(plan.repeat for plan in self.plans))
 
     def blocks(self, name: SeriesName, *phases: str, label: str | None = None) -> Iterator[Block]:
         """Yield the blocks of a series in some phases, in order of time; those in which nothing happened are left out.

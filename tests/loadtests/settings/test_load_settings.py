@@ -56,6 +56,22 @@ def test_runs_that_must_not_be(options, message):
         settle(options, Statement())
 
 
+@pytest.mark.parametrize(
+    ("options", "allowed_s", "looks"),
+    [
+        ({}, None, (1, 2, 4)),
+        ({}, 100.0, (1, 2)),
+        ({}, 20.0, (1,)),
+        ({"duration_s": 40.0}, None, (1,)),
+        ({"repeat": 2}, None, (1,)),
+    ],
+)
+def test_a_comparison_goes_on_unless_its_length_was_said(options, allowed_s, looks):
+    other = Statement(endpoints=Endpoints(rest="http://other:1"), load=Load(max_duration_s=allowed_s))
+    mine = Statement(load=Load(max_duration_s=20.0 if allowed_s == 20.0 else None))
+    assert settle(CliOptions.of(**REST, against=other, **options), mine).against.looks == looks
+
+
 def test_the_statements_limits_hold_and_lift():
     limits = Statement(endpoints=Endpoints(request_rate=80.0), load=Load(max_duration_s=5.0))
     assert settle(CliOptions.of(**REST), limits).load.rate == 80

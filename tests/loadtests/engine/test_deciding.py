@@ -1,0 +1,89 @@
+"""A comparison of two robots goes on while it is undecided, and no longer than the settings allow."""
+
+import numpy as np
+import pytest
+
+from loadtests.engine.deciding import until_decided
+from loadtests.schedule.arrivals import Schedule
+from loadtests.schedule.plan import Load, Plan
+from loadtests.settings.settings import Against
+from loadtests.statistics.against import NOT_SLOWER, SLOWER, UNCLEAR, Judge, against
+from loadtests.statistics.comparisons import aa_controls
+from loadtests.statistics.measured import Measured
+from loadtests.statistics.recorder import Recorder
+
+LOAD = Load(rate=200.0, users=None, duration_s=10.0, warmup_s=0.5, arrivals="constant", seed=1)
+PLAN = Plan(("pose",), ("rest",), ("wire",), LOAD, timeout_s=10.0, workers=1, connections=32, robots=2)
+OTHER = Against(None, 0.05, (1, 2, 4))
+
+
+class Bench:
+    """Carries out plans by making up service times: lognormal, the median of this robot's times `slower` the other's.
+
+    Args:
+        scatter: standard deviation of the logarithm.
+        slower: by which factor this robot is slower.
+    """
+
+    def __init__(self, scatter, slower=1.0):
+        self.scatter, self.slower = scatter, slower
+        self.recorder = Recorder(PLAN.series_of())
+        self.plans = []
+        self.rng = np.random.default_rng(3)
+
+    def carry_out(self, plan):
+        schedule = Schedule(plan, 0, 1)
+        self.recorder.series_of.update(plan.series_of())
+        for index, segment in enumerate(plan.segments):
+            median_ms = 1.0 if segment.robot else self.slower
+            for due, operation, _ in schedule.arrivals(index):
+                done = due + int(1e6 * median_ms * np.exp(self.rng.normal(0, self.scatter)))
+                self.recorder.record(plan.first_segment + index, operation, due, due, due, done, done, -1)
+        self.plans.append(plan)
+
+    def decided(self, is_over=lambda: False):
+        self.carry_out(PLAN)
+        return until_decided(PLAN, OTHER, self.recorder, self.carry_out, is_over, lambda _: None)
+
+    @property
+    def verdict(self):
+        self.recorder.flush()
+        measured = Measured(self.plans, self.recorder)
+        return against(measured, aa_controls(measured), 0.05, 3, {}).verdict
+
+
+@pytest.mark.parametrize(("slower", "verdict"), [(1.0, NOT_SLOWER), (1.3, SLOWER)])
+def test_what_is_decided_takes_no_longer(slower, verdict):
+    bench = Bench(0.2, slower)
+    assert bench.decided().part == 0
+    assert bench.verdict == verdict
+
+
+def test_what_is_undecided_is_measured_on_and_all_of_it_counts():
+    bench = Bench(0.35)
+    last, plans = bench.decided(), bench.plans
+    assert [plan.part for plan in plans] == [0, 1]
+    assert (last, bench.verdict) == (plans[-1], NOT_SLOWER)
+    assert plans[1].first_segment == len(PLAN.segments)
+    assert plans[1].load.warmup_s == 0
+    measured = Measured(plans, bench.recorder)
+    assert measured.repeats == [0]
+    name = ("pose", "rest", "wire")
+    assert len(measured.pairs("duel", name)) == 2 * len(Measured(plans[:1], bench.recorder).pairs("duel", name))
+
+
+def test_what_cannot_be_decided_ends_after_four_times_the_duration():
+    bench = Bench(3.0)
+    assert (bench.decided().part, bench.verdict) == (3, UNCLEAR)
+
+
+def test_nothing_more_is_measured_once_the_run_is_over():
+    assert Bench(3.0).decided(is_over=lambda: True).part == 0
+
+
+def test_who_is_judged_several_times_has_wider_intervals():
+    interval, control = [0.97, 1.045], [0.9, 1.1]
+    assert Judge(0.05, 2).verdict(1.0, interval, control) == NOT_SLOWER
+    assert Judge(0.05, 2, looks=3).verdict(1.0, interval, control) == UNCLEAR
+    assert Judge(0.05, 2).verdict(1.2, [1.08, 1.3], control) == SLOWER
+    assert Judge(0.05, 2, looks=3).verdict(1.2, [1.08, 1.3], control) == UNCLEAR
