@@ -105,8 +105,7 @@ def alternately(calls: list[Call], rate: float, seconds: float) -> list[Load]:
     """Send each request once in turn, at a rate of so many turns per second, each after the response to the last.
 
     Short turns expose all servers to the same disturbances of the machine. The first request of a turn finds the
-    processors
-    asleep, and the second finds them awake: each turn begins with the next request.
+    processors asleep, and the second finds them awake: each turn begins with the next request.
     """
     connections = [_Connection(call.host, call.port, call.octets()) for call in calls]
     seen: list[list[tuple[float, bool]]] = [[] for _ in calls]

@@ -237,8 +237,7 @@ def growth(robot: Robot, idle_megabytes: float) -> bool:
     """Measure how much memory the robot gains by 200,000 requests, and how much by as many more, three times.
 
     The first 200,000 fill bounded buffers: DDS's histories and the reports on missions. Memory that each further
-    200,000
-    add would be a leak; memory that only some of them add is a history that had not been full.
+    200,000 add would be a leak; memory that only some of them add is a history that had not been full.
     """
     filled, *later = [after_requests(robot) for _ in range(1 + MORE_TIMES)]
     grown = [now / before - 1 for before, now in pairwise([filled, *later])]

@@ -41,8 +41,7 @@ def send_together(rounds: Sequence[Sequence[Outgoing]]) -> list[list[Attempt]]:
     """Send the requests of each round concurrently, one round after another.
 
     The nth request of every round belongs to the nth client, which keeps its connection. Listeners are called
-    afterwards,
-    in order, except for requests that met an overloaded robot.
+    afterwards, in order, except for requests that met an overloaded robot.
 
     Args:
         rounds: at most MOST_CLIENTS requests each.

@@ -41,8 +41,7 @@ def _agree(path: Path, result: Mapping[str, Any]) -> None:
     """Raise `ResultInvalidError` if a result's verdicts contradict each other.
 
     A class must not pass if one of its requirements failed, and the run must not be conformant unless all claimed
-    classes
-    passed.
+    classes passed.
     """
     passed = {name for name, verdict in result["classes"].items() if verdict == "pass"}
     claimed = {name for name, verdict in result["classes"].items() if verdict != "not-claimed"}

@@ -100,8 +100,7 @@ def histories(certificates: Iterable[Certificate], policy: Policy, known: Known,
     """Group certificates by robot (name and vendor), judge each by the policy, and return the robots sorted by name.
 
     A later certificate always supersedes an earlier one, whichever trusted key signed it and whatever its verdict: an
-    older
-    result may no longer hold.
+    older result may no longer hold.
     """
     by_robot: dict[tuple[str, str], list[Certificate]] = defaultdict(list)
     for certificate in certificates:

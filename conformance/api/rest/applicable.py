@@ -39,8 +39,7 @@ def readable(api: RestInterface, operation: Operation) -> Call:
     """Return a request for a read-only operation, with parameters that this robot accepts if possible.
 
     If the robot rejects the description's example (a place outside its map), small numbers are tried. The first call
-    for
-    an operation sends up to four requests.
+    for an operation sends up to four requests.
 
     Raises:
         HarnessError: the generated request is invalid by the contract.

@@ -77,10 +77,8 @@ class Clock:
         """Return the clock's rate within a second; None where there are too few readings.
 
         The rate is the median over pairs of near readings. Pairs with the same stamp do not count: odometry may be
-        published
-        slowly. A robot that writes milliseconds into the nanoseconds field has the right rate over many seconds and
-        almost none
-        within one.
+        published slowly. A robot that writes milliseconds into the nanoseconds field has the right rate over many
+        seconds and almost none within one.
         """
         near = [
             (later - earlier) / (there - here)

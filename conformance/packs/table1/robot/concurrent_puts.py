@@ -118,8 +118,7 @@ class ConcurrentVelocities:
         """Return the last GET that shows a wrong velocity while the robot had to drive an accepted one, or None.
 
         A mixture (one client's linear part with another's angular part) counts at once. Any other velocity counts only
-        on the
-        last try, since the robot may have been delayed.
+        on the last try, since the robot may have been delayed.
         """
         settled, ends = self.settled(limits), self.ends(limits)
         if self.reached(limits) is not None or self.is_unreadable:

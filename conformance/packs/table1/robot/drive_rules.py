@@ -137,8 +137,7 @@ def agreement(trace: Trace, limits: Limits) -> Iterator[tuple[str, Case]]:
     """Judge whether velocity and linear velocity agree with the odometry, by their medians while each was steady.
 
     Only readings without a command in between count. The window is long enough for several looks, also where responses
-    are
-    slow. A robot that moves by itself may do so between two reads: its readings are then not steady.
+    are slow. A robot that moves by itself may do so between two reads: its readings are then not steady.
     """
     odometry = trace.turns[-SEVERAL].odometry if len(trace.turns) >= SEVERAL else None
     if odometry is None:

@@ -1,7 +1,7 @@
 """Choose targets that the robot can reach, and drive it to open space."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from http import HTTPStatus
 from typing import Any, Final
 
@@ -23,6 +23,8 @@ _DISTANCES_M: Final = (0.3, 0.5, 0.8, 1.5, 2.5)
 # How far away a goal is that has to last, where there is room, m; and how often it is tried to be in time.
 _FARTHEST_M: Final = 1.5
 _ATTEMPTS: Final = 3
+# By how much the headings of goals in a series differ, rad.
+_TURN_RAD: Final = 0.37
 # A robot that makes room is waited for so long, s.
 _ARRIVES_S: Final = 10.0
 
@@ -31,8 +33,7 @@ def choose_goals(robot: Robot, distance: float, count: int) -> list[Pose]:
     """Return ``count`` different poses about ``distance`` metres from the robot (nearer where the statement says so).
 
     The robot has a plan to each, or it lies on the way of one. Where the robot has no plan to any pose nearby, the
-    check
-    ends as not possible. A robot without a plan resource gets poses straight ahead.
+    check ends as not possible. A robot without a plan resource gets poses straight ahead.
     """
     here = robot.map_pose() or Pose(0.0, 0.0, 0.0)
     reach = min(distance, robot.statement.motion.radius_m) if robot.statement.motion.arena is None else distance
@@ -56,9 +57,14 @@ def _on_the_way(robot: Robot, here: Pose, goal: Pose, share: float) -> Pose | No
     return pose if plan is not None and plan.poses[-1].distance(pose) < EXACT else None
 
 
-def _turned(goal: Pose, part: int) -> Pose:
+def _turned(goal: Pose, by_rad: float) -> Pose:
     """Return the goal's position with another heading, which is as reachable."""
-    return Pose(goal.x, goal.y, math.remainder(goal.yaw + part, math.tau))
+    return Pose(goal.x, goal.y, math.remainder(goal.yaw + by_rad, math.tau))
+
+
+def in_turn(goals: Sequence[Pose], number: int) -> Pose:
+    """Return one goal of a series that takes turns between some places, each time with another heading."""
+    return _turned(goals[number % len(goals)], number * _TURN_RAD)
 
 
 def meanwhile(robot: Robot, id_: str, act: Callable[[dict[str, Any], Pose, dict[str, Any]], bool]) -> bool:
@@ -92,8 +98,7 @@ def make_room(robot: Robot, ahead_m: float = _FAR_M) -> None:
     """Drive a robot that stands close to an obstacle to a place from which it can drive freely.
 
     A simulated robot's wheels turn on against a wall, and its pose then contradicts its velocity. Where the robot knows
-    no
-    such place or does not get there, it stays, and the checks judge what follows.
+    no such place or does not get there, it stays, and the checks judge what follows.
 
     Args:
         robot: a robot at rest.

@@ -97,8 +97,7 @@ class _Sums(NamedTuple):
         """Return the median window's miss, extrapolated to the whole course.
 
         A window is weighted with the distance between its first reading and the next one, so that many readings of a
-        resting
-        robot do not outweigh those of a moving one.
+        resting robot do not outweigh those of a moving one.
 
         Args:
             course: length or turn integrated up to each reading.

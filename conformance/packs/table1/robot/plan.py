@@ -108,8 +108,7 @@ def reachable(robot: Robot, here: Pose, distance: float, count: int = 1) -> list
     """Return poses inside the arena, about ``distance`` metres away, to which the robot has a plan without a detour.
 
     The statement's goals come first where they are about that far away. Where there is no such pose, the distance is
-    halved
-    up to twice.
+    halved up to twice.
     """
     found = [
         pose

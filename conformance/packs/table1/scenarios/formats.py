@@ -5,7 +5,6 @@ reading after each change counts, and a fault must show after each of several ch
 sample that came between two reads.
 """
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -18,7 +17,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.goal import arrived, await_goal, await_none, goal_body, put_goal
-from conformance.packs.table1.robot.goals import choose_goals, make_room
+from conformance.packs.table1.robot.goals import choose_goals, in_turn, make_room
 from conformance.packs.table1.robot.plan import reachable
 from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, PLAN, POSE, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.xml_commands import put_as_xml
@@ -30,11 +29,9 @@ from conformance.verdict.effort import Effort
 # First readings that are out after so many changes of one kind are no chance.
 _CHANGES: Final = 3
 # Ids that YAML, by any of its versions, takes for another type where they are not quoted.
-_NO_TEXTS: Final = ("123", "null", "true", "-1.5", "0x1F")
+_LIKE_OTHER_TYPES: Final = ("123", "null", "true", "-1.5", "0x1F")
 # Over a slow link, or a robot that arrives soon, a goal may be over when it is read.
 _TRIES: Final = 3
-# Each goal at one place has another heading, rad.
-_TURNED_RAD: Final = 0.37
 
 
 @dataclass(frozen=True)
@@ -113,8 +110,7 @@ def formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> tuple[
     trace: list[FormatsRead | XmlPut] = []
     suspects: Found | None = None
     for number in range(effort.cases(12)):
-        pose = poses[number % 2]
-        pose = pose._replace(yaw=math.remainder(pose.yaw + number * _TURNED_RAD, math.tau))
+        pose = in_turn(poses, number)
         body = goal_body(pose, robot.statement.motion.frame, f"formats {number}")
         accept = (JSON, XML)[number // 2 % 2]
         as_xml = put_as_xml(robot, GOAL_PATH, body, accept=accept) if number % 2 else None
@@ -146,7 +142,7 @@ def goal_as_text(api: RestInterface, robot: Robot) -> tuple[tuple[str, Exchange]
         return ()
     pose = choose_goals(robot, 1.5, 1)[0]
     read: list[tuple[str, Exchange]] = []
-    for id_ in _NO_TEXTS:
+    for id_ in _LIKE_OTHER_TYPES:
         body = goal_body(pose, robot.statement.motion.frame, id_)
         for _ in range(_TRIES):
             put_goal(robot, body)
@@ -158,7 +154,7 @@ def goal_as_text(api: RestInterface, robot: Robot) -> tuple[tuple[str, Exchange]
     robot.delete_goal()
     await_none(robot)
     if not read:
-        raise NoOccasionError(f"a goal with the id {_NO_TEXTS[0]} was never there when it was read")
+        raise NoOccasionError(f"a goal with the id {_LIKE_OTHER_TYPES[0]} was never there when it was read")
     return tuple(read)
 
 

@@ -5,7 +5,6 @@ good robot's may be out as well, by one odometry message that one interface has 
 everything is done again, and only what is out after each change is recorded.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -18,7 +17,7 @@ from conformance.observe.polling import poll
 from conformance.packs.table1.robot.agreement import Slack, disagreement
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.goal import await_goal, await_none, goal_body, put_goal
-from conformance.packs.table1.robot.goals import choose_goals, make_room
+from conformance.packs.table1.robot.goals import choose_goals, in_turn, make_room
 from conformance.packs.table1.robot.message_shapes import GOAL_AND_STATUS
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 from conformance.packs.table1.robot.soap_services import ask, returned
@@ -35,8 +34,6 @@ _TIMES: Final = 4
 _GOALS: Final = 3
 # So many goals are first read in one way: more than the first answers that are no chance.
 _IN_A_ROW: Final = 4
-# Each goal at one place has another heading, rad.
-_TURNED_RAD: Final = 0.37
 
 
 @scenario(needs={Need.REST, Need.SUBSCRIBERS, Need.MOTION})
@@ -85,8 +82,7 @@ def goals_over_soap(robot: Robot, subscribers: SoapService, effort: Effort) -> t
     # SOAP's first answers after the last goals that were out.
     late: list[StateRead] = []
     for index in range(effort.cases(20)):
-        pose = goals[index % 2]
-        pose = pose._replace(yaw=math.remainder(pose.yaw + index * _TURNED_RAD, math.tau))
+        pose = in_turn(goals, index)
         body = goal_body(pose, robot.statement.motion.frame, f"equal \u00e9 <&> {index}")
         put_goal(robot, body)
         await_goal(robot, body)

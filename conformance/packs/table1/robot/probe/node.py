@@ -48,8 +48,7 @@ class ProbeNode:
 
         Returns:
             Number of nodes and publishers in the domain; 0 means that this is not the robot's domain. Publishers count
-            too, as
-            they may be discovered before their nodes' names.
+            too, as they may be discovered before their nodes' names.
         """
         topics = (self._delivery_topic, self._cmd_vel_topic)
         until = time.monotonic() + seconds
