@@ -10,7 +10,8 @@ import gevent
 from loadtests.clients.failures import CallError
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.locust_feed import LocustFeed
-from loadtests.schedule.plan import Plan, Segment
+from loadtests.schedule.plan import Plan
+from loadtests.schedule.segment import Segment
 from loadtests.statistics.recorder import Recorder
 
 NS = 1_000_000_000

@@ -6,7 +6,8 @@ from typing import Any
 from conformance.commandline.without_folders import without_folders
 from loadtests.clients.library import LIBRARY
 from loadtests.clients.payloads import CATALOGUE
-from loadtests.schedule.plan import GAP_S, Plan
+from loadtests.schedule.plan import Plan
+from loadtests.schedule.segment import GAP_S
 from loadtests.settings.settings import Settings
 
 CLIENT_WORDS = {

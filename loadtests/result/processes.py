@@ -3,7 +3,7 @@
 from typing import Any
 
 from loadtests.measuring.executor import Member
-from loadtests.schedule.plan import GAP_S
+from loadtests.schedule.segment import GAP_S
 from loadtests.statistics import figures
 
 

@@ -21,6 +21,7 @@ import numpy as np
 
 from conformance.packs.table1.thresholds import ApiStyle, Client, Operation
 from loadtests.schedule.rotation import turns_of_all
+from loadtests.schedule.segment import Segment
 
 INTERFACES = tuple(map(str, ApiStyle))
 #: REST and SOAP at once, in steps of the load: every other request goes over the other.
@@ -32,7 +33,6 @@ MOVES = frozenset({"delivery", "coffee"})
 #: The highest rate for each worker at which the library clients take part: a call costs some 1.5 ms of the
 #: generator's time, and a generator that is busy for more than a fraction of it measures itself.
 LIBRARY_RATE = 250.0
-GAP_S = 0.010
 #: The least length of a block: of a robot that answers within QUICK_ANSWER_S to arrivals on time, and otherwise.
 SHORT_BLOCK_S, BLOCK_S = 0.02, 0.1
 QUICK_ANSWER_S = 0.01
@@ -43,42 +43,6 @@ _AA_TURNS = {1: (2, 4), 2: (4,)}  # the third and the fifth; the fifth alone whe
 _NS = 1_000_000_000
 #: Names a series of the result: (operation, interface, client).
 SeriesName = tuple[str, str, str]
-
-
-@dataclass(frozen=True, slots=True)
-class Segment:
-    """A stretch of time in which one client calls one interface.
-
-    Attributes:
-        start_ns, end_ns: offsets from the run's start.
-        phase: `warmup`, `duel`, `aa`, `against` (the comparison's blocks of the other robot) or `step`.
-        label: in phase `aa` the name that the interface goes by, `a` or `b`.
-        pair: neighbours that are compared with one another share a number.
-        rate: arrivals per second over all workers; 0 in the closed model.
-        robot: 0, or 1 for the robot that it is compared with.
-        gap: whether it begins with a gap in which no request starts.
-    """
-
-    start_ns: int
-    end_ns: int
-    phase: str
-    interface: str
-    client: str
-    label: str
-    pair: int
-    rate: float
-    robot: int = 0
-    gap: bool = True
-
-    @property
-    def opens_ns(self) -> int:
-        """Return the offset at which its requests may start: after the quiet gap, if it has one."""
-        return self.start_ns + self.gap * min(int(GAP_S * _NS), (self.end_ns - self.start_ns) // 8)
-
-    @property
-    def active_s(self) -> float:
-        """Return for how long its requests may start."""
-        return (self.end_ns - self.opens_ns) / _NS
 
 
 @dataclass(frozen=True)
