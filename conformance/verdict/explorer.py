@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import time
 import zlib
+from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings
+from hypothesis.configuration import set_hypothesis_home_dir
 from hypothesis.errors import Flaky
 from hypothesis.internal.conjecture import providers
 from hypothesis.stateful import RuleBasedStateMachine, run_state_machine_as_test
@@ -26,6 +30,11 @@ if TYPE_CHECKING:
 # Hypothesis also takes values from the source of all loaded modules that are not in site-packages. The cases would then
 # depend on how the suite is installed; and reading the source takes a quarter of a second.
 providers._get_local_constants = lambda: providers._local_constants  # noqa: SLF001 - there is no setting for it
+# The folder in which the command was started is the user's. Made once, Hypothesis' table of characters saves a third of
+# a second.
+if "HYPOTHESIS_STORAGE_DIRECTORY" not in os.environ:
+    with suppress(RuntimeError):  # a user without a home, as in some containers
+        set_hypothesis_home_dir(Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "roaas/hypothesis")
 
 
 class Explorer:
