@@ -178,7 +178,9 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
 @click.option("--against-subscribers-wsdl", metavar="URL|FILE", help="WSDL of its subscribers service.")
 @click.option("--against-publishers-endpoint", metavar="URL", help="Address of that service, when no WSDL says.")
 @click.option("--against-subscribers-endpoint", metavar="URL", help="Address of that service, when no WSDL says.")
-@click.option("--tolerance", callback=SHARE, default="5%", help="How much slower than the other it may be.")
+@click.option(
+    "--tolerance", callback=SHARE, default="5%", help="How much slower than the other, or the baseline, it may be."
+)
 @click.option("--allow-motion", is_flag=True, help="The robot may drive: measure deliveries too.")
 @click.option("--save", metavar="NAME", help="Store the result as a baseline of this name.")
 @click.option("--baseline", metavar="NAME", help="Compare with the latest result stored under this name.")

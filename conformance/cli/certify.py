@@ -74,7 +74,9 @@ _FILE = click.Path(exists=True, dir_okay=False)
 )
 @click.option("--nonce", metavar="TEXT", help="Text chosen by the relying party; the seed is derived from it.")
 @click.option("--timeout", "timeout_s", type=_POSITIVE, metavar="S", help="Deadline of one request.  [default: 10]")
-@click.option("--request-rate", type=_POSITIVE, metavar="R", help="At most R requests per second.")
+@click.option(
+    "--request-rate", type=click.FloatRange(min=1), metavar="R", help="At most R requests per second, 1 or more."
+)
 @click.option("--ca-file", type=_FILE, help="Certificate authorities (PEM) to trust for HTTPS instead of the system's.")
 @click.option(
     "--ros-domain-id",

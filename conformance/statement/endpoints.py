@@ -37,16 +37,17 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         publishers_endpoint, subscribers_endpoint: URL of the service if it differs from the WSDL's.
         ca_file: certificate authorities to trust.
         token_file: file with the bearer token.
-        basic_file, digest_file: file with ``user:password`` for HTTP's basic or digest authentication.
+        basic_file: file with ``user:password`` for HTTP's basic authentication.
+        digest_file: file with ``user:password`` for HTTP's digest authentication.
         username_token_file: file with ``user:password`` for WS-Security's UsernameToken.
         api_key: where the API key goes: ``header NAME``, ``query NAME`` or ``cookie NAME``.
         api_key_file: file with the API key.
         headers_file: file with fixed headers, ``Name: value`` in each line; their values are secrets.
         client_cert_file: client certificate for TLS (PEM).
         client_key_file: its key, if it is not in the same file.
-        request_rate: maximum requests per second; slower than one a second, no run would end.
+        request_rate: maximum requests per second, at least 1.
         timeout_s: deadline of one request, s.
-        auth: a login before the run.
+        auth: a login before the run; the same as the table ``[auth]``.
     """
 
     rest: Text | None = None

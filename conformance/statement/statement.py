@@ -34,9 +34,9 @@ class Api(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         openapi: URL or file of its OpenAPI or Swagger description.
-        wsdl: URL or file of its WSDL, in place of that. With both, `certify` uses `openapi`, and `load` compares them.
+        wsdl: URL or file of its WSDL, in place of `openapi`. With both, `certify` uses `openapi`; `load` compares them.
         overlays: files of OpenAPI Overlays to apply to it.
-        base_url: where its operations are, if the description does not say it.
+        base_url: where its operations are, in place of what the description says.
     """
 
     openapi: Text | None = None

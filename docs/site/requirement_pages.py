@@ -100,7 +100,6 @@ def _class(class_: ConformanceClass, items: list[Requirement]) -> str:
     rows = (f"| [`{item.id}`]({item.id}.md) | {item.level} | {_cell(item.text)} |" for item in items)
     return "\n".join([
         f"# Class {class_.name}", "", f"{class_.title}.", "",
-        f"Interfaces that it judges: {', '.join(class_.interfaces)}.", "",
         "| requirement | level | rule |", "|---|---|---|", *rows, "",
     ])  # fmt: skip
 
