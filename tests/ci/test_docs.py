@@ -116,7 +116,7 @@ def test_a_newcomers_way_through_the_pages(tmp_path):
 @pytest.mark.parametrize(
     "text",
     [text for page, text in fences("yaml") if page == "ci.md"],
-    ids=["a GitHub workflow", "code scanning", "a GitLab pipeline"],
+    ids=["a GitHub workflow", "code scanning", "the GitLab template", "a GitLab job"],
 )
 def test_a_file_for_a_ci_service_is_valid(text, tmp_path):
     document = yaml.safe_load(text)
