@@ -53,9 +53,9 @@ def test_a_mutant_is_killed(tmp_path):
     assert "sensors-twice" in (tmp_path / "selftest.md").read_text()
 
 
-@pytest.mark.parametrize("faults", [("--generated", "40"), ("--short", "--no-compare")])
+@pytest.mark.parametrize("faults", [("--generated", "40"), ("--no-compare",)])
 def test_an_interrupted_self_test_keeps_what_it_has(tmp_path, faults):
-    words = [*faults, "--target", "plain", "--seeds", "0", "--parallel", "1", "--out", str(tmp_path)]
+    words = ["--contract", LAMP, *faults, "--seeds", "0", "--no-variants", "--parallel", "1", "--out", str(tmp_path)]
     command = [sys.executable, "-m", "roaas", "selftest", *words]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
         first = process.stderr.readline()
@@ -79,8 +79,9 @@ def test_a_small_packs_mutants_are_made_by_rule_and_judged(tmp_path):
     assert "--target lamp --contract lamp" in (tmp_path / "selftest.md").read_text()
 
 
-def test_a_small_packs_controls_run_without_mutants_by_hand(tmp_path):
-    done = run(selftest, "--contract", LAMP, "--seeds", "1", "--no-variants", "--out", str(tmp_path))
+def test_a_small_packs_controls_run_without_mutants(tmp_path):
+    words = ["--contract", LAMP, "--controls-only", "--seeds", "1", "--no-variants", "--out", str(tmp_path)]
+    done = run(selftest, *words)
     assert done.exit_code == 0, done.output
     assert "1 of 1 A/A controls (good devices) found conformant" in done.output
 
