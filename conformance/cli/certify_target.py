@@ -146,7 +146,9 @@ def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> 
         if url is not None and not url.startswith(("http://", "https://")):
             raise StatementError(f"{key.replace('_', '-')} {url!r} is no URL: it has to start with http:// or https://")
     if not where.interfaces:
-        raise StatementError("no robot is named: give a STATEMENT, --rest, --publishers-wsdl or --subscribers-wsdl")
+        raise StatementError(
+            "no robot is named: give --rest, --publishers-wsdl or --subscribers-wsdl, or a STATEMENT with [endpoints]"
+        )
     _check_soap(where.interfaces)
     claims = declared.claims
     if options["profile"] or options["classes"]:
