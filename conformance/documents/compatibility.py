@@ -8,7 +8,8 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from conformance.documents.json_schema import Schema
-from conformance.documents.openapi import Operation, Parameter, read_operations
+from conformance.documents.openapi import Operation, read_operations
+from conformance.documents.parameters import Parameter
 from conformance.documents.resources import PARAMETER
 from conformance.documents.schema_compatibility import schema_changes
 

@@ -14,7 +14,7 @@ from urllib.parse import urljoin, urlsplit
 import yaml
 
 from conformance.documents.description_faults import unresolved
-from conformance.documents.json_schema import Schema, UnresolvedError
+from conformance.documents.json_schema import Schema, UnresolvedError, pointed
 from conformance.documents.overlay import OverlayError, overlaid
 from conformance.documents.swagger import as_openapi_3
 
@@ -22,6 +22,8 @@ from conformance.documents.swagger import as_openapi_3
 FILES: Final = "x-roaas-files"
 _LOADER: Final[Any] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _MOST_FILES: Final = 200
+# Other keywords of OpenAPI 3 describe these, so header parameters of these names are ignored (OpenAPI 3.1, 4.8.12.2).
+_IGNORED: Final = frozenset({"accept", "content-type", "authorization"})
 _VARIABLE: Final = re.compile(r"\{([^{}]+)\}")
 # Returns the content of a URL or file.
 Load = Callable[[str], bytes]
@@ -83,6 +85,7 @@ def read_description(source: str, load: Load, overlays: Iterable[str] = ()) -> D
         raise DescriptionError(f"{source} describes no operation: it has no 'paths'")
     broken = unresolved(document)
     document = _without(document, frozenset(broken)) if broken else document
+    document = document if version.startswith("2.") else _without_ignored(document, document)
     base_url, remarks = _base_url(source, document)
     return Description(source, document, original, base_url, (*bundle.unresolved, *broken), remarks)
 
@@ -96,8 +99,30 @@ def _without(value: Any, broken: frozenset[str]) -> Any:
     return {key: {} if _refers(item, broken) else _without(item, broken) for key, item in value.items()}
 
 
+def _without_ignored(value: Any, document: Schema) -> Any:
+    """Return a part of an OpenAPI 3 document without the header parameters that the specification ignores."""
+    if isinstance(value, list):
+        return [_without_ignored(item, document) for item in value]
+    if not isinstance(value, dict):
+        return value
+    found = {key: _without_ignored(item, document) for key, item in value.items()}
+    if isinstance(value.get("parameters"), list):
+        found["parameters"] = [one for one in found["parameters"] if not _is_ignored(one, document)]
+    return found
+
+
+def _is_ignored(given: Any, document: Schema) -> bool:
+    parameter = pointed(document, given["$ref"]) if _is_reference(given) else given
+    is_header = isinstance(parameter, dict) and parameter.get("in") == "header"
+    return is_header and str(parameter.get("name")).lower() in _IGNORED
+
+
+def _is_reference(value: Any) -> bool:
+    return isinstance(value, dict) and isinstance(value.get("$ref"), str)
+
+
 def _refers(value: Any, broken: frozenset[str]) -> bool:
-    return isinstance(value, dict) and isinstance(value.get("$ref"), str) and value["$ref"] in broken
+    return _is_reference(value) and value["$ref"] in broken
 
 
 def is_url(source: str) -> bool:

@@ -7,34 +7,17 @@ from typing import Any
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, opened, resolved
+from conformance.documents.parameters import (
+    Encoding,
+    Parameter,
+    by_media_type,
+    examples_of,
+    read_encoding,
+    read_parameter,
+)
 
 METHODS = ("get", "put", "post", "delete", "patch", "head", "options", "trace")
 SAFE = frozenset({"GET", "HEAD", "OPTIONS", "TRACE"})
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One parameter of an operation.
-
-    Attributes:
-        name: as in requests.
-        where: path, query, header or cookie.
-        required: whether requests must have it.
-        schema: of its value.
-        examples: example values in the description; may be empty.
-        also: other names of it, for instance in ROS (x-roaas-also).
-        style: how arrays and objects are written.
-        explode: whether their items are written apart.
-    """
-
-    name: str
-    where: str
-    required: bool
-    schema: Schema
-    examples: tuple[Any, ...] = ()
-    also: tuple[str, ...] = ()
-    style: str = "simple"
-    explode: bool = False
 
 
 @dataclass(frozen=True)
@@ -45,13 +28,13 @@ class Body:
         media_type: without parameters.
         schema: of the value.
         examples: example values (text for XML) in the description; may be empty.
-        encoding: style and explode of the members of a form, where the description says them.
+        encoding: how the fields of a form are written, where the description says it.
     """
 
     media_type: str
     schema: Schema
     examples: tuple[Any, ...] = ()
-    encoding: dict[str, tuple[str, bool]] = field(default_factory=dict)
+    encoding: dict[str, Encoding] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,18 +173,21 @@ def _operation(
         id=given.get("operationId", f"{method} {path}"),
         method=method,
         template=path,
-        parameters=tuple(_parameter(item) for item in parameters),
+        parameters=tuple(read_parameter(item) for item in parameters),
         bodies={
             name: Body(
-                name, _without(modern(content.get("schema", {})), "readOnly"), _examples(content), _encoding(content)
+                name,
+                _without(modern(content.get("schema", {})), "readOnly"),
+                examples_of(content),
+                read_encoding(content),
             )
-            for name, content in _by_media_type(body).items()
+            for name, content in by_media_type(body).items()
         },
         body_required=bool(body.get("required", False)),
         responses={
             str(status): {
                 name: _answer(content.get("schema", {}), closed=closed)
-                for name, content in _by_media_type(response).items()
+                for name, content in by_media_type(response).items()
             }
             for status, response in given.get("responses", {}).items()
         },
@@ -244,14 +230,6 @@ def _marked(properties: dict[str, Any], mark: str) -> set[str]:
     return {name for name, part in properties.items() if isinstance(part, dict) and part.get(mark) is True}
 
 
-def _encoding(content: dict[str, Any]) -> dict[str, tuple[str, bool]]:
-    """Return style and explode of the members of a form (OpenAPI 3.1, 4.8.15.1)."""
-    return {
-        name: (style := given.get("style", "form"), bool(given.get("explode", style == "form")))
-        for name, given in content.get("encoding", {}).items()
-    }
-
-
 def _headers(response: dict[str, Any]) -> dict[str, tuple[bool, Schema]]:
     return {
         name.lower(): (bool(header.get("required", False)), modern(header.get("schema", {})))
@@ -259,32 +237,3 @@ def _headers(response: dict[str, Any]) -> dict[str, tuple[bool, Schema]]:
         # OpenAPI 3.1, 4.8.17.1: a Content-Type header in this place is ignored.
         if name.lower() != "content-type"
     }
-
-
-def _by_media_type(given: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    return {name.split(";", 1)[0].strip().lower(): content for name, content in given.get("content", {}).items()}
-
-
-def _parameter(given: dict[str, Any]) -> Parameter:
-    content: dict[str, Any] = next(iter(given.get("content", {}).values()), {})
-    return Parameter(
-        given["name"],
-        given["in"],
-        bool(given.get("required", given["in"] == "path")),
-        modern(given.get("schema", content.get("schema", {}))),
-        _examples(given),
-        tuple(given.get("x-roaas-also", ())),
-        style := given.get("style", "form" if given["in"] in {"query", "cookie"} else "simple"),
-        bool(given.get("explode", style == "form")),
-    )
-
-
-def _examples(given: dict[str, Any]) -> tuple[Any, ...]:
-    """Return the examples of a parameter or media type, or those of its schema."""
-    if "example" in given:
-        return (given["example"],)
-    named = tuple(item["value"] for item in given.get("examples", {}).values() if "value" in item)
-    schema = given.get("schema", {})
-    if named:
-        return named
-    return (schema["example"],) if "example" in schema else tuple(schema.get("examples", ()))

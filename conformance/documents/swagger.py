@@ -26,7 +26,7 @@ _MOVED = {
 _COLLECTIONS = {
     "csv": ("form", False),
     "ssv": ("spaceDelimited", False),
-    "tsv": ("form", False),
+    "tsv": ("tabDelimited", False),
     "pipes": ("pipeDelimited", False),
     "multi": ("form", True),
 }
@@ -123,10 +123,15 @@ def _parameter(given: Schema) -> Schema:
     found["schema"] = _schema_of(given)
     if given.get("type") == "array":
         written = _collection(given)
-        found |= {"explode": written["explode"]} if given["in"] in {"path", "header"} else written
+        # In a path or header, commas are the style simple, and the other separators have no name in OpenAPI 3.
+        found |= {**written, "style": "simple"} if given["in"] in {"path", "header"} and _is_csv(given) else written
     if "x-example" in given:
         found["example"] = given["x-example"]
     return found
+
+
+def _is_csv(given: Schema) -> bool:
+    return given.get("collectionFormat", "csv") in {"csv", "multi"}
 
 
 def _collection(given: Schema) -> Schema:

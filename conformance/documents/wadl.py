@@ -5,7 +5,8 @@ from urllib.parse import urlsplit
 
 from lxml import etree
 
-from conformance.documents.openapi import Operation, Parameter
+from conformance.documents.openapi import Operation
+from conformance.documents.parameters import Parameter
 from conformance.documents.representation import UnreadableError, local_name, parse_xml
 from conformance.documents.xml import elements
 

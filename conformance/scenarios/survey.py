@@ -14,15 +14,15 @@ from typing import Any, Final
 from hypothesis.errors import Unsatisfiable
 
 from conformance.api.rest.applicable import allowed
-from conformance.api.rest.calls import Call
+from conformance.api.rest.calls import Call, value_text
 from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.invalid_variations import invalid_variations
+from conformance.api.rest.validity import UNCLEAR, Validity, validity
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation, odd_variations, unknown_variations, valid_variations
 from conformance.documents.openapi import Operation, operations_of
-from conformance.documents.writing import text_of
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
@@ -66,7 +66,8 @@ class Probe:
         place: the parameter or member that is special.
         exchange: the request with its response; None without a response.
         unanswered: the request without a response; None with one.
-        opinions: code and text of what Schemathesis finds wrong.
+        validity: valid, invalid or unclear: the request by the description, read back as it was written.
+        why: what is invalid in it.
     """
 
     operation: str
@@ -75,7 +76,8 @@ class Probe:
     place: str = ""
     exchange: Exchange | None = None
     unanswered: Unanswered | None = None
-    opinions: tuple[tuple[str, str], ...] = ()
+    validity: str = UNCLEAR
+    why: str = ""
 
     @property
     def attempt(self) -> Attempt:
@@ -142,21 +144,20 @@ class Surveyor:
             PartialTraceError: the device does not respond any more.
         """
         request = request or written(operation, variation.inputs)
-        exchange, unanswered = None, None
+        probe = self._described(operation, variation, request)
         try:
             # A device may treat the first request on a connection in another way than those after it.
             fresh = variation.kind is Kind.USUAL or len(self.probes) % _FRESH == 0
             exchange = self._recorded(request, fresh=fresh)
         except NoAnswerError as none:
-            unanswered = none.unanswered
             if none.kind in {NoAnswer.TIMEOUT, NoAnswer.CIRCUIT_OPEN}:
                 self.given_up.add(operation.label)
                 self.api.streams.add(operation.label)
-            self.record(Probe(operation.label, variation.kind, variation.says, variation.place, None, unanswered))
+            self.record(replace(probe, unanswered=none.unanswered))
             if not self.api.alive():
                 raise PartialTraceError(Survey(tuple(self.probes))) from none
             return self.probes[-1]
-        self.record(Probe(operation.label, variation.kind, variation.says, variation.place, exchange))
+        self.record(replace(probe, exchange=exchange))
         if exchange.response.cut:
             # An endless response says nothing new the second time, and costs its time each time.
             self.given_up.add(operation.label)
@@ -164,6 +165,16 @@ class Surveyor:
         if exchange.response.ok:
             self.values.learn(operation, exchange)
         return self.probes[-1]
+
+    def _described(self, operation: Operation, variation: Variation, request: GeneratedRequest) -> Probe:
+        """Return a probe of a request that is not sent yet."""
+        said = validity(
+            self.api.run.contract, request.method, request.target, request.content_type, request.body, request.headers
+        )
+        own = said if said.operation == operation else Validity(UNCLEAR)
+        return Probe(
+            operation.label, variation.kind, variation.says, variation.place, validity=own.verdict, why=own.why
+        )
 
     def _recorded(self, request: GeneratedRequest, *, fresh: bool) -> Exchange:
         """Send a request whose exchange becomes a probe, so that no observer judges it as well.
@@ -201,10 +212,12 @@ class Surveyor:
         told[what] = told.get(what, 0) + 1
 
     def _note_working(self, operation: Operation, inputs: Inputs, exchange: Exchange) -> None:
-        """Keep a request that was answered 2xx for other checks, if its values are plain texts and numbers."""
-        values = {**inputs.path, **inputs.query}
-        if all(isinstance(value, str | int | float) for value in values.values()) and not inputs.headers:
-            texts = {name: text_of(value) for name, value in values.items()}
+        """Keep a request that was answered 2xx for other checks, if it needs no header or cookie of its own."""
+        if not inputs.headers and not inputs.cookies:
+            values = {**inputs.path, **inputs.query}
+            texts = {
+                item.name: value_text(item, values[item.name]) for item in operation.parameters if item.name in values
+            }
             self.api.working[operation.label] = Call(operation, texts)
             self.api.first.setdefault(operation.label, exchange)
 
@@ -313,7 +326,7 @@ def _repeated(surveyor: Surveyor, operations: list[Operation]) -> Survey:
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.DESCRIBE)
 def generated_requests(api: RestInterface, values: Values, explore: Explorer) -> Survey:
-    """Send requests that Schemathesis generates for each operation, and note what its own checks say of each."""
+    """Send requests that Schemathesis generates for each operation."""
     # Imported late: that takes half a second.
     from conformance.api.rest.generated import targets  # noqa: PLC0415
 
@@ -346,9 +359,8 @@ def generated_requests(api: RestInterface, values: Values, explore: Explorer) ->
 
 
 def _send_case(surveyor: Surveyor, operation: Operation, case: Any) -> None:
-    """Send a case of Schemathesis, and record it with what Schemathesis's checks say of the response."""
+    """Send a case of Schemathesis, and record it."""
     from conformance.api.rest.generated import as_request, own_headers  # noqa: PLC0415 - see generated_requests()
-    from conformance.api.rest.opinions import opinions  # noqa: PLC0415 - as above
 
     request, headers = as_request(case), own_headers(case)
     if request is None or headers is None or operation.label in surveyor.given_up:
@@ -357,7 +369,4 @@ def _send_case(surveyor: Surveyor, operation: Operation, case: Any) -> None:
     if request.method not in {operation.method, "OPTIONS"}:
         return
     whole = replace(request, headers=headers)
-    probe = surveyor.send(operation, Variation(Kind.GENERATED, "", "", Inputs()), whole)
-    if probe.exchange is not None and request.method == operation.method:
-        found = tuple((one.code, one.text) for one in opinions(case, probe.exchange))
-        surveyor.probes[-1] = replace(probe, opinions=found)
+    surveyor.send(operation, Variation(Kind.GENERATED, "", "", Inputs()), whole)

@@ -12,8 +12,10 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.api.rest.values import sample
 from conformance.documents.json_schema import Schema, kind_of
-from conformance.documents.openapi import SAFE, Operation
+from conformance.documents.openapi import SAFE, Operation, is_json
+from conformance.documents.parameters import Parameter
 from conformance.documents.representation import flat
+from conformance.documents.serialization import path_text, query_pairs, query_text
 from conformance.documents.writing import json_text, text_of, xml_bytes
 from conformance.transport.exchange import Exchange
 
@@ -30,14 +32,14 @@ class Call:
 
     Attributes:
         operation: the operation.
-        values: texts of path and query parameters by name, not percent-encoded.
+        values: of path and query parameters by name, not percent-encoded: texts, lists and objects.
         media_type: of the body; empty without one.
         body: bytes.
         value: the value in the body, or None.
     """
 
     operation: Operation
-    values: dict[str, str]
+    values: dict[str, Any]
     media_type: str = ""
     body: bytes = b""
     value: Any = None
@@ -47,9 +49,10 @@ class Call:
         """The request target below the base URL, with its query."""
         path = self.operation.template
         for item in self.operation.parameter("path"):
-            path = path.replace(f"{{{item.name}}}", quote(self.values.get(item.name, ""), safe=""))
+            text = path_text(self.values.get(item.name, ""), item.style, item.name, explode=item.explode)
+            path = path.replace(f"{{{item.name}}}", text)
         query = "&".join(
-            f"{quote(item.name, safe='')}={quote(self.values[item.name], safe='')}"
+            _query_of(item, self.values[item.name])
             for item in self.operation.parameter("query")
             if item.name in self.values
         )
@@ -96,6 +99,20 @@ class Call:
         return api.client.send(asked, self.path, headers=sent, body=self.body, fresh=fresh)
 
 
+def _query_of(item: Parameter, value: Any) -> str:
+    """Return a query parameter, percent-encoded."""
+    if isinstance(value, list | dict):
+        return query_text(query_pairs(item.name, value, item.style, explode=item.explode))
+    return f"{quote(item.name, safe='')}={quote(value, safe='')}"
+
+
+def value_text(item: Parameter, value: Any) -> Any:
+    """Return a parameter's value as a call has it: JSON for a parameter with content, else as text."""
+    if is_json(item.media_type):
+        return json_text(value)
+    return value if isinstance(value, list | dict) else text_of(value)
+
+
 def _put_off(exchange: Exchange) -> int | None:
     """Return the seconds of Retry-After (RFC 9110 10.2.3) if they are few, otherwise None."""
     after = exchange.response.header("retry-after") or ""
@@ -129,7 +146,8 @@ def _example(api: RestInterface, operation: Operation, media_type: str) -> Call:
             given[item.name] = item.examples[0] if item.examples else made(item.schema)
     if given:
         given = _fitted(api, operation, given)
-    call = Call(operation, {name: text_of(value) for name, value in given.items()})
+    by_name = {item.name: item for item in operation.parameters if item.where in {"path", "query"}}
+    call = Call(operation, {name: value_text(by_name[name], value) for name, value in given.items()})
     if media_type not in operation.bodies:
         return call
     body = operation.bodies.get(JSON) or next(iter(operation.bodies.values()))

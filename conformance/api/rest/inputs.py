@@ -6,8 +6,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from conformance.api.rest.generated_request import GeneratedRequest
+from conformance.api.rest.validity import validity_by
 from conformance.api.rest.values import Values, sample
+from conformance.documents.field_reading import is_binary
 from conformance.documents.openapi import Operation, is_json, is_xml
+from conformance.documents.parameters import Parameter
 from conformance.documents.serialization import (
     form_body,
     header_text,
@@ -70,7 +73,8 @@ def written(operation: Operation, inputs: Inputs) -> GeneratedRequest:
         values = inputs.at(item.where)
         if item.name not in values:
             continue
-        value = values[item.name]
+        # What has content is written by its media type, whatever the style.
+        value = json_text(values[item.name]) if is_json(item.media_type) else values[item.name]
         match item.where:
             case "path":
                 text = path_text(value, item.style, item.name, explode=item.explode)
@@ -78,15 +82,16 @@ def written(operation: Operation, inputs: Inputs) -> GeneratedRequest:
             case "query":
                 query += query_pairs(item.name, value, item.style, explode=item.explode)
             case "header":
-                headers.append((item.name, header_text(value, explode=item.explode)))
+                headers.append((item.name, header_text(value, item.style, explode=item.explode)))
             case _:
                 cookies += query_pairs(item.name, value, "form", explode=item.explode)
     known = {item.name for item in operation.parameters}
+    reserved = frozenset(item.name for item in operation.parameter("query") if item.reserved)
     query += [pair for name, value in inputs.query.items() if name not in known for pair in query_pairs(name, value)]
     if cookies:
         headers.append(("Cookie", "; ".join(f"{name}={text}" for name, text in cookies)))
     content_type, body = _body(operation, inputs)
-    target = f"{path}?{query_text(query)}" if query else path
+    target = f"{path}?{query_text(query, reserved)}" if query else path
     return GeneratedRequest(operation.method, target, content_type, body, tuple(headers))
 
 
@@ -97,17 +102,34 @@ def _body(operation: Operation, inputs: Inputs) -> tuple[str, bytes]:
         media_type, value = "", b""
     if isinstance(value, bytes):
         return media_type, value
+    encoding = operation.bodies[media_type].encoding if media_type in operation.bodies else {}
     if media_type == FORM and isinstance(value, dict):
-        encoding = operation.bodies[media_type].encoding if media_type in operation.bodies else {}
         return media_type, form_body(value, encoding)
     if media_type == MULTIPART and isinstance(value, dict):
-        return multipart_body(value)
+        return multipart_body(value, encoding)
     if is_xml(media_type):
         schema = operation.bodies[media_type].schema if media_type in operation.bodies else {}
         return media_type, xml_bytes(value, str(schema.get("xml", {}).get("name", "root")))
     if is_json(media_type) or not isinstance(value, str):
         return media_type, json_text(value).encode()
     return media_type, value.encode()
+
+
+def parameter_verdict(operation: Operation, parameter: Parameter, value: Any) -> str:
+    """Return whether a parameter's value is valid, invalid or unclear as it is written; NOTHING: without it."""
+    alone = replace(operation, parameters=(parameter,), bodies={})
+    return _verdict(alone, Inputs().having(parameter.where, parameter.name, value))
+
+
+def body_verdict(operation: Operation, inputs: Inputs) -> str:
+    """Return whether the body of a request is valid, invalid or unclear as it is written."""
+    return _verdict(replace(operation, parameters=()), inputs)
+
+
+def _verdict(operation: Operation, inputs: Inputs) -> str:
+    request = written(operation, inputs)
+    path, _, query = request.target.partition("?")
+    return validity_by(operation, path, query, request.content_type, request.body, request.headers).verdict
 
 
 def usual_inputs(operation: Operation, values: Values) -> list[Inputs]:
@@ -135,13 +157,7 @@ def _with_files(value: Any, schema: dict[str, Any], media_type: str) -> Any:
     if media_type != MULTIPART or not isinstance(value, dict):
         return value
     properties = schema.get("properties", {})
-    return {name: b"roaas" if is_file(properties.get(name, {})) else item for name, item in value.items()}
-
-
-def is_file(schema: dict[str, Any]) -> bool:
-    """Return whether a member of a form is a file (OpenAPI 3.0 and 3.1, 4.8.14.5)."""
-    binary = schema.get("format") in {"binary", "base64"} or "contentMediaType" in schema
-    return binary or (schema.get("type") == "file")
+    return {name: b"roaas" if is_binary(properties.get(name, {})) else item for name, item in value.items()}
 
 
 def whole_body(operation: Operation) -> tuple[str, Any]:

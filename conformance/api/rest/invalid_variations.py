@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Final
 
-from conformance.api.rest.inputs import FORM, MULTIPART, NOTHING, Inputs
+from conformance.api.rest.inputs import FORM, MULTIPART, NOTHING, Inputs, body_verdict, parameter_verdict
+from conformance.api.rest.validity import INVALID
 from conformance.api.rest.values import fits, sample
 from conformance.api.rest.variations import DEPTH, LONG, UNKNOWN, Kind, Steps, Variation, place_of, shown, with_member
 from conformance.documents.json_schema import Schema, kinds_of
-from conformance.documents.openapi import Operation, Parameter, is_json
+from conformance.documents.openapi import Operation, is_json
 from conformance.documents.representation import flat
 
 # A longer array is a load test.
@@ -22,17 +23,16 @@ def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
     """Yield requests that the description forbids: each breaks one rule of it, clearly also as it is written."""
     for item in operation.parameters:
         place = f"{item.where} {item.name}"
-        if item.required and item.where != "path":
+        if item.required and item.where != "path" and parameter_verdict(operation, item, NOTHING) == INVALID:
             without = usual.having(item.where, item.name, NOTHING)
             yield Variation(Kind.MISSING, f"no {place}", place, without)
-        for value, why in _invalid_texts(item):
-            yield Variation(
-                Kind.INVALID, f"{shown(value)} as {place}, {why}", place, usual.having(item.where, item.name, value)
-            )
+        for value, why in _wrong_values(item.schema, usual.at(item.where).get(item.name)):
+            if parameter_verdict(operation, item, value) == INVALID:
+                changed = usual.having(item.where, item.name, value)
+                yield Variation(Kind.INVALID, f"{shown(value)} as {place}, {why}", place, changed)
     if usual.media_type in {FORM, MULTIPART} and isinstance(usual.body, dict):
-        for name in operation.bodies[usual.media_type].schema.get("required", ()):
-            less = {key: item for key, item in usual.body.items() if key != name}
-            yield Variation(Kind.MISSING, f"no field {name}", f"body /{name}", replace(usual, body=less))
+        found = _invalid_fields(usual, usual.body, flat(operation.bodies[usual.media_type].schema))
+        yield from (one for one in found if body_verdict(operation, one.inputs) == INVALID)
     if not is_json(usual.media_type) or usual.media_type not in operation.bodies:
         return
     body = operation.bodies[usual.media_type]
@@ -128,7 +128,9 @@ def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:
         one = sample(items if isinstance(items, dict) else {})
         yield [copy.deepcopy(one) for _ in range(schema["maxItems"] + 1)], "with more items than its maxItems"
     if isinstance(schema.get("minItems"), int) and schema["minItems"] > 0:
-        yield [], "with fewer items than its minItems"
+        items = schema.get("items")
+        one = sample(items if isinstance(items, dict) else {})
+        yield [copy.deepcopy(one) for _ in range(schema["minItems"] - 1)], "with fewer items than its minItems"
 
 
 def _beyond_texts(schema: Schema) -> Iterator[tuple[Any, str]]:
@@ -141,17 +143,46 @@ def _beyond_texts(schema: Schema) -> Iterator[tuple[Any, str]]:
         yield "~ roaas ~", "which its pattern excludes"
 
 
-def _invalid_texts(parameter: Parameter) -> Iterator[tuple[Any, str]]:
-    """Yield values of a parameter that its schema forbids in whatever way its text is read."""
-    kinds = kinds_of(parameter.schema)
+def _invalid_fields(usual: Inputs, body: dict[str, Any], schema: Schema) -> Iterator[Variation]:
+    """Yield forms without a required field, and with a wrong value of a field."""
+    for name, part in schema.get("properties", {}).items():
+        place = place_of((name,))
+        if name in schema.get("required", ()):
+            less = {key: item for key, item in body.items() if key != name}
+            yield Variation(Kind.MISSING, f"no field {name}", place, replace(usual, body=less))
+        for value, why in _wrong_values(part, body.get(name)):
+            changed = replace(usual, body={**body, name: value})
+            yield Variation(Kind.INVALID, f"{shown(value)} as {place}, {why}", place, changed)
+
+
+def _wrong_values(schema: Schema, usual: Any) -> Iterator[tuple[Any, str]]:
+    """Yield values that a schema forbids; not all are wrong as they are written, where each value is a text."""
+    kinds, merged = kinds_of(schema), flat(schema)
+    if kinds & {"object", "array"} and usual is None:
+        usual = sample(schema, whole=True)
+    if "object" in kinds and isinstance(usual, dict):
+        for name in merged.get("required", ()):
+            yield {key: item for key, item in usual.items() if key != name}, f"without {name}"
+        for name, part in merged.get("properties", {}).items():
+            for value, why in _wrong_scalars(part):
+                yield {**usual, name: value}, f"whose {name} is {shown(value)}, {why}"
+    elif "array" in kinds:
+        yield from ((value, why) for value, why in _beyond(merged) if isinstance(value, list))
+        items = merged.get("items")
+        for value, why in _wrong_scalars(items) if isinstance(items, dict) else ():
+            yield [value, *(usual[1:] if isinstance(usual, list) else ())], f"with {shown(value)}, {why}"
+    yield from _wrong_scalars(schema)
+
+
+def _wrong_scalars(schema: Schema) -> Iterator[tuple[Any, str]]:
+    """Yield texts and numbers that a schema forbids in whatever way they are read: at its edge, and of another type."""
+    kinds, merged = kinds_of(schema), flat(schema)
     if not kinds or kinds & {"object", "array"}:
         return
-    merged = flat(parameter.schema)
-    in_path = parameter.where == "path"
     for value, why in _beyond(merged):
-        # In a path, an empty text makes another path; a number within a text is a text.
+        # A number within a text is a text.
         is_text = isinstance(value, str) or "string" not in kinds
-        if is_text and not fits(parameter.schema, value) and not (in_path and value == ""):
+        if is_text and not isinstance(value, list) and not fits(schema, value):
             yield value, why
             break
     if "string" not in kinds and "enum" not in merged:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from conformance.documents.json_schema import kinds_of, shape_of
-from conformance.documents.openapi import Parameter
+from conformance.documents.parameters import Parameter
 
 # Letters, nothing, and texts that programming languages take for numbers and the contract does not.
 _NO_NUMBERS = ("abc", "roaas-no-number", "", "NaN", "Infinity", "-Infinity", "inf", "1e400", "-1e400", "1.5m", "0x1F")

@@ -1,26 +1,26 @@
 """Whether a request is valid by the contract, read back from what goes over the wire."""
 
-import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from urllib.parse import parse_qsl, unquote
 
 from conformance.contract.pack import Contract
+from conformance.documents.field_reading import multipart_verdict, query_verdicts, text_verdict, urlencoded_verdict
 from conformance.documents.json_schema import Schema, kinds_of, shape_of
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import Operation, Parameter, is_json, is_xml
+from conformance.documents.openapi import Body, Operation, is_json, is_xml
+from conformance.documents.parameter_reading import INVALID, UNCLEAR, VALID, decoded_path, judged
+from conformance.documents.parameters import Parameter
 from conformance.documents.representation import UnreadableError, from_element, local_name, parse_xml
 from conformance.documents.resources import is_normal, matching
+from conformance.transport.exchange import media_type_of
 from conformance.verdict.evidence import HarnessError
 
-VALID, INVALID, UNCLEAR = "valid", "invalid", "unclear"
-# The contract's grammar of numbers in paths and queries (fine print).
-_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
-_INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
-# Texts that no reader takes for a number: nothing, or a letter where a number has none.
-_NO_NUMBER = re.compile(r"|.*[A-DF-Za-df-z].*|[eE].*", re.DOTALL)
-# Digits of an integer.
-_BEYOND_EVERY_BOUND = 40
+__all__ = ["INVALID", "UNCLEAR", "VALID"]
+
+# What a cookie's value may not contain (RFC 6265 4.1.1), and percent signs, which not every reader decodes.
+_NO_COOKIE = re.compile(r"[^!#-$&-+\--:<-\[\]-~]")
+Headers = Sequence[tuple[str, str]]
 _RULES = {
     "required": "json-missing",
     "additionalProperties": "json-unknown",
@@ -46,34 +46,41 @@ class Validity:
     why: str = ""
 
 
-def validity(contract: Contract, method: str, target: str, media_type: str, body: bytes) -> Validity:
+def validity(
+    contract: Contract, method: str, target: str, content_type: str, body: bytes, headers: Headers | None = None
+) -> Validity:
     """Return the verdict on a request.
 
     Args:
         contract: the contract to judge by.
         method: as sent.
         target: path and query below the base URL, as sent.
-        media_type: without parameters; empty where there is none.
+        content_type: empty where there is none.
         body: octets.
+        headers: all header fields, to judge header and cookie parameters too; None: they are not judged.
     """
     path, _, query = target.partition("?")
     operation = matching(contract, method, path)
     if operation is None or method != operation.method or not is_normal(path):
         return Validity(UNCLEAR)
-    said = validity_by(operation, path, query, media_type, body)
-    if said.requirement == "json-unknown" and _is_shown(contract, path, operation.bodies[media_type].schema, body):
-        return Validity(UNCLEAR, operation)
+    said = validity_by(operation, path, query, content_type, body, headers)
+    if said.requirement == "json-unknown":
+        schema = operation.bodies[media_type_of(content_type)].schema
+        if _is_shown(contract, path, schema, body):
+            return Validity(UNCLEAR, operation)
     return said
 
 
-def validity_by(operation: Operation, path: str, query: str, media_type: str, body: bytes) -> Validity:
+def validity_by(
+    operation: Operation, path: str, query: str, content_type: str, body: bytes, headers: Headers | None = None
+) -> Validity:
     """Return the verdict on a request by the description of its operation alone; the arguments are as in validity()."""
-    found = [*_of_path(operation, path), *_of_query(operation, query), _of_body(operation, media_type, body)]
-    for wanted in (UNCLEAR, INVALID):
-        for verdict, requirement, why in found:
-            if verdict == wanted:
-                return Validity(verdict, operation, requirement, why)
-    return Validity(VALID, operation)
+    found = [*_of_path(operation, path), *_of_query(operation, query), _of_body(operation, content_type, body)]
+    found += _of_headers(operation, headers) if headers is not None else []
+    if any(verdict == UNCLEAR for verdict, _, _ in found):
+        return Validity(UNCLEAR, operation)
+    wrong = next(((requirement, why) for verdict, requirement, why in found if verdict == INVALID), None)
+    return Validity(INVALID, operation, *wrong) if wrong else Validity(VALID, operation)
 
 
 def require_valid(contract: Contract, method: str, target: str, media_type: str = "", body: bytes = b"") -> None:
@@ -98,57 +105,75 @@ def _of_path(operation: Operation, path: str) -> list[_Said]:
         return [(UNCLEAR, "", "")]
     texts = dict(zip(names, match.groups(), strict=True))
     return [
-        _of_text(item, unquote(texts[item.name]), "path-parameter")
+        (judged(item, [texts[item.name]], decoded_path), "path-parameter", f"{texts[item.name][:40]!r} at {item.name}")
         for item in operation.parameter("path")
         if item.name in texts
     ]
 
 
 def _of_query(operation: Operation, query: str) -> list[_Said]:
-    given = parse_qsl(query, keep_blank_values=True)
-    known = {item.name: item for item in operation.parameter("query")}
-    texts = dict(given)
-    said: list[_Said] = []
-    if len(texts) < len(given) or set(texts) - set(known):
-        said.append((UNCLEAR, "", ""))
-    for name, item in known.items():
-        if name in texts:
-            said.append(_of_text(item, texts[name], "query-parameter"))
-        elif item.required and "object" not in kinds_of(item.schema):
-            # An object may be written as its members.
-            said.append((INVALID, "query-missing", f"no parameter {name}"))
+    return [
+        (verdict, "query-missing" if missing else "query-parameter", why)
+        for verdict, why, missing in query_verdicts(operation.parameter("query"), query)
+    ]
+
+
+def _of_headers(operation: Operation, headers: Headers) -> list[_Said]:
+    """Judge header and cookie parameters; a list in a header may be written in several fields."""
+    said = []
+    cookies = [pair.strip().partition("=") for _, text in _named(headers, "cookie") for pair in text.split(";")]
+    for item in (*operation.parameter("header"), *operation.parameter("cookie")):
+        in_cookie = item.where == "cookie"
+        texts = [part[2] for part in cookies if part[0] == item.name] if in_cookie else []
+        texts = texts if in_cookie else [text.strip(" \t") for _, text in _named(headers, item.name)]
+        if not texts:
+            said.append((INVALID if item.required else VALID, "header", f"no {item.where} {item.name}"))
+        else:
+            verdict = UNCLEAR if in_cookie and _NO_COOKIE.search("".join(texts)) else _of_header(item, texts)
+            said.append((verdict, "header", f"{texts[0][:40]!r} at {item.where} {item.name}"))
     return said
 
 
-def _of_text(parameter: Parameter, text: str, requirement: str) -> _Said:
-    """Judge a parameter's text, read as each of its types; near misses of a number are unclear (fine print)."""
-    kinds = kinds_of(parameter.schema) or {"string"}
-    if not kinds <= {"number", "integer", "string"} or ("string" in kinds and not text):
-        return UNCLEAR, "", ""
-    readings: list[str | float] = [text] if "string" in kinds else []
-    is_clear = True
-    if kinds != {"string"} and not _NO_NUMBER.fullmatch(text):
-        is_clear = bool((_NUMBER if "number" in kinds else _INTEGER).fullmatch(text))
-        if is_clear and math.isfinite(float(text)):
-            is_whole = "number" not in kinds and len(text) < _BEYOND_EVERY_BOUND
-            readings.append(int(text) if is_whole else float(text))
-    shape = shape_of(parameter.schema)
-    if not all(shape.problem(value) for value in readings):
-        return VALID, "", ""
-    return (INVALID, requirement, f"{text[:40]!r} at {parameter.name}") if is_clear else (UNCLEAR, "", "")
+def _of_header(item: Parameter, texts: Sequence[str]) -> str:
+    kinds = kinds_of(item.schema)
+    if len(texts) > 1 and not kinds <= {"array", "object"}:
+        return UNCLEAR
+    whole = ",".join(texts)
+    # White space around the items of a list is optional (RFC 9110 5.6.1).
+    return judged(item, [re.sub(r"[ \t]*,[ \t]*", ",", whole) if kinds <= {"array", "object"} else whole])
 
 
-def _of_body(operation: Operation, media_type: str, body: bytes) -> _Said:
+def _named(headers: Headers, name: str) -> list[tuple[str, str]]:
+    return [(key, text) for key, text in headers if key.lower() == name.lower()]
+
+
+def _of_body(operation: Operation, content_type: str, body: bytes) -> _Said:
     if not operation.bodies:
         return (UNCLEAR, "", "") if body else (VALID, "", "")
+    if not body and not content_type and not operation.body_required:
+        return VALID, "", ""
+    media_type = media_type_of(content_type)
     if media_type not in operation.bodies:
         return UNCLEAR, "", ""
-    schema = operation.bodies[media_type].schema
+    given = operation.bodies[media_type]
     if is_json(media_type):
-        return json_fault(body, schema)
+        return json_fault(body, given.schema)
     if is_xml(media_type):
-        return _xml_fault(body, schema)
-    return UNCLEAR, "", ""
+        return _xml_fault(body, given.schema)
+    return _of_form(media_type, content_type, body, given)
+
+
+def _of_form(media_type: str, content_type: str, body: bytes, given: Body) -> _Said:
+    """Judge a form or a text; what other media types contain is unclear."""
+    if media_type == "application/x-www-form-urlencoded":
+        verdict, why = urlencoded_verdict(body, given)
+    elif media_type == "multipart/form-data":
+        verdict, why = multipart_verdict(body, content_type, given)
+    elif media_type == "text/plain" and kinds_of(given.schema) == {"string"}:
+        verdict, why = text_verdict(body, given.schema), "the text in the body"
+    else:
+        verdict, why = UNCLEAR, ""
+    return verdict, "form", why
 
 
 def json_fault(body: bytes, schema: Schema) -> _Said:

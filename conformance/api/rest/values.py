@@ -9,7 +9,8 @@ from typing import Any
 
 from conformance.documents.json_schema import Schema, kinds_of, shape_of
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import Operation, Parameter, is_json
+from conformance.documents.openapi import Operation, is_json
+from conformance.documents.parameters import Parameter
 from conformance.documents.representation import flat
 from conformance.transport.exchange import Exchange
 
@@ -103,7 +104,9 @@ class Values:
         given = self._given.get(plain_name(parameter.name), [])
         named = parameter.where == "path" or plain_name(parameter.name).endswith(IDS)
         learned = self.known_ids(operation, parameter) if named else []
-        found = [*given, *parameter.examples, *learned, sample(parameter.schema)]
+        # An empty list or object is written as nothing, or as an empty text.
+        made = sample(parameter.schema) or sample(parameter.schema, whole=True)
+        found = [*given, *parameter.examples, *learned, made]
         return [value for value in _distinct(found) if value in given or fits(parameter.schema, value)][:_TRIED]
 
     def body(self, schema: Schema, examples: Sequence[Any] = ()) -> list[Any]:
@@ -200,11 +203,18 @@ def _array(schema: Schema, depth: int, *, whole: bool) -> list[Any]:
     least = max(int(schema.get("minItems", 0)), 1 if whole else 0)
     items = [sample(part, depth + 1) for part in prefix]
     rest = schema.get("items") if isinstance(schema.get("items"), dict) else {}
-    while len(items) < min(least, schema.get("maxItems", least), 64):
+    for _ in range(min(least, schema.get("maxItems", least), 64) - len(items)):
         item = sample(rest or {}, depth + 1)
-        # Of unique items, the second differs from the first.
-        items.append(item + len(items) if schema.get("uniqueItems") and isinstance(item, int) else item)
+        items.append(_another(rest or {}, item, items) if schema.get("uniqueItems") else item)
     return items
+
+
+def _another(schema: Schema, item: Any, others: list[Any]) -> Any:
+    """Return an item that is none of the others, as far as one can be made."""
+    number = len(others)
+    numbered = item + number if isinstance(item, int | float) else f"{item}{number}" if isinstance(item, str) else item
+    candidates = [item, *flat(schema).get("enum", ()), numbered]
+    return next((one for one in candidates if one not in others and fits(schema, one)), item)
 
 
 def _number(schema: Schema, kind: str) -> Any:

@@ -12,10 +12,12 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Final
 
-from conformance.api.rest.inputs import NOTHING, Inputs, whole_body
+from conformance.api.rest.inputs import NOTHING, Inputs, parameter_verdict, whole_body
+from conformance.api.rest.validity import VALID
 from conformance.api.rest.values import Values, fits, sample
 from conformance.documents.json_schema import Schema, kinds_of
-from conformance.documents.openapi import Operation, Parameter, is_json
+from conformance.documents.openapi import Operation, is_json
+from conformance.documents.parameters import Parameter
 from conformance.documents.representation import flat
 
 # As many enum values, examples and optional members are tried of one place, and so deep in a body.
@@ -86,7 +88,8 @@ def valid_variations(operation: Operation, usual: Inputs, values: Values) -> Ite
     for item in operation.parameters:
         place = f"{item.where} {item.name}"
         for kind, value in _valid_values(item.schema, item.examples, values.of(operation, item), item.required):
-            if value != usual.at(item.where).get(item.name, NOTHING) and _sendable(item, value):
+            is_new = value != usual.at(item.where).get(item.name, NOTHING) and _sendable(item, value)
+            if is_new and parameter_verdict(operation, item, value) == VALID:
                 yield Variation(kind, f"{shown(value)} as {place}", place, usual.having(item.where, item.name, value))
     media_type, whole = whole_body(operation)
     if is_json(media_type) and isinstance(usual.body, dict):
@@ -181,6 +184,8 @@ def odd_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
 
 def _sendable(parameter: Parameter, value: Any) -> bool:
     """Return whether HTTP carries a value in a parameter's place unchanged."""
+    if isinstance(value, list | dict):
+        return all(_sendable(parameter, item) for item in (value.values() if isinstance(value, dict) else value))
     text = value if isinstance(value, str) else ""
     if parameter.where == "path":
         return value != "" and "/" not in text and text not in {".", ".."}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-from conformance.api.rest.validity import INVALID, validity
+from conformance.api.rest.validity import INVALID, VALID
 from conformance.api.rest.variations import Kind
 from conformance.documents.openapi import operations_of
 from conformance.rules.told_once import Fault, told_once, without_numbers
@@ -15,9 +15,8 @@ from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
 
 _REFUSED = frozenset({400, 415, 422})
-_MISSING_OR_INVALID = frozenset({Kind.INVALID, Kind.MALFORMED})
+_WRONG = frozenset({Kind.INVALID, Kind.MALFORMED})
 _CONVERTED = re.compile(r"(?: is (.+), not of type (.+)|: (True|False) is not valid under any .+)$", re.DOTALL)
-_INVALID_TAKEN, _VALID_REFUSED = frozenset({"ST201", "ST203"}), "ST202"
 
 
 @rule("description/operations", on=(survey,))
@@ -34,15 +33,15 @@ def operations(trace: Survey, run: Run) -> Iterable[Outcome]:
 
 
 @rule("description/invalid-refused", on=(survey, generated_requests))
-def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
+def invalid_refused(trace: Survey) -> Iterable[Outcome]:
     """Judge whether requests with values that the description forbids are refused."""
-    sure = [one for one in trace.probes if one.kind in _MISSING_OR_INVALID and one.exchange is not None]
-    sure += [one for one in trace.probes if one.kind is Kind.GENERATED and _is_invalid(run, one)]
+    sure = [one for one in trace.probes if one.kind in _WRONG and one.validity != VALID and one.exchange is not None]
+    sure += [one for one in trace.probes if one.kind is Kind.GENERATED and one.validity == INVALID and one.exchange]
 
     def fault(probe: Probe) -> Fault | None:
         if not probe.ok:
             return None
-        why = _why_invalid(run, probe)
+        why = "" if probe.says else probe.why
         # A type that a framework converts, it converts in every operation.
         converted = _CONVERTED.search(why)
         given = _json_type((converted[1] or converted[3]).lower()) if converted else ""
@@ -52,7 +51,6 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
             cause = f"{given} {converted[2]}"
         else:
             cause = f"{probe.operation} {probe.place} {'' if probe.says else without_numbers(why)}"
-        why = "" if probe.says else why
         return Fault(cause, f"status {probe.status}" + (f", although {why}" if why else ""))
 
     yield from told_once(sure, "status 4xx for a request that the description forbids", fault)
@@ -65,27 +63,11 @@ def _json_type(text: str) -> str:
     )
 
 
-def _is_invalid(run: Run, probe: Probe) -> bool:
-    """Return whether a generated request is invalid as it was sent, or by what Schemathesis says."""
-    return bool(_why_invalid(run, probe))
-
-
-def _why_invalid(run: Run, probe: Probe) -> str:
-    """Return why a generated request is invalid, as it was sent or by what Schemathesis says; empty if it is valid."""
-    if probe.exchange is None:
-        return ""
-    request = probe.exchange.request
-    target = request.url.split("//", 1)[-1].partition("/")[2]
-    said = validity(run.contract, request.method, f"/{target}", request.media_type, request.body)
-    if said.verdict == INVALID:
-        return said.why
-    return next((text for code, text in probe.opinions if code in _INVALID_TAKEN), "")
-
-
 @rule("description/required", on=(survey,))
 def required(trace: Survey) -> Iterable[Outcome]:
     """Judge whether what the description requires is required."""
-    probes = [one for one in trace.probes if one.kind is Kind.MISSING and one.exchange is not None]
+    missing = [one for one in trace.probes if one.kind is Kind.MISSING and one.validity != VALID]
+    probes = [one for one in missing if one.exchange is not None]
 
     def fault(probe: Probe) -> Fault | None:
         return Fault(f"{probe.operation} {probe.place}", f"status {probe.status}") if probe.ok else None
@@ -140,16 +122,19 @@ def valid_accepted(trace: Survey) -> Iterable[Outcome]:
     generated = [one for one in trace.probes if one.kind is Kind.GENERATED and one.operation in works]
 
     def fault(probe: Probe) -> Fault | None:
-        said = [text for code, text in probe.opinions if code == _VALID_REFUSED]
-        return Fault(f"{probe.operation} {probe.status}", f"status {probe.status} (ST202)") if said else None
+        if probe.status not in _REFUSED or probe.exchange is None:
+            return None
+        return Fault(f"{probe.operation} {probe.status}", _refusal(probe.exchange))
 
-    yield from told_once(generated, "a request that the description allows accepted", fault)
+    valid = [one for one in generated if one.validity == VALID]
+    yield from told_once(valid, "a request that the description allows accepted", fault)
 
 
 def _accepted(trace: Survey, kinds: tuple[Kind, ...], expected: str, *, anyway: bool = False) -> Iterator[Outcome]:
     """Yield whether valid requests are accepted; unless ``anyway``, of operations whose usual request is."""
     works = {one.operation for one in trace.probes if one.kind is Kind.USUAL and one.ok}
-    probes = [one for one in trace.probes if one.kind in kinds and one.exchange and (anyway or one.operation in works)]
+    sent = [one for one in trace.probes if one.kind in kinds and one.exchange and one.validity != INVALID]
+    probes = [one for one in sent if anyway or one.operation in works]
 
     def fault(probe: Probe) -> Fault | None:
         if probe.status not in _REFUSED:

@@ -152,3 +152,27 @@ def test_overlays_are_applied_in_their_order():
     found = _read(json.dumps({"openapi": "3.1.0", "paths": _PATHS}), overlays=("one", "two"), **overlays)
     assert found.document["paths"]["/a"]["get"]["x-n"] == "two"
     assert "x-n" not in found.original["paths"]["/a"]["get"]
+
+
+@pytest.mark.parametrize("version", ["openapi: 3.0.3", "openapi: 3.1.0", "swagger: '2.0'"])
+def test_header_parameters_that_other_keywords_describe_are_ignored_in_openapi_3(version):
+    text = f"""
+{version}
+paths:
+  /a:
+    parameters: [{{name: AUTHORIZATION, in: header, type: string, schema: {{}}}}]
+    get:
+      parameters:
+        - $ref: '#/components/parameters/Accept'
+        - {{name: content-type, in: header, type: string, schema: {{}}}}
+        - {{name: accept, in: query, type: string, schema: {{}}}}
+        - {{name: X-Trace, in: header, type: string, schema: {{}}}}
+      responses: {{200: {{description: ''}}}}
+components:
+  parameters:
+    Accept: {{name: Accept, in: header, type: string, schema: {{}}}}
+"""
+    (operation,) = read_operations(_read(text).document)
+    names = [item.name for item in operation.parameters]
+    kept = ["accept", "X-Trace"]
+    assert names == (["AUTHORIZATION", "Accept", "content-type", *kept] if "swagger" in version else kept)

@@ -28,9 +28,10 @@ def test_paths(style, explode, text, of_list, of_object):
     [
         ("form", True, "c=blue&c=black", "R=100&G=200"),
         ("form", False, "c=blue,black", "c=R,100,G,200"),
-        ("spaceDelimited", False, "c=blue%20black", None),
-        ("pipeDelimited", False, "c=blue|black", None),
-        ("deepObject", True, None, "c[R]=100&c[G]=200"),
+        ("spaceDelimited", False, "c=blue%20black", "c=R%20100%20G%20200"),
+        ("pipeDelimited", False, "c=blue%7Cblack", "c=R%7C100%7CG%7C200"),
+        ("tabDelimited", False, "c=blue%09black", None),
+        ("deepObject", True, None, "c%5BR%5D=100&c%5BG%5D=200"),
     ],
 )
 def test_queries(style, explode, of_list, of_object):

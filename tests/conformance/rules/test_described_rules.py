@@ -8,6 +8,7 @@ import pytest
 from conformance.api.rest.variations import Kind
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
+from conformance.documents.json_schema import shape_of
 from conformance.rules.description import test_answers as answers
 from conformance.rules.description import test_requests as requests
 from conformance.rules.robustness import test_robustness as robustness
@@ -154,15 +155,14 @@ def test_a_right_device_is_not_blamed(rule, run):
         (requests.operations, [_page(operation=_PLAIN)]),
         (requests.operations, [_page(405, operation=_PLAIN)]),
         (requests.invalid_refused, [_probe(kind=Kind.INVALID)]),
-        (requests.invalid_refused, [_probe(kind=Kind.GENERATED, operation=_OTHER, sent=b'{"n": "x"}')]),
-        (requests.invalid_refused, [_probe(kind=Kind.GENERATED, opinions=(("ST201", "taken"),))]),
+        (requests.invalid_refused, [_probe(kind=Kind.GENERATED, validity="invalid", why="'x' at n")]),
         (requests.required, [_probe(kind=Kind.MISSING)]),
         (requests.optional, [_probe(422, operation=_PLAIN), _probe(operation=_PLAIN, kind=Kind.OPTIONAL)]),
         (requests.enums, [_OK, _probe(422, kind=Kind.ENUM)]),
         (requests.examples, [_probe(400, kind=Kind.EXAMPLE)]),
         (requests.defaults, [_OK, _probe(422, kind=Kind.DEFAULT)]),
         (requests.valid_accepted, [_OK, _probe(400, kind=Kind.BOUND)]),
-        (requests.valid_accepted, [_OK, _probe(400, kind=Kind.GENERATED, opinions=(("ST202", "refused"),))]),
+        (requests.valid_accepted, [_OK, _probe(400, kind=Kind.GENERATED, validity="valid")]),
         (robustness.no_server_error, [_probe(500, kind=Kind.ODD)]),
         (robustness.no_crash, [_silent(NoAnswer.CLOSED)]),
         (robustness.no_hang, [_silent(NoAnswer.TIMEOUT)]),
@@ -187,7 +187,10 @@ def test_a_fault_is_one_finding(rule, probes, run):
         (requests.operations, [_probe(404, {"detail": "no"}, operation=_OTHER, **_PROBLEM)]),
         (requests.enums, [_probe(422), _probe(422, kind=Kind.ENUM)]),
         (requests.optional, [_probe(422), _probe(422, kind=Kind.OPTIONAL)]),
-        (requests.valid_accepted, [_probe(400, kind=Kind.GENERATED, opinions=(("ST202", "refused"),))]),
+        (requests.valid_accepted, [_probe(400, kind=Kind.GENERATED, validity="valid")]),
+        (requests.invalid_refused, [_probe(kind=Kind.GENERATED), _probe(kind=Kind.INVALID, validity="valid")]),
+        (requests.required, [_probe(kind=Kind.MISSING, validity="valid")]),
+        (requests.valid_accepted, [_OK, _probe(400, kind=Kind.BOUND, validity="invalid")]),
         (robustness.recovers, [_probe(500), _probe(500, kind=Kind.AGAIN)]),
         (robustness.no_internals, [_probe(200, b'"/usr/lib/python3/robot.py"')]),
     ],
@@ -208,7 +211,7 @@ def test_what_operations_have_in_common_is_told_once(run):
 def test_types_that_a_framework_converts_are_told_once(run):
     at = {"n": 1, "at": 5}
     probes = [
-        _probe(kind=Kind.GENERATED, operation=_OTHER, sent=json.dumps(one).encode())
+        _probe(kind=Kind.GENERATED, operation=_OTHER, validity="invalid", why=shape_of(_SCHEMA).problem(one))
         for one in ({"n": "1"}, {"n": "2"}, {"n": True}, at)
     ]
     found = _failed(requests.invalid_refused, Survey(tuple(probes)), run)

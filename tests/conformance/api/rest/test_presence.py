@@ -8,7 +8,8 @@ from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.presence import judge_there
 from conformance.contract.pack import Contract
-from conformance.documents.openapi import Body, Operation, Parameter
+from conformance.documents.openapi import Body, Operation
+from conformance.documents.parameters import Parameter
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.run import Run
 

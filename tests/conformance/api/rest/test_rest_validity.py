@@ -101,7 +101,8 @@ def test_a_mistake_of_a_generator_is_the_suite_s():
             {"7": "valid", "0": "invalid", "a": "invalid"},
         ),
         ({"enum": [1, 2]}, {"2": "valid", "3": "invalid", "a": "invalid"}),
-        ({"type": "boolean"}, {"true": "unclear"}),
+        ({"type": "boolean"}, {"true": "valid", "True": "unclear", "1": "unclear", "maybe": "invalid"}),
+        ({"type": ["integer", "null"]}, {"7": "valid", "null": "unclear", "abc": "invalid"}),
     ],
 )
 def test_a_parameter_of_several_types_is_valid_as_any_of_them(tmp_path, schema, texts):

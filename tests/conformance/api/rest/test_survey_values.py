@@ -6,7 +6,8 @@ import pytest
 
 from conformance.api.rest.values import Values, fits, sample
 from conformance.documents.json_schema import modern
-from conformance.documents.openapi import Operation, Parameter
+from conformance.documents.openapi import Operation
+from conformance.documents.parameters import Parameter
 from conformance.transport.exchange import Exchange, Request, Response
 
 _LIST, _ONE = Operation("", "GET", "/jobs"), Operation("", "GET", "/jobs/{job_id}")

@@ -1,0 +1,251 @@
+"""Read parameters and fields of forms back from what goes over the wire, by their styles, and judge them.
+
+A request that a generator means as invalid may be valid as it is written: each value is a text there. OpenAPI leaves
+some ways of writing open (3.1, 4.8.12.2 and appendix C), so a verdict has three values.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+from urllib.parse import unquote, unquote_plus
+
+from conformance.documents.json_schema import Schema, kinds_of, shape_of
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import is_json
+from conformance.documents.parameters import Parameter
+from conformance.documents.representation import flat
+from conformance.documents.serialization import SEPARATORS
+
+VALID, INVALID, UNCLEAR = "valid", "invalid", "unclear"
+# The grammar of numbers in paths and queries; integers have no fraction.
+_NUMBER: Final = re.compile(r"[+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_INTEGER: Final = re.compile(r"[+-]?\d+", re.ASCII)
+# Texts that no reader takes for a number: nothing, or a letter where a number has none.
+_NO_NUMBER: Final = re.compile(r"|.*[A-DF-Za-df-z].*|[eE].*", re.DOTALL)
+# Texts that some frameworks take for a boolean, and for null.
+_BOOLEANS: Final = {"true": True, "false": False}
+_NEAR_BOOLEANS: Final = frozenset({"", "1", "0", "yes", "no", "on", "off", "t", "f", "y", "n"})
+_NULLS: Final = frozenset({"", "null"})
+# Digits of an integer that no bound reaches.
+_BEYOND_EVERY_BOUND: Final = 40
+_SCALARS: Final = frozenset({"string", "number", "integer", "boolean"})
+_ENCODED: Final = re.compile(r"%(?![0-9A-Fa-f]{2})")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A value that stands in a request.
+
+    Attributes:
+        value: a text, a list or an object, in which each scalar is a text.
+        sure: whether every reader takes it like this.
+    """
+
+    value: Any
+    sure: bool = True
+
+
+def decoded_query(text: str) -> str:
+    """Return a name or value of a query or form, decoded.
+
+    Raises:
+        ValueError: it is not percent-encoded UTF-8.
+    """
+    return _decoded(text, unquote_plus)
+
+
+def decoded_path(text: str) -> str:
+    """Return a part of a path segment, decoded.
+
+    Raises:
+        ValueError: it is not percent-encoded UTF-8.
+    """
+    return _decoded(text, unquote)
+
+
+def _decoded(text: str, decode: Callable[..., str]) -> str:
+    if _ENCODED.search(text):
+        raise ValueError("a percent sign without two digits")
+    return decode(text, errors="strict")
+
+
+def judged(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], str] = str) -> str:
+    """Return whether a parameter's texts are a valid value of it.
+
+    Args:
+        parameter: the parameter; of an exploded array of a query or form, each text is an item, of all others one.
+        texts: as they stand in the request.
+        decode: decodes a text or a part of it, and raises ValueError for what cannot be decoded.
+    """
+    try:
+        if parameter.media_type:
+            return _of_content(parameter, texts, decode)
+        kinds = kinds_of(parameter.schema) or {"string"}
+        said = [_of_scalar(parameter, texts, decode)] if kinds & _SCALARS else []
+        if kinds & {"array", "object"} and list(texts) == [""]:
+            return UNCLEAR  # nothing at all, an empty array, or one with an empty text
+        if "array" in kinds:
+            said.append(_agreed(parameter.schema, _arrays(parameter, texts, decode)))
+        if "object" in kinds:
+            said.append(_agreed(parameter.schema, _objects(parameter, texts, decode)))
+    except ValueError:
+        return UNCLEAR
+    if VALID in said:
+        return VALID
+    return INVALID if set(said) == {INVALID} else UNCLEAR
+
+
+def judged_value(schema: Schema, reading: Reading) -> str:
+    """Return whether a value whose scalars are texts is valid by a schema."""
+    shape = shape_of(schema)
+    said = set()
+    for one in _alternatives(schema):
+        value, sure = _typed(one, reading.value)
+        if shape.holds(value):
+            return VALID if reading.sure else UNCLEAR
+        said.add(sure)
+    return INVALID if said == {True} else UNCLEAR
+
+
+def _of_content(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], str]) -> str:
+    if len(texts) != 1 or not is_json(parameter.media_type):
+        return UNCLEAR
+    text = read_json(decode(texts[0]).encode())
+    if text.malformed:
+        return INVALID
+    if text.non_finite or text.twice or text.encoding:
+        return UNCLEAR
+    return VALID if shape_of(parameter.schema).holds(text.value) else INVALID
+
+
+def _of_scalar(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], str]) -> str:
+    text = _unprefixed(parameter, texts[0], decode) if len(texts) == 1 else None
+    if text is None or (text == "" and parameter.empty):
+        return UNCLEAR
+    return judged_text(parameter.schema, decode(text))
+
+
+def judged_text(schema: Schema, text: str) -> str:
+    """Return whether a text stands for a valid scalar; a near miss of a number or boolean, or none, is unclear."""
+    kinds = kinds_of(schema) or {"string"}
+    if "string" in kinds and not text:
+        return UNCLEAR
+    readings, sure = _scalars(schema, text)
+    shape = shape_of(schema)
+    if any(shape.holds(value) for value in readings):
+        return VALID
+    return INVALID if sure else UNCLEAR
+
+
+def _scalars(schema: Schema, text: str) -> tuple[list[Any], bool]:
+    """Return the values that a text may stand for, and whether no reader finds another one in it."""
+    kinds = kinds_of(schema) or {"string"}
+    readings: list[Any] = [text] if "string" in kinds else []
+    sure = bool(kinds & _SCALARS) and not (text in _NULLS and shape_of(schema).holds(None))
+    if kinds & {"number", "integer"} and not _NO_NUMBER.fullmatch(text):
+        is_number = bool((_NUMBER if "number" in kinds else _INTEGER).fullmatch(text))
+        sure = sure and is_number
+        if is_number and math.isfinite(float(text)):
+            is_whole = "number" not in kinds and len(text) < _BEYOND_EVERY_BOUND
+            readings.append(int(text) if is_whole else float(text))
+    if "boolean" in kinds:
+        sure = sure and (text in _BOOLEANS or text.lower() not in _NEAR_BOOLEANS | _BOOLEANS.keys())
+        readings += [_BOOLEANS[text]] if text in _BOOLEANS else []
+    return readings, sure
+
+
+def _typed(schema: Schema, value: Any) -> tuple[Any, bool]:
+    """Return a value with its texts as what their schemas ask for, and whether no reader takes them otherwise."""
+    if isinstance(value, list):
+        prefix, rest = schema.get("prefixItems", []), schema.get("items")
+        items = [_typed_part(prefix[i] if i < len(prefix) else rest, item) for i, item in enumerate(value)]
+        return [item for item, _ in items], all(sure for _, sure in items)
+    if isinstance(value, dict):
+        properties, more = schema.get("properties", {}), schema.get("additionalProperties")
+        members = {name: _typed_part(properties.get(name, more), item) for name, item in value.items()}
+        sure = "patternProperties" not in schema and all(sure for _, sure in members.values())
+        return {name: item for name, (item, _) in members.items()}, sure
+    readings, sure = _scalars(schema, value)
+    shape = shape_of(schema)
+    return next((one for one in readings if shape.holds(one)), value), sure or any(map(shape.holds, readings))
+
+
+def _typed_part(schema: Any, value: Any) -> tuple[Any, bool]:
+    return _typed(flat(schema) if isinstance(schema, dict) else {}, value)
+
+
+def _alternatives(schema: Schema) -> Iterator[Schema]:
+    """Yield a schema once with each alternative of its union."""
+    unions = [(key, one) for key in ("anyOf", "oneOf") for one in schema.get(key, ())]
+    for key, one in unions:
+        yield flat({**schema, key: [one]})
+    if not unions:
+        yield flat(schema)
+
+
+def _agreed(schema: Schema, readings: Iterator[Reading]) -> str:
+    """Return the verdict on a value that readers may take in several ways: unclear if it depends on the way."""
+    said = {judged_value(schema, one) for one in readings}
+    return said.pop() if len(said) == 1 else UNCLEAR
+
+
+def _unprefixed(parameter: Parameter, text: str, decode: Callable[[str], str]) -> str | None:
+    """Return a text without what the styles label and matrix put before it; None where that is missing."""
+    if parameter.style == "label":
+        return text[1:] if text.startswith(".") else None
+    if parameter.style != "matrix":
+        return text
+    name, _, value = text[1:].partition("=")
+    return value if text.startswith(";") and decode(name) == parameter.name else None
+
+
+def _arrays(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], str]) -> Iterator[Reading]:
+    if parameter.style == "matrix" and parameter.explode:
+        parts = [part.partition("=") for part in texts[0].split(";")[1:]]
+        is_own = bool(parts) and texts[0].startswith(";") and all(decode(part[0]) == parameter.name for part in parts)
+        yield Reading([decode(part[2]) for part in parts], sure=is_own)
+    elif parameter.explode and parameter.where in {"query", "form"} and parameter.style == "form":
+        yield Reading([decode(text) for text in texts])
+    else:
+        yield from _split(parameter, texts, decode)
+
+
+def _objects(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], str]) -> Iterator[Reading]:
+    for items in _split(parameter, texts, decode):
+        parts = items.value
+        if parameter.explode:
+            pairs = [part.partition("=") for part in parts]
+            members = {decode(name): decode(value) for name, _, value in pairs}
+            whole = all(separator for _, separator, _ in pairs) and len(members) == len(parts)
+        else:
+            members = dict(zip(parts[::2], parts[1::2], strict=False))
+            whole = len(members) * 2 == len(parts)
+        yield Reading(members, sure=items.sure and whole)
+
+
+def _split(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], str]) -> Iterator[Reading]:
+    """Yield the parts of one text, each decoded unless they are pairs, by each separator that the style may have."""
+    text = _unprefixed(parameter, texts[0], decode) if len(texts) == 1 else None
+    if parameter.style == "matrix" and parameter.explode:
+        text = texts[0][1:] if len(texts) == 1 and texts[0].startswith(";") else None
+    if text is None:
+        raise ValueError("not in its style")
+    separator = SEPARATORS.get(parameter.style, ",")
+    if parameter.style in {"label", "matrix"} and parameter.explode:
+        separator = "." if parameter.style == "label" else ";"
+    pairs = parameter.explode and "object" in kinds_of(parameter.schema)
+    plain: Callable[[str], str] = str if pairs else decode
+    if parameter.style in SEPARATORS:
+        yield Reading(decode(text).split(separator))  # such a separator is always percent-encoded
+        return
+    yield Reading([plain(part) for part in text.split(separator)])
+    delimiters = (separator, "=") if pairs else (separator,)
+    if any(decode(text).count(one) != text.count(one) for one in delimiters):
+        yield Reading(decode(text).split(separator))  # some servers decode before they split
+    if parameter.style == "label" and not parameter.explode:
+        # Before 3.1.1, the specification's table had a full stop between the items too.
+        yield Reading([plain(part) for part in text.split(".")])

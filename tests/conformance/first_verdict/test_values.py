@@ -1,0 +1,122 @@
+"""Parameters and forms are written and judged as the specification has them: a right device passes, a lax one fails."""
+
+import re
+from urllib.parse import unquote, unquote_plus
+
+import pytest
+from aiohttp import web
+from small_device import REFUSED, answers, certified, constant, described, error, small_device
+
+_WHOLE = {"type": "integer", "minimum": 0, "maximum": 9}
+_LIST = {"type": "array", "items": _WHOLE, "minItems": 2, "maxItems": 3}
+_POINT = {"type": "object", "required": ["x"], "properties": {"x": {"type": "number"}, "y": {"type": "number"}}}
+_TAG = {"type": "object", "required": ["min"], "additionalProperties": False, "properties": {"min": _WHOLE}}
+_NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?"
+# For each operation its parameter, and what the text of its value has to look like, decoded.
+_QUERIES = {
+    "/csv": ({"schema": _LIST, "explode": False}, r"p=\d(,\d){1,2}"),
+    "/multi": ({"schema": _LIST}, r"p=\d(&p=\d){1,2}"),
+    "/pipes": ({"schema": _LIST, "style": "pipeDelimited", "explode": False}, r"p=\d(\|\d){1,2}"),
+    "/spaces": ({"schema": _LIST, "style": "spaceDelimited", "explode": False}, r"p=\d( \d){1,2}"),
+    "/deep": ({"schema": _TAG, "style": "deepObject", "explode": True}, r"p\[min\]=\d"),
+    "/apart": ({"schema": _POINT}, rf"(?!.*\by=(?!{_NUMBER}(?:&|$)))(.*&)?x={_NUMBER}(&.*)?"),
+    "/together": ({"schema": _POINT, "explode": False}, None),
+    "/content": ({"content": {"application/json": {"schema": _TAG}}}, r'p=\{"min": ?\d\}'),
+    "/reserved": ({"schema": {"type": "string", "enum": ["a/b", "c:d"]}, "allowReserved": True}, r"p=(a/b|c:d)"),
+}
+_PATHS = {
+    "/matrix/{p}": ({"schema": _WHOLE, "style": "matrix"}, r";p=\d"),
+    "/label/{p}": ({"schema": _WHOLE, "style": "label"}, r"\.\d"),
+    "/simple/{p}": ({"schema": _LIST}, r"\d(,\d){1,2}"),
+    "/members/{p}": ({"schema": _POINT, "explode": True}, rf"(?!.*\by=(?!{_NUMBER}(?:,|$)))(.*,)?x={_NUMBER}(,.*)?"),
+}
+_RESPONSES = {"200": answers({"type": "object"}), "4XX": REFUSED}
+
+
+def _operation(name, where, given):
+    return {"get": {"parameters": [{"name": name, "in": where, "required": True, **given}], "responses": _RESPONSES}}
+
+
+def _paths():
+    paths = {path: _operation("p", "query", given) for path, (given, _) in _QUERIES.items()}
+    paths |= {path: _operation("p", "path", given) for path, (given, _) in _PATHS.items()}
+    paths["/header"] = _operation("X-Ids", "header", {"schema": _LIST})
+    paths["/cookie"] = _operation("mode", "cookie", {"schema": {"enum": ["auto", "manual"]}})
+    form = {"type": "object", "required": ["n"], "properties": {"n": _WHOLE, "ids": _LIST}}
+    content = {"application/x-www-form-urlencoded": {"schema": form, "encoding": {"ids": {"explode": False}}}}
+    paths["/form"] = {"post": {"requestBody": {"required": True, "content": content}, "responses": _RESPONSES}}
+    ignored = [
+        {"name": name, "in": "header", "required": True, "schema": {"enum": ["roaas"]}}
+        for name in ("Authorization", "accept", "Content-Type")
+    ]
+    paths["/ignored"] = {"get": {"parameters": ignored, "responses": _RESPONSES}}
+    return paths
+
+
+def _refusing(is_right):
+    async def handle(request):
+        try:
+            right = is_right(request, await request.text())
+        except (KeyError, ValueError):
+            right = False
+        return web.json_response({}) if right else error(400, "refused")
+
+    return handle
+
+
+def _of_pairs(request, _):
+    texts = unquote_plus(request.rel_url.raw_query_string.removeprefix("p=")).split(",")
+    members = dict(zip(texts[::2], texts[1::2], strict=True))
+    return "x" in members and all(re.fullmatch(_NUMBER, members.get(name, "0"), re.ASCII) for name in "xy")
+
+
+def _of_query(pattern):
+    if pattern is None:
+        return _of_pairs
+    return lambda request, _: re.fullmatch(pattern, unquote_plus(request.rel_url.raw_query_string), re.ASCII)
+
+
+def _of_path(pattern):
+    return lambda request, _: re.fullmatch(pattern, unquote(request.rel_url.raw_path.rsplit("/", 1)[1]), re.ASCII)
+
+
+def _of_form(_, text):
+    fields = [part.split("=") for part in text.split("&")]
+    values = {unquote_plus(name): unquote_plus(value) for name, value in fields}
+    whole = len(values) == len(fields) and re.fullmatch(r"\d", values["n"], re.ASCII) is not None
+    return whole and re.fullmatch(r"\d(,\d){1,2}", values.get("ids", "1,2"), re.ASCII)
+
+
+def _strict():
+    routes = {path: {"GET": _refusing(_of_query(pattern))} for path, (_, pattern) in _QUERIES.items()}
+    routes |= {path: {"GET": _refusing(_of_path(pattern))} for path, (_, pattern) in _PATHS.items()}
+    routes["/header"] = {
+        "GET": _refusing(lambda request, _: re.fullmatch(r"\d(, ?\d){1,2}", request.headers.get("X-Ids", "")))
+    }
+    routes["/cookie"] = {"GET": _refusing(lambda request, _: request.cookies.get("mode") in {"auto", "manual"})}
+    routes["/form"] = {"POST": _refusing(_of_form)}
+    return routes | {"/ignored": constant({})}
+
+
+def _lax():
+    routes = {path: {method.upper(): _refusing(lambda *_: True) for method in item} for path, item in _paths().items()}
+    return routes | {"/ignored": constant({})}
+
+
+@pytest.mark.parametrize("effort", ["quick", "standard"])
+def test_each_style_that_a_device_reads_rightly_passes(tmp_path, effort):
+    with small_device(described(_paths()), _strict()) as url:
+        seen = certified(f"{url}/openapi.json", tmp_path / "out", "--call", "*", effort=effort)
+    assert seen.blamed == {}
+    assert seen.exit_code == 0
+    assert f"{len(_paths())} of {len(_paths())} operations called" in seen.text
+
+
+@pytest.mark.parametrize("first", range(0, 17, 5))
+def test_a_device_that_takes_anything_in_any_style_is_caught_at_quick(tmp_path, first):
+    some = dict(list(_paths().items())[first : first + 5])
+    with small_device(described(some), {path: _lax()[path] for path in some}) as url:
+        seen = certified(f"{url}/openapi.json", tmp_path / "out", "--call", "*")
+    assert seen.blamed["description/invalid-refused"] == "fail"
+    found = {one["operation"].split()[1] for one in seen.result["api"]["operations"] if one["findings"]}
+    assert found == some.keys() - {"/ignored"}
