@@ -82,7 +82,10 @@ def _described(
         connection = connection_of(where if where.api_key else msgspec.structs.replace(where, api_key_file=None))
         moves = statement is not None and has_motion_map(statement)
         if soap:
-            contract, where, remarks = soap_contract(source, base_url, where, connection, options["out"], moves=moves)
+            schemas = options.get("schemas") or (Path(api.schemas) if api and api.schemas else None)
+            contract, where, remarks = soap_contract(
+                source, base_url, where, connection, options["out"], schemas=schemas, moves=moves
+            )
         else:
             contract, where, remarks = described_contract(
                 source, overlays, base_url, where, connection, options["out"], moves=moves

@@ -1,6 +1,7 @@
 """The click options on a device with a description that several commands share: where, what may be called, who asks."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
@@ -11,6 +12,12 @@ _FILE = click.Path(exists=True, dir_okay=False)
 _DESCRIPTION = (
     click.option("--openapi", metavar="URL|FILE", help="The device's own OpenAPI or Swagger description: go by that."),
     click.option("--wsdl", metavar="URL|FILE", help="The device's own WSDL: go by that."),
+    click.option(
+        "--schemas",
+        type=click.Path(exists=True, file_okay=False, path_type=Path),
+        metavar="FOLDER",
+        help="Folder with the schemas that the WSDL imports, where their addresses do not have them.",
+    ),
     click.option("--overlay", "overlays", multiple=True, metavar="FILE", help="OpenAPI Overlay to apply; repeatable."),
     click.option("--base-url", metavar="URL", help="Where the operations of the description are."),
     click.option(

@@ -6,16 +6,18 @@ and validated as all others are.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 from urllib.parse import urlsplit
 
 from lxml import etree
 
-from conformance.documents.wsdl_imports import Fetch, collect
-from conformance.documents.xml_names import ENVELOPE, WSDL, WSDL_SOAP, XSD, clark
-from conformance.documents.xsd import SchemaDocument, SchemaError, Types
+from conformance.documents.wsdl_gaps import gaps
+from conformance.documents.wsdl_imports import Fetch, Locate, collect
+from conformance.documents.xml_names import ENVELOPE, WSDL, WSDL_SOAP, XSD, clark, namespace
+from conformance.documents.xsd import SchemaError, Types
+from conformance.documents.xsd_assembly import SchemaDocument
 
 ENVELOPE_12: Final = "http://www.w3.org/2003/05/soap-envelope"
 _WSDL_SOAP_12: Final = "http://schemas.xmlsoap.org/wsdl/soap12/"
@@ -78,15 +80,19 @@ class SoapDescription:
         ports: those over HTTP.
         types: the compiled schemas.
         faults: what is wrong with the WSDL itself: documents that are missing, references without a target.
+        notes: what the suite does not know of the WSDL, through no fault of the device.
     """
 
     name: str
     ports: tuple[SoapPort, ...]
     types: Types
     faults: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
-def read_services(wsdl: bytes, location: str, fetch: Fetch, address: str = "") -> SoapDescription:
+def read_services(
+    wsdl: bytes, location: str, fetch: Fetch, address: str = "", locate: Locate = lambda _: "", *, foreign: bool = False
+) -> SoapDescription:
     """Read a WSDL and what it refers to.
 
     Args:
@@ -94,36 +100,41 @@ def read_services(wsdl: bytes, location: str, fetch: Fetch, address: str = "") -
         location: its URL or file.
         fetch: loads the documents that it refers to.
         address: where the service is, whatever the WSDL says; a standard's WSDL (ONVIF) says nothing or an example.
+        locate: returns where the schema of a namespace is to which no reference led.
+        foreign: whether the WSDL is not the device's own, as that of a standard: its faults are then notes.
 
     Raises:
         WsdlError: it is none, has no port over HTTP, or its schemas do not compile.
     """
     try:
-        found = collect(wsdl, location, fetch)
+        found = collect(wsdl, location, fetch, locate)
     except ValueError as error:
-        raise WsdlError(f"{location} is no WSDL: {error}") from error
+        raise WsdlError(f"{location} is no WSDL, but {error}") from error
     reader = _Reader(found.definitions)
     ports = tuple(reader.ports())
     if address:
         ports = tuple(replace(port, url=address) for port in ports) or tuple(reader.bindings(address))
     if not ports:
         raise WsdlError(f"{location} has no port over HTTP: name the address of the service with --base-url")
-    faults = [f"{place} could not be read: {reason}" for place, reason in found.missing.items()]
     try:
         types = Types.compiled([*found.schemas, *reader.wrappers])
     except SchemaError as error:
         raise WsdlError(f"the schemas of {location} do not compile: {error}") from error
-    faults += [f"its schemas are refused by one of two compilers: {problem}" for problem in types.problems]
-    faults += reader.faults
+    faults, notes = gaps(found, types, location)
+    faults += [*reader.faults, *_undeclared(ports, types, found.lacking)]
+    name = found.definitions[0].get("name") or ports[0].service
+    if foreign:
+        faults, notes = [], [*notes, *faults]
+    return SoapDescription(name, ports, types, tuple(dict.fromkeys(faults)), tuple(dict.fromkeys(notes)))
+
+
+def _undeclared(ports: Iterable[SoapPort], types: Types, lacking: Sequence[str]) -> Iterator[str]:
+    """Yield which elements of messages no schema declares, but for those whose documents are lacking."""
     for port in ports:
         for operation in port.operations:
             for tag in filter(None, (operation.request, operation.response)):
-                if types.shape(tag) is None:
-                    faults.append(
-                        f"{operation.name} of port {port.name} names the element {tag}, which no schema declares"
-                    )
-    name = found.definitions[0].get("name") or ports[0].service
-    return SoapDescription(name, ports, types, tuple(dict.fromkeys(faults)))
+                if types.shape(tag) is None and namespace(tag) not in lacking:
+                    yield f"{operation.name} of port {port.name} names the element {tag}, which no schema declares"
 
 
 class _Reader:

@@ -14,7 +14,8 @@ from lxml import etree
 
 from conformance.documents.wsdl_imports import Collected, Fetch, collect
 from conformance.documents.xml_names import WSAM, WSAW, WSDL, WSDL_SOAP, clark
-from conformance.documents.xsd import SchemaDocument, SchemaError, Types
+from conformance.documents.xsd import SchemaError, Types
+from conformance.documents.xsd_assembly import SchemaDocument
 from conformance.documents.xsd_shapes import Element
 
 _ACTIONS: Final = tuple(clark(space, "Action") for space in (WSAM, WSAW, "http://www.w3.org/2005/08/addressing"))

@@ -1,21 +1,28 @@
-"""Collect the documents of a WSDL by wsdl:import, xsd:import and xsd:include, each once."""
+"""Collect the documents of a WSDL by wsdl:import, xsd:import, include, redefine and override, each once."""
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
+from functools import cached_property
+from pathlib import Path, PurePosixPath
 from typing import Final
-from urllib.parse import urljoin
+from urllib.parse import urlsplit
 
 from lxml import etree
 
 from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import WSDL, XSD, clark
-from conformance.documents.xsd import SchemaDocument
+from conformance.documents.xsd_assembly import SchemaDocument, resolved
 
 # Obtains a document by its resolved location. Raises OSError or ValueError with the reason where it cannot.
 Fetch = Callable[[str], bytes]
+# Returns the location of the schema of a namespace; empty if it knows none.
+Locate = Callable[[str], str]
 # More documents than this are no description of a robot, but a robot that keeps its reader busy.
 _MOST: Final = 50
+_HEAD: Final = 1000
+_SHOWN: Final = 80
+_TITLE: Final = re.compile(rb"<title[^>]*>([^<]*)", re.IGNORECASE)
 
 
 @dataclass
@@ -26,72 +33,152 @@ class Collected:
         definitions: wsdl:definitions elements.
         schemas: schema documents.
         missing: reasons why documents are missing, by location.
+        imported: namespaces that schemas import, each with the location that one of them gives, or empty.
     """
 
     definitions: list[etree._Element] = field(default_factory=list)
     schemas: list[SchemaDocument] = field(default_factory=list)
     missing: dict[str, str] = field(default_factory=dict)
+    imported: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def lacking(self) -> list[str]:
+        """The imported namespaces of which no document was found."""
+        there = {schema.namespace for schema in self.schemas} | {XSD}
+        return [space for space in self.imported if space and space not in there]
 
 
-def collect(wsdl: bytes, location: str, fetch: Fetch) -> Collected:
+def collect(wsdl: bytes, location: str, fetch: Fetch, locate: Locate = lambda _: "") -> Collected:
     """Return all documents of a description.
+
+    Args:
+        wsdl: the first document.
+        location: its URL or file name, the base of relative references.
+        fetch: returns a further document by its resolved location.
+        locate: returns where the schema of a namespace is to which no reference led.
 
     Raises:
         ValueError: the first one is not a WSDL; the message says why.
     """
-    try:
-        # WSDL 1.1 forbids no DOCTYPE: that one is there blames nobody, and nothing of it is read.
-        root = parse(wsdl, doctype=True)
-    except NotXmlError as error:
-        raise ValueError(str(error)) from error
-    if root.tag != clark(WSDL, "definitions"):
-        raise ValueError(f"the root element {root.tag} instead of wsdl:definitions")
-    found = Collected()
-    waiting: list[tuple[str, etree._Element]] = [(location, root)]
-    seen = {location}
+    root, found = _root_of(wsdl), Collected()
+    waiting = _take(found, location, root)
+    seen = {location, ""}
     while waiting:
-        place, element = waiting.pop(0)
-        for reference in _take(found, place, element):
-            target = _resolved(place, reference)
-            if target in seen:
-                continue
+        target = waiting.pop(0)
+        if target not in seen:
             seen.add(target)
             if len(seen) > _MOST:
                 found.missing[target] = f"more than {_MOST} documents"
                 return found
             try:
-                waiting.append((target, parse(fetch(target), doctype=True)))
+                waiting += _take(found, target, parse(fetch(target), doctype=True))
             except (OSError, ValueError) as error:
                 found.missing[target] = str(error) or type(error).__name__
+        if not waiting:
+            waiting = [place for place in map(locate, found.lacking) if place not in seen]
     return found
+
+
+def _root_of(wsdl: bytes) -> etree._Element:
+    """Return the root of a WSDL.
+
+    Raises:
+        ValueError: it is not one; the message says what it is.
+    """
+    # WSDL 1.1 forbids no DOCTYPE: that one is there blames nobody, and nothing of it is read.
+    head = wsdl[:_HEAD].lstrip(b"\xef\xbb\xbf \t\r\n").lower()
+    if not head:
+        raise ValueError("an empty document")
+    if head.startswith((b"{", b"[")):
+        raise ValueError("JSON: an OpenAPI description goes with --openapi")
+    try:
+        root = parse(wsdl, doctype=True)
+        problem = f"the root element {root.tag} instead of wsdl:definitions"
+    except NotXmlError as error:
+        root, problem = None, str(error)
+    if root is not None and root.tag == clark(WSDL, "definitions"):
+        return root
+    if head.startswith((b"<!doctype html", b"<html")):
+        title = _TITLE.search(wsdl)
+        said = " ".join(title[1].decode("utf-8", "replace").split())[:_SHOWN] if title else ""
+        problem = f"an HTML page, such as a login or an error{f', with the title {said!r}' if said else ''}: {problem}"
+    if root is not None and root.tag == "{http://www.w3.org/ns/wsdl}description":
+        problem = "a WSDL 2.0, which the suite does not read: it reads WSDL 1.1"
+    raise ValueError(problem)
 
 
 def _take(found: Collected, place: str, root: etree._Element) -> list[str]:
     """Add a document, and return the locations that it refers to."""
+    # Entities are not expanded, and the copies that the compilers get have no DOCTYPE that declares them.
+    etree.strip_elements(root, etree.Entity, with_tail=False)
+    targets: list[str] = []
     if root.tag == clark(WSDL, "definitions"):
         found.definitions.append(root)
         references = [element.get("location") for element in root.findall(clark(WSDL, "import"))]
+        targets += [resolved(place, reference) for reference in references if reference]
         for number, schema in enumerate(root.iterfind(f"{clark(WSDL, 'types')}/{clark(XSD, 'schema')}")):
             found.schemas.append(SchemaDocument(f"{place}#{number}", schema, inline=True))
-            references += _schema_references(schema)
+            targets += _schema_references(found)
     elif root.tag == clark(XSD, "schema"):
         found.schemas.append(SchemaDocument(place, root))
-        references = _schema_references(root)
+        targets += _schema_references(found)
     else:
         found.missing[place] = f"neither a WSDL nor a schema, but {root.tag}"
-        references = []
-    return [reference for reference in references if reference]
+    # Without any reference left, a namespace may still be looked for by its name.
+    return [*targets, ""]
 
 
-def _schema_references(root: etree._Element) -> list[str | None]:
-    return [
-        element.get("schemaLocation")
-        for kind in ("import", "include", "redefine")
-        for element in root.findall(clark(XSD, kind))
-    ]
+def _schema_references(found: Collected) -> Iterator[str]:
+    """Yield the locations that the last schema refers to, and note what it imports."""
+    schema = found.schemas[-1]
+    for element in schema.root.iterchildren(
+        *(clark(XSD, name) for name in ("import", "include", "redefine", "override"))
+    ):
+        reference = element.get("schemaLocation") or ""
+        target = resolved(schema.location, reference) if reference else ""
+        if element.tag == clark(XSD, "import"):
+            space = element.get("namespace") or ""
+            found.imported[space] = found.imported.get(space) or target
+        yield target
 
 
-def _resolved(place: str, reference: str) -> str:
-    if "://" in reference or "://" in place:
-        return urljoin(place, reference)
-    return str(Path(place).parent / reference)
+@dataclass(frozen=True)
+class SchemaFolder:
+    """A folder with schemas for references that lead nowhere.
+
+    Attributes:
+        folder: the folder; its subfolders count too.
+    """
+
+    folder: Path
+
+    @cached_property
+    def _files(self) -> dict[Path, str]:
+        """The documents in the folder, each with its target namespace; without one, an empty text."""
+        found: dict[Path, str] = {}
+        for path in sorted(one for one in self.folder.rglob("*") if one.is_file()):
+            try:
+                root = parse(path.read_bytes(), doctype=True)
+            except (OSError, NotXmlError):
+                continue
+            if root.tag in {clark(XSD, "schema"), clark(WSDL, "definitions")}:
+                found[path] = (root.get("targetNamespace") or "") if root.tag == clark(XSD, "schema") else ""
+        return found
+
+    def at(self, place: str) -> bytes | None:
+        """Return the document whose path ends as a location does, with `.xsd` or without; None if there is none."""
+        wanted = PurePosixPath(urlsplit(place).netloc + urlsplit(place).path).parts[::-1]
+
+        def fits(path: Path) -> int:
+            parts = path.relative_to(self.folder).parts[::-1]
+            if not wanted or parts[0] not in {wanted[0], f"{wanted[0]}.xsd"}:
+                return 0
+            pairs = zip(wanted[1:], parts[1:], strict=False)
+            return 1 + next((number for number, (one, other) in enumerate(pairs) if one != other), len(parts))
+
+        best = max(self._files, key=fits, default=None)
+        return best.read_bytes() if best is not None and fits(best) else None
+
+    def locate(self, space: str) -> str:
+        """Return the path of the schema of a namespace; empty if there is none."""
+        return next((str(path) for path, own in self._files.items() if own == space), "")

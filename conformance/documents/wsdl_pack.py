@@ -39,6 +39,8 @@ def write_soap_pack(
     documents: Mapping[str, bytes],
     address: str = "",
     *,
+    named: Mapping[str, str] | None = None,
+    foreign: bool = False,
     moves: bool = False,
 ) -> Path:
     """Write a contract pack for a WSDL; return its folder.
@@ -49,6 +51,8 @@ def write_soap_pack(
         location: that of the WSDL.
         documents: all documents by location.
         address: where the service is, whatever the WSDL says; empty: as it says.
+        named: locations of schemas that were found by their namespace.
+        foreign: whether the WSDL is not the device's own.
         moves: whether the statement has a motion map, so that motion is judged as well.
 
     Raises:
@@ -66,7 +70,7 @@ def write_soap_pack(
     (folder / MANIFEST).write_text("\n".join(lines) + "\n", encoding="utf-8")
     (folder / "openapi.json").write_text(json.dumps(_operations(found)), encoding="utf-8")
     texts = {place: text.decode("latin-1") for place, text in documents.items()}
-    kept = {"location": location, "address": address, "documents": texts}
+    kept = {"location": location, "address": address, "documents": texts, "named": named or {}, "foreign": foreign}
     (folder / DOCUMENTS_NAME).write_text(json.dumps(kept), encoding="utf-8")
     return folder
 
@@ -132,7 +136,14 @@ def services_of(contract: Contract) -> SoapDescription | None:
         found: bytes = documents[place]
         return found
 
-    return read_services(documents[kept["location"]], kept["location"], fetch, kept["address"])
+    return read_services(
+        documents[kept["location"]],
+        kept["location"],
+        fetch,
+        kept["address"],
+        lambda space: str(kept["named"].get(space, "")),
+        foreign=kept["foreign"],
+    )
 
 
 def messages_of(contract: Contract) -> dict[str, Element]:

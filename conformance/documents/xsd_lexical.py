@@ -32,6 +32,7 @@ FLOATS: Final = frozenset({"double", "float"})
 STRINGS: Final = frozenset({"string", "normalizedString", "token"})
 # Where an integer has no bounds of its own, values stay within what a robot can be asked to hold.
 _WIDEST: Final = 2**31 - 1
+_LONGEST: Final = 1_000_000
 # Texts that are no number of any kind to XML Schema, though some are to a programming language.
 NO_NUMBERS: Final = (
     "four",
@@ -119,5 +120,6 @@ def plain(simple: Simple) -> str:
         "hexBinary": "00FF",
     }
     text = known.get(simple.builtin, "map")
-    short = (simple.min_length or 0) - len(text)
+    # A text longer than any message cannot be sent.
+    short = min(simple.min_length or 0, _LONGEST) - len(text)
     return (text + "a" * max(0, short))[: simple.max_length]

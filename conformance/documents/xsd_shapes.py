@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any, Final
 
 from conformance.documents.xml_names import XSD, clark
+from conformance.documents.xsd_unknown import UNKNOWN
 
-# A type that holds itself is followed this deep.
-_DEEPEST: Final = 12
+# So many elements of one message are read; types that hold one another in many ways would be read without end.
+_MOST: Final = 20_000
 
 
 @dataclass(frozen=True)
@@ -64,12 +65,14 @@ class Complex:
         text: the type of its text, if it has simple content.
         attributes: (name in Clark notation, type, required) for each.
         wildcard: whether it allows elements or attributes that the schema does not name.
+        unknown: whether no document declares it.
     """
 
     content: Group | None = None
     text: Simple | None = None
     attributes: tuple[tuple[str, Simple, bool], ...] = ()
     wildcard: bool = False
+    unknown: bool = False
 
 
 @dataclass(frozen=True)
@@ -97,41 +100,61 @@ class Element:
         return tuple(self.type.content.elements())
 
 
-def shape(declared: Any, depth: int = 0) -> Element:
-    """Return the content that an xmlschema element declaration allows; ``depth`` is its nesting depth."""
-    space, _, name = str(declared.name).rpartition("}")
-    tag = str(declared.name) if space else name
-    return Element(
-        tag, _type(declared.type, depth), declared.min_occurs, declared.max_occurs, nillable=bool(declared.nillable)
-    )
+@dataclass
+class _Reader:
+    """Reads declarations of xmlschema; ``left`` is how many elements of one message may yet be read."""
+
+    left: int = _MOST
+    path: list[int] = field(default_factory=list)
+
+    def element(self, declared: Any) -> Element:
+        """Return the content that an element declaration allows."""
+        self.left -= 1
+        space, _, name = str(declared.name).rpartition("}")
+        tag = str(declared.name) if space else name
+        nillable = bool(declared.nillable)
+        return Element(tag, self._type(declared.type), declared.min_occurs, declared.max_occurs, nillable=nillable)
+
+    def _type(self, declared: Any) -> Simple | Complex:
+        if declared.is_simple():
+            return _simple(declared)
+        if declared.elem is not None and declared.elem.get(UNKNOWN):
+            return Complex(wildcard=True, unknown=True)
+        # A type within itself is followed once; what is beyond is optional in every message that ends.
+        if self.path.count(id(declared)) > 1 or self.left < 0:
+            return Complex()
+        attributes = tuple(
+            (str(name), _simple(attribute.type), attribute.use == "required")
+            for name, attribute in declared.attributes.items()
+            if name is not None and attribute.use != "prohibited"
+        )
+        wildcard = None in declared.attributes
+        if declared.has_simple_content():
+            return Complex(None, _simple(declared.content), attributes, wildcard)
+        self.path.append(id(declared))
+        content = self._group(declared.content)
+        self.path.pop()
+        wildcard = wildcard or any(map(_is_any, declared.content.iter_elements()))
+        return Complex(content, None, attributes, wildcard)
+
+    def _group(self, declared: Any) -> Group:
+        items: list[Element | Group] = []
+        for item in declared:
+            if hasattr(item, "model"):
+                items.append(self._group(item))
+            elif not _is_any(item):
+                items.append(self.element(item))
+        return Group(declared.model, tuple(items), declared.min_occurs, declared.max_occurs)
 
 
-def _type(declared: Any, depth: int) -> Simple | Complex:
-    if declared.is_simple():
-        return _simple(declared)
-    if depth > _DEEPEST:
-        return Complex()
-    attributes = tuple(
-        (str(name), _simple(attribute.type), attribute.use == "required")
-        for name, attribute in declared.attributes.items()
-        if name is not None and attribute.use != "prohibited"
-    )
-    wildcard = None in declared.attributes
-    if declared.has_simple_content():
-        return Complex(None, _simple(declared.content), attributes, wildcard)
-    content = _group(declared.content, depth)
-    wildcard = wildcard or any(type(item).__name__ == "XsdAnyElement" for item in declared.content.iter_elements())
-    return Complex(content, None, attributes, wildcard)
+def shape(declared: Any) -> Element:
+    """Return the content that an xmlschema element declaration allows."""
+    return _Reader().element(declared)
 
 
-def _group(declared: Any, depth: int) -> Group:
-    items: list[Element | Group] = []
-    for item in declared:
-        if hasattr(item, "model"):
-            items.append(_group(item, depth))
-        elif type(item).__name__ != "XsdAnyElement":
-            items.append(shape(item, depth + 1))
-    return Group(declared.model, tuple(items), declared.min_occurs, declared.max_occurs)
+def _is_any(declared: Any) -> bool:
+    """Return whether a particle is an xs:any, of XSD 1.0 or 1.1."""
+    return type(declared).__name__.endswith("AnyElement")
 
 
 def _simple(declared: Any) -> Simple:

@@ -34,10 +34,14 @@ class UnreachableError(Exception):
 
 
 class _Loader:
-    """Loads the content of URLs, with the credentials and deadline of the run, and of files."""
+    """Loads the content of URLs, with the deadline of the run, and of files.
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
+    Credentials go to the server of the description alone: its references may lead anywhere.
+    """
+
+    def __init__(self, connection: Connection, source: str) -> None:
+        self._connection, self._own = connection, urlsplit(source).netloc
+        self._silent: dict[str, str] = {}
 
     def __call__(self, source: str) -> bytes:
         """Return the content of a URL or file.
@@ -51,15 +55,18 @@ class _Loader:
         url = source
         for _ in range(_REDIRECTS):
             parts = urlsplit(url)
+            if parts.netloc in self._silent:
+                raise UnreachableError(f"{url}: {self._silent[parts.netloc]}")
             client = HttpClient(f"{parts.scheme}://{parts.netloc}", self._connection)
             target = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
             try:
-                response = client.send(
-                    "GET", target, headers=[("Accept", "application/json, application/yaml, */*")]
-                ).response
+                accept = ("Accept", "application/json, application/yaml, */*")
+                own = parts.netloc == self._own
+                response = client.send("GET", target, headers=[accept], authorized=own).response
             except NoAnswerError as none:
                 if none.kind is NoAnswer.CIRCUIT_OPEN:
                     raise ValueError(str(none)) from none
+                self._silent[parts.netloc] = str(none)
                 raise UnreachableError(f"{url}: {none}") from none
             finally:
                 client.close()
@@ -82,7 +89,7 @@ def fetch_description(source: str, overlays: tuple[str, ...], connection: Connec
         DescriptionError: there is no usable description.
         UnreachableError: the server does not respond.
     """
-    load = _Loader(connection)
+    load = _Loader(connection, source)
     try:
         return read_description(source, load, overlays)
     except DescriptionError as error:
@@ -137,7 +144,14 @@ def described_contract(
 
 
 def soap_contract(
-    source: str, base_url: str | None, endpoints: Endpoints, connection: Connection, out: Path, *, moves: bool = False
+    source: str,
+    base_url: str | None,
+    endpoints: Endpoints,
+    connection: Connection,
+    out: Path,
+    *,
+    schemas: Path | None = None,
+    moves: bool = False,
 ) -> tuple[Contract, Endpoints, tuple[str, ...]]:
     """Return the contract of a device's WSDL, the endpoints with its address, and remarks.
 
@@ -148,6 +162,7 @@ def soap_contract(
         endpoints: what the statement or the options say.
         connection: deadline, credentials and TLS.
         out: folder of the results, in which the pack is written.
+        schemas: folder with schemas that the WSDL's references do not lead to, or None.
         moves: whether the statement has a motion map.
 
     Raises:
@@ -158,27 +173,45 @@ def soap_contract(
     import msgspec  # noqa: PLC0415 - read already where this is used
 
     from conformance.documents.soap_services import WsdlError, base_of, moved, read_services  # noqa: PLC0415
+    from conformance.documents.wsdl_imports import SchemaFolder  # noqa: PLC0415
 
     # xmlschema and lxml take a third of a second, which other devices need not pay.
     from conformance.documents.wsdl_pack import write_soap_pack  # noqa: PLC0415
 
-    load, documents = _Loader(connection), dict[str, bytes]()
+    load, documents, named = _Loader(connection, source), dict[str, bytes](), dict[str, str]()
+    folder = SchemaFolder(schemas) if schemas else None
 
     def fetch(place: str) -> bytes:
-        documents[place] = load(place)
+        own = urlsplit(place).netloc == urlsplit(source).netloc
+        given = folder.at(place) if folder and not own else None
+        try:
+            documents[place] = load(place) if given is None else given
+        except (UnreachableError, OSError, ValueError) as error:
+            given = folder.at(place) if folder else None
+            if given is None:
+                raise ValueError(str(error)) from error
+            documents[place] = given
         return documents[place]
 
+    def locate(space: str) -> str:
+        named[space] = folder.locate(space) if folder else ""
+        return named[space]
+
+    foreign = bool(base_url) and not is_url(source)
     try:
         address = base_url if base_url and urlsplit(base_url).path.strip("/") else ""
-        found = read_services(fetch(source), source, fetch, address)
-    except (WsdlError, ValueError) as error:
+        documents[source] = load(source)
+        found = read_services(documents[source], source, fetch, address, locate, foreign=foreign)
+    except WsdlError as error:
         raise DescriptionError(str(error)) from error
+    except ValueError as error:
+        raise DescriptionError(f"{source} could not be read: {error}") from error
     base = (base_of(found) if address else base_url or endpoints.rest or base_of(found)).rstrip("/")
-    remarks = tuple(
+    elsewhere = (
         f"Port {port.name} is at {port.url}, another server, and is not called."
         for port in found.ports
         if not moved(port.url, base_of(found), base).startswith(base)
     )
-    folder = write_soap_pack(out / FOLDER, found, source, documents, address, moves=moves)
+    pack = write_soap_pack(out / FOLDER, found, source, documents, address, named=named, foreign=foreign, moves=moves)
     Contract.load.cache_clear()
-    return Contract.load(folder), msgspec.structs.replace(endpoints, rest=base), remarks
+    return Contract.load(pack), msgspec.structs.replace(endpoints, rest=base), (*elsewhere, *found.notes)

@@ -7,7 +7,7 @@ from urllib.parse import urlsplit
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.envelope import envelope
-from conformance.api.soap.messages import ordinary, simple_leaves, with_text
+from conformance.api.soap.messages import ordinary, simple_leaves, unknown_in, with_text
 from conformance.api.soap.username_token import block_of
 from conformance.documents.soap_services import SoapDescription, SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import services_of
@@ -83,6 +83,9 @@ class DescribedMessages:
                 given = self.values.get(node.at(path).name)
                 if given:
                     node = with_text(node, path, str(given[turn % len(given)]))
+            if lacking := unknown_in(declared, node):
+                fault = f"no document declares what {lacking} holds: give the folder of its schema by --schemas"
+                continue
             fault = self.found.types.invalid(parse(node.written()))
             if not fault:
                 return declared, node

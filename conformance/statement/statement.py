@@ -37,12 +37,14 @@ class Api(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         wsdl: URL or file of its WSDL, in place of `openapi`. With both, `certify` uses `openapi`; `load` compares them.
         overlays: files of OpenAPI Overlays to apply to it.
         base_url: where its operations are, in place of what the description says.
+        schemas: folder with the schemas that the WSDL imports, where their addresses do not have them.
     """
 
     openapi: Text | None = None
     overlays: tuple[Text, ...] = ()
     base_url: Text | None = None
     wsdl: Text | None = None
+    schemas: Text | None = None
 
 
 class Statement(msgspec.Struct, frozen=True):
@@ -250,6 +252,7 @@ def api_of(path: Path) -> Api:
         overlays=tuple(map(beside_it, api.overlays)),
         base_url=api.base_url,
         wsdl=beside_it(api.wsdl) if api.wsdl else None,
+        schemas=beside_it(api.schemas) if api.schemas else None,
     )
 
 

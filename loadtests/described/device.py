@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 
 #: Options, by their names in Python, that a device with a description alone has.
 DESCRIBED_ONLY = (
-    "openapi", "wsdl", "overlays", "base_url", "allow", "never", "basic_file", "digest_file", "username_token_file",
-    "api_key", "api_key_file", "headers_file", "client_cert_file", "client_key_file", "streams", "stamp_field",
-    "clock_field", "scenario",
+    "openapi", "wsdl", "schemas", "overlays", "base_url", "allow", "never", "basic_file", "digest_file",
+    "username_token_file", "api_key", "api_key_file", "headers_file", "client_cert_file", "client_key_file",
+    "streams", "stamp_field", "clock_field", "scenario",
 )  # fmt: skip
 #: The credentials in options, by their names in Python.
 CREDENTIALS = (
@@ -164,8 +164,12 @@ class Device:
         operations_of(run.contract)  # kept from now on
         return cls(api, remarks, DescribedMessages.of(api))
 
-    def beside(self, wsdl: str) -> Self:
+    def beside(self, wsdl: str, schemas: Path | None = None) -> Self:
         """Return the same device by its WSDL, with the same statement and credentials.
+
+        Args:
+            wsdl: URL or file of the WSDL.
+            schemas: folder with schemas that its references do not lead to, or None.
 
         Raises:
             SettingsError: the WSDL cannot be used.
@@ -175,7 +179,7 @@ class Device:
         where = msgspec.structs.replace(said.endpoints, rest=None)
         try:
             with TemporaryDirectory(prefix="roaas-load-") as folder:
-                contract, where, remarks = soap_contract(wsdl, None, where, connection, Path(folder))
+                contract, where, remarks = soap_contract(wsdl, None, where, connection, Path(folder), schemas=schemas)
                 statement = msgspec.structs.replace(said, endpoints=where, motion_map=None)
                 run = Run(statement=statement, contract=contract, allow_motion=self.api.run.allow_motion)
                 return self._opened(run, connection, remarks)

@@ -151,7 +151,11 @@ def _opened(named: Named, options: Mapping[str, Any]) -> tuple[Device, ...]:
         CallError: the device does not respond.
     """
     first, wanted = Device.at(named, options), set(options["interfaces"])
-    both = (first,) if named.wsdl is None or wanted == {"rest"} else (first, first.beside(named.wsdl))
+    both = (
+        (first,)
+        if named.wsdl is None or wanted == {"rest"}
+        else (first, first.beside(named.wsdl, options.get("schemas")))
+    )
     lacking = wanted - {each.interface for each in both}
     if lacking:
         kind, option = ("a WSDL", "wsdl") if "soap" in lacking else ("an OpenAPI description", "openapi")

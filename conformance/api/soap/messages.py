@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Final
 
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
@@ -11,6 +12,9 @@ from conformance.documents import xsd_lexical as lexical
 from conformance.documents.xml_names import local
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Complex, Element, Group, Simple
+
+# A schema that demands more of one element cannot be met.
+_MOST: Final = 1000
 
 
 def padded(document: bytes, octets: int) -> bytes:
@@ -45,7 +49,7 @@ def _ordinary(group: Group | None, *, optional: bool) -> tuple[Node, ...]:
 def _some(item: Element | Group, *, optional: bool) -> tuple[Node, ...]:
     count = max(item.minimum, 1 if optional and item.maximum != 0 else 0)
     made = (ordinary(item, optional=optional),) if isinstance(item, Element) else _ordinary(item, optional=optional)
-    return made * count
+    return made * min(count, _MOST)
 
 
 def filled(element: Element, values: Mapping[str, str]) -> Node:
@@ -114,3 +118,9 @@ def _is_sequence(element: Element) -> bool:
         and element.type.content.model == "sequence"
         and element.type.text is None
     )
+
+
+def unknown_in(element: Element, node: Node) -> str:
+    """Return the tag of an element in a message whose type no document declares; empty if there is none."""
+    found = [(element.tag, element)] + [(declared.tag, declared) for _, declared in declarations(element, node)]
+    return next((tag for tag, one in found if isinstance(one.type, Complex) and one.type.unknown), "")

@@ -26,6 +26,7 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
 _DEVICES = {"camera": camera, "scale": scale, "table": table}
+_SOURCE = "http://device/d.wsdl"
 _RULES = [one for one in vars(test_soap).values() if isinstance(one, Rule)]
 
 
@@ -39,8 +40,8 @@ def secret(tmp_path):
 def _judged(device, tmp_path, secret):
     """Return the requirements that a device breaks, without HTTP, and those that were judged."""
     documents = {
-        "d.wsdl": device.wsdl.replace("ADDRESS", "http://device").encode(),
-        f"{device.name}.xsd": device.xsd.encode(),
+        _SOURCE: device.wsdl.replace("ADDRESS", "http://device").encode(),
+        f"http://device/{device.name}.xsd": device.xsd.encode(),
     }
 
     def fetch(place):
@@ -48,8 +49,8 @@ def _judged(device, tmp_path, secret):
             raise ValueError("404")
         return documents[place]
 
-    found = read_services(documents["d.wsdl"], "d.wsdl", fetch)
-    contract = Contract.load(write_soap_pack(tmp_path / device.name, found, "d.wsdl", documents))
+    found = read_services(documents[_SOURCE], _SOURCE, fetch)
+    contract = Contract.load(write_soap_pack(tmp_path / device.name, found, _SOURCE, documents))
 
     def send(method, path, *, headers=(), body=b""):
         if method == "GET":

@@ -16,7 +16,8 @@ from conformance.documents.wsdl import read_file
 from conformance.documents.xml import parse
 from conformance.documents.xml_names import ENVELOPE, clark
 from conformance.documents.xml_node import Node
-from conformance.documents.xsd import SchemaDocument, Types
+from conformance.documents.xsd import Types
+from conformance.documents.xsd_assembly import SchemaDocument
 from conformance.documents.xsd_lexical import plain, unreadable
 from conformance.packs.table1.files import CONTRACT_DIR
 

@@ -1,0 +1,238 @@
+"""Schema documents written into a folder so that libxml2 and xmlschema compile them.
+
+libxml2 loads one document per imported namespace, so each namespace gets one that includes all its documents.
+"""
+
+from __future__ import annotations
+
+import os.path
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+from urllib.parse import urljoin
+
+from lxml import etree
+
+from conformance.documents.xml_names import XSD, clark
+from conformance.documents.xsd_unknown import Component, allow_anything, stand_ins
+
+_IMPORT, _INCLUDE = clark(XSD, "import"), clark(XSD, "include")
+_REDEFINE: Final = (clark(XSD, "redefine"), clark(XSD, "override"))
+_SCHEMA: Final = clark(XSD, "schema")
+# Which kind of component an attribute names; a type may be of either kind.
+_NAMED: Final = {
+    "type": "type",
+    "base": "type",
+    "itemType": "type",
+    "memberTypes": "type",
+    "substitutionGroup": "element",
+}
+_XML: Final = "http://www.w3.org/XML/1998/namespace"
+# Numbers of occurrences beyond it make libxml2's automata larger than any memory.
+_MANY: Final = 1000
+
+
+@dataclass(frozen=True)
+class SchemaDocument:
+    """One xs:schema.
+
+    Attributes:
+        location: its URL or file name; for an inline schema, that of the WSDL with a fragment.
+        root: the xs:schema element.
+        inline: whether it is inside wsdl:types.
+    """
+
+    location: str
+    root: etree._Element
+    inline: bool = False
+
+    @property
+    def namespace(self) -> str:
+        """The targetNamespace; empty without one."""
+        return self.root.get("targetNamespace") or ""
+
+    def targets(self, *tags: str) -> Iterator[str]:
+        """Yield the locations that its references of some kinds name."""
+        for reference in self.root.iterchildren(*tags):
+            if reference.get("schemaLocation"):
+                yield resolved(self.location, reference.get("schemaLocation", ""))
+
+
+@dataclass
+class Assembly:
+    """The written documents.
+
+    Attributes:
+        entry: the document that imports all others.
+        unknown: components that are referred to, and that no document declares.
+        twice: components that several documents declare, each in its own way; the first one counts.
+    """
+
+    entry: Path
+    unknown: list[Component] = field(default_factory=list)
+    twice: list[Component] = field(default_factory=list)
+
+
+def resolved(place: str, reference: str) -> str:
+    """Return a reference in a document as a location, without "." and ".."."""
+    if "://" in reference or "://" in place:
+        return urljoin(place, reference)
+    return os.path.normpath(Path(place).parent / reference)
+
+
+def assemble(documents: Sequence[SchemaDocument], folder: Path) -> Assembly:
+    """Write documents into a folder, with an entry document that imports them all."""
+    made = Assembly(folder / "entry.xsd")
+    documents = [one for one in documents if not _only_imports(one)]
+    spaces, inner = _spaces(documents), _redefined(documents)
+    # An inline schema may use prefixes that the WSDL around it declares. A copy loses them, a text has them.
+    roots = [etree.fromstring(etree.tostring(one.root, with_tail=False)) for one in documents]
+    names = {one.location: f"document{number}.xsd" for number, one in enumerate(documents)}
+    members: dict[str, list[str]] = {space: [] for one in documents for space in sorted(spaces[one.location])}
+    known: dict[Component, bytes] = {}
+    for document, root in zip(documents, roots, strict=True):
+        outer = document.location not in inner
+        for space in sorted(spaces[document.location]):
+            if outer:
+                members[space].append(names[document.location])
+            made.twice += _declare(known, root, space, drop=outer and len(spaces[document.location]) == 1)
+    for document, root in zip(documents, roots, strict=True):
+        for space in spaces[document.location]:
+            made.unknown += (one for one in _references(root, space) if one not in known and one not in made.unknown)
+    for root in roots:
+        _import(root, {one.space for one in made.unknown})
+    spaces_of = [one.namespace for one in documents]
+    allow_anything(spaces_of, roots, {one.tag for one in made.unknown if one.kind == "type"})
+    for space in dict.fromkeys(one.space for one in made.unknown):
+        name = f"unknown{len(names)}.xsd"
+        names[name] = name
+        (folder / name).write_bytes(stand_ins(space, [one for one in made.unknown if one.space == space], roots))
+        members.setdefault(space, []).append(name)
+    collected = {space: f"namespace{number}.xsd" for number, space in enumerate(sorted(members))}
+    for document, root in zip(documents, roots, strict=True):
+        _relocate(document, root, collected, names, keep=document.location in inner)
+        (folder / names[document.location]).write_bytes(etree.tostring(root))
+    made.unknown = [one for one in made.unknown if one.space != _XML]
+    for space, place in collected.items():
+        (folder / place).write_bytes(_schema_of(space, includes=members[space]))
+    imports = {space: place for space, place in collected.items() if space}
+    made.entry.write_bytes(_schema_of("", includes=members.get("", []), imports=imports))
+    return made
+
+
+def _spaces(documents: Sequence[SchemaDocument]) -> dict[str, set[str]]:
+    """Return the namespaces that each document has: one without takes those of the documents that include it."""
+    found = {one.location: {one.namespace} if one.namespace or one.inline else set() for one in documents}
+    changed = True
+    while changed:
+        changed = False
+        for document in documents:
+            for target in document.targets(_INCLUDE, *_REDEFINE):
+                new = found[document.location] - found.get(target, set())
+                if new and any(one.location == target and not one.namespace for one in documents):
+                    found[target] |= new
+                    changed = True
+    imported = {
+        resolved(one.location, reference.get("schemaLocation", ""))
+        for one in documents
+        for reference in one.root.iterchildren(_IMPORT)
+        if not reference.get("namespace") and reference.get("schemaLocation")
+    }
+    for place, spaces in found.items():
+        if not spaces or place in imported:
+            spaces.add(next(one.namespace for one in documents if one.location == place))
+    return found
+
+
+def _redefined(documents: Sequence[SchemaDocument]) -> set[str]:
+    """Return the documents that others redefine, and what those include: nothing else may include them."""
+    by_place = {one.location: one for one in documents}
+    waiting = [target for one in documents for target in one.targets(*_REDEFINE)]
+    found: set[str] = set()
+    while waiting:
+        place = waiting.pop()
+        if place in by_place and place not in found:
+            found.add(place)
+            waiting += by_place[place].targets(_INCLUDE, *_REDEFINE)
+    return found
+
+
+def _declare(known: dict[Component, bytes], root: etree._Element, space: str, *, drop: bool) -> list[Component]:
+    """Add the components that a document declares, and leave out what is there; return those that differ."""
+    differ: list[Component] = []
+    parents = [root, *root.iterchildren(*_REDEFINE)]
+    for child in [one for parent in parents for one in parent.iterchildren(etree.Element) if one.get("name")]:
+        component = Component(_kind(child.tag), space, child.get("name", ""))
+        text = etree.tostring(child, method="c14n", exclusive=True)
+        if child.getparent() is root and component in known and drop:
+            differ += [component] if known[component] != text else []
+            root.remove(child)
+        known.setdefault(component, text)
+    return differ
+
+
+def _kind(tag: str) -> str:
+    name = etree.QName(tag).localname
+    return "type" if name in {"complexType", "simpleType"} else name
+
+
+def _references(root: etree._Element, space: str) -> Iterator[Component]:
+    """Yield the components that a document refers to."""
+    for element in root.iter(etree.Element):
+        for attribute, text in element.attrib.items():
+            kind = _kind(element.tag) if attribute == "ref" else _NAMED.get(str(attribute))
+            for name in str(text).split() if kind and etree.QName(element).namespace == XSD else ():
+                prefix, _, local = name.rpartition(":")
+                given = element.nsmap.get(prefix or None) or ("" if root.get("targetNamespace") else space)
+                given = _XML if prefix == "xml" else given
+                if given != XSD and (not prefix or prefix in {"xml", *element.nsmap}):
+                    yield Component(str(kind), given, local)
+
+
+def _import(root: etree._Element, spaces: set[str]) -> None:
+    """Let a document import those of some namespaces that it refers to."""
+    own = root.get("targetNamespace") or ""
+    there = {reference.get("namespace") or "" for reference in root.iterchildren(_IMPORT)}
+    for space in sorted(({one.space for one in _references(root, own)} & spaces) - there - {own}):
+        root.insert(0, etree.Element(_IMPORT, {"namespace": space} if space else {}))
+
+
+def _relocate(
+    document: SchemaDocument,
+    root: etree._Element,
+    collected: Mapping[str, str],
+    names: Mapping[str, str],
+    *,
+    keep: bool,
+) -> None:
+    """Let a document's references name the written files; without includes, unless they are kept."""
+    for reference in [*root.iterchildren(_IMPORT, _INCLUDE, *_REDEFINE)]:
+        place = resolved(document.location, reference.get("schemaLocation", ""))
+        if reference.tag == _IMPORT:
+            reference.attrib.pop("schemaLocation", "")
+            if name := collected.get(reference.get("namespace") or ""):
+                reference.set("schemaLocation", name)
+        elif place in names and (reference.tag != _INCLUDE or keep):
+            reference.set("schemaLocation", names[place])
+        else:
+            root.remove(reference)
+    for element in root.iter(clark(XSD, "element"), clark(XSD, "any"), clark(XSD, "sequence"), clark(XSD, "choice")):
+        if (most := element.get("maxOccurs", "")).isdigit() and int(most[:9]) > _MANY:
+            element.set("maxOccurs", "unbounded")
+
+
+def _schema_of(space: str, *, includes: Sequence[str], imports: Mapping[str, str] | None = None) -> bytes:
+    root = etree.Element(_SCHEMA, {"targetNamespace": space} if space else {}, nsmap={"xs": XSD})
+    for name in includes:
+        etree.SubElement(root, _INCLUDE, schemaLocation=name)
+    for other, name in (imports or {}).items():
+        etree.SubElement(root, _IMPORT, namespace=other, schemaLocation=name)
+    return etree.tostring(root)
+
+
+def _only_imports(document: SchemaDocument) -> bool:
+    """Return whether a schema document consists of imports only, as WSDL tools write it into wsdl:types (R2105)."""
+    return not document.namespace and all(
+        child.tag == _IMPORT for child in document.root if isinstance(child.tag, str) and "annotation" not in child.tag
+    )

@@ -1,0 +1,255 @@
+"""Schemas of several documents: each way in which one may lead to another, what is missing, and what is too much."""
+
+import time
+
+import pytest
+from lxml import etree
+
+from conformance.api.soap.messages import ordinary, unknown_in
+from conformance.documents.soap_services import read_services
+from conformance.documents.wsdl_imports import SchemaFolder
+from conformance.documents.xml_names import XSD
+
+_WSDL = f"""<w:definitions xmlns:w="http://schemas.xmlsoap.org/wsdl/" xmlns:s="http://schemas.xmlsoap.org/wsdl/soap/"
+ xmlns:t="urn:t" xmlns:x="urn:x" xmlns:y="urn:y" xmlns:xs="{XSD}" targetNamespace="urn:t"><w:types>TYPES</w:types>
+<w:message name="i"><w:part name="p" element="t:Get"/></w:message>
+<w:message name="o"><w:part name="p" element="t:Got"/></w:message>
+<w:portType name="P"><w:operation name="Get">
+<w:input message="t:i"/><w:output message="t:o"/></w:operation></w:portType>
+<w:binding name="B" type="t:P"><s:binding transport="http://schemas.xmlsoap.org/soap/http"/><w:operation name="Get">
+<s:operation soapAction=""/><w:input><s:body use="literal"/></w:input><w:output><s:body use="literal"/></w:output>
+</w:operation></w:binding><w:service name="S"><w:port name="P" binding="t:B"><s:address location="http://device/soap"/>
+</w:port></w:service></w:definitions>"""
+_GET = '<xs:element name="Get"><xs:complexType/></xs:element>'
+
+
+def _schema(space, body, more=""):
+    of = f'targetNamespace="{space}"' if space else ""
+    spaces = f'xmlns:xs="{XSD}" xmlns:t="urn:t" xmlns:x="urn:x" xmlns:y="urn:y"'
+    return f'<xs:schema {spaces} {of} elementFormDefault="qualified" {more}>{body}</xs:schema>'
+
+
+def _got(content):
+    return f'{_GET}<xs:element name="Got"><xs:complexType>{content}</xs:complexType></xs:element>'
+
+
+def _value(type_):
+    return _got(f'<xs:sequence><xs:element name="v" type="{type_}"/></xs:sequence>')
+
+
+def _import(space, place=""):
+    where = f'schemaLocation="{place}"' if place else ""
+    return f'<xs:import namespace="{space}" {where}/>'
+
+
+def _read(types, files=(), source="http://device/a/b.wsdl", **how):
+    documents = dict(files)
+
+    def fetch(place):
+        if place not in documents:
+            raise ValueError("404")
+        return documents[place].encode()
+
+    return read_services(_WSDL.replace("TYPES", types).encode(), source, fetch, **how)
+
+
+def _answer(inside):
+    spaces = 'xmlns="urn:t" xmlns:x="urn:x" xmlns:y="urn:y" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance"'
+    return etree.fromstring(f"<Got {spaces}>{inside}</Got>")
+
+
+_MODE = '<xs:simpleType name="Mode"><xs:restriction base="xs:string">{}</xs:restriction></xs:simpleType>'
+_ON, _AUTO = '<xs:enumeration value="on"/>', '<xs:enumeration value="auto"/>'
+
+
+def _simple(name, base, facets=""):
+    return f'<xs:simpleType name="{name}"><xs:restriction base="{base}">{facets}</xs:restriction></xs:simpleType>'
+
+
+_DEGREES = _simple("D", "xs:double", '<xs:maxInclusive value="9"/>')
+_REDEFINED = '<xs:redefine schemaLocation="base.xsd">{}</xs:redefine>'.format(
+    _MODE.format(_ON).replace("xs:string", "t:Mode")
+)
+_BASE = {"http://device/a/base.xsd": _schema("urn:t", _MODE.format(_ON + _AUTO))}
+_WHOLE = {
+    "diamond": (
+        _schema("urn:t", _import("urn:x", "../x/x.xsd") + _import("urn:y", "../y/./y.xsd") + _value("x:T")),
+        {
+            "http://device/x/x.xsd": _schema("urn:x", _import("urn:y", "../y/y.xsd") + "" + _simple("T", "y:D")),
+            "http://device/y/y.xsd": _schema("urn:y", _DEGREES),
+        },
+    ),
+    "chameleon": (
+        _schema("urn:t", '<xs:include schemaLocation="one.xsd"/>' + _value("t:T")),
+        {
+            "http://device/a/one.xsd": _schema("", '<xs:include schemaLocation="two.xsd"/>' + _simple("T", "D")),
+            "http://device/a/two.xsd": _schema("", _DEGREES),
+        },
+    ),
+    "circle": (
+        _schema("urn:t", '<xs:include schemaLocation="one.xsd"/>' + _value("t:D")),
+        {
+            "http://device/a/one.xsd": _schema("urn:t", '<xs:include schemaLocation="two.xsd"/>'),
+            "http://device/a/two.xsd": _schema("urn:t", '<xs:include schemaLocation="one.xsd"/>' + _DEGREES),
+        },
+    ),
+    "no location": (_schema("urn:x", _DEGREES) + _schema("urn:t", _import("urn:x") + _value("x:D")), {}),
+    "two of one namespace": (_schema("urn:t", _DEGREES) + _schema("urn:t", _value("t:D")), {}),
+    "the same twice": (_schema("urn:t", _DEGREES) + _schema("urn:t", _DEGREES + _value("t:D")), {}),
+    "xml:lang": (
+        _schema(
+            "urn:t",
+            _import("http://www.w3.org/XML/1998/namespace")
+            + _DEGREES
+            + _got('<xs:sequence><xs:element name="v" type="t:D"/></xs:sequence><xs:attribute ref="xml:lang"/>'),
+        ),
+        {},
+    ),
+    "xsd 1.1": (_schema("urn:t", _simple("D", "xs:double", '<xs:assertion test="$value le 9"/>') + _value("t:D")), {}),
+}
+
+
+@pytest.mark.parametrize("name", _WHOLE)
+def test_documents_are_found_by_each_kind_of_reference(name):
+    found = _read(*_WHOLE[name])
+    assert (found.notes, [one for one in found.faults if "refused by one" not in one]) == ((), [])
+    assert not found.types.invalid(_answer("<v>9</v>"))
+    assert found.types.invalid(_answer("<v>10</v>"))
+
+
+def test_what_is_redefined_counts():
+    found = _read(_schema("urn:t", _REDEFINED + _value("t:Mode")), _BASE)
+    assert (found.faults, found.notes) == ((), ())
+    assert not found.types.invalid(_answer("<v>on</v>"))
+    assert found.types.invalid(_answer("<v>auto</v>"))
+
+
+_UNKNOWN = {
+    "type": '<xs:sequence><xs:element name="v" type="x:T"/><xs:element name="n" type="xs:int"/></xs:sequence>',
+    "element": '<xs:sequence><xs:element ref="x:e"/><xs:element name="n" type="xs:int"/></xs:sequence>',
+    "base": '<xs:complexContent><xs:extension base="x:T"><xs:sequence><xs:element name="n" type="xs:int"/>'
+    "</xs:sequence></xs:extension></xs:complexContent>",
+    "attribute": '<xs:sequence><xs:element name="n" type="xs:int"/></xs:sequence><xs:attribute name="a" type="x:A"/>',
+    "attribute group": '<xs:sequence><xs:element name="n" type="xs:int"/></xs:sequence><xs:attributeGroup ref="x:g"/>',
+    "group": '<xs:sequence><xs:element name="n" type="xs:int"/><xs:group ref="x:g"/></xs:sequence>',
+    "head": '<xs:sequence><xs:element name="n" type="xs:int"/></xs:sequence>',
+}
+_RIGHT = {
+    "type": "<v><a>1</a></v><n>1</n>",
+    "element": "<x:e><b/></x:e><n>1</n>",
+    "base": "<x:any>1</x:any><n>1</n>",
+    "group": "<n>1</n><x:a/>",
+}
+
+
+@pytest.mark.parametrize("name", _UNKNOWN)
+@pytest.mark.parametrize("place", ["", "http://www.w3.org/x.xsd"])
+def test_what_no_document_declares_counts_as_any_and_is_a_note(name, place):
+    head = '<xs:element name="h" substitutionGroup="x:e"/>' if name == "head" else ""
+    found = _read(_schema("urn:t", _import("urn:x", place) + head + _got(_UNKNOWN[name])))
+    assert found.faults == ()
+    assert len(found.notes) == 1
+    assert "--schemas" in found.notes[0]
+    right = _RIGHT.get(name, "<n>1</n>")
+    assert not found.types.invalid(_answer(right))
+    if name != "base":
+        assert found.types.invalid(_answer(right.replace("<n>1</n>", "<n>one</n>")))
+    declared = found.types.shape("{urn:t}Got")
+    assert bool(unknown_in(declared, ordinary(declared))) is (name in {"type", "element", "base"})
+
+
+def test_what_the_devices_own_server_does_not_have_is_its_fault():
+    found = _read(_schema("urn:t", _import("urn:x", "x.xsd") + _value("x:T")))
+    assert found.faults == ("http://device/a/x.xsd could not be read: 404",)
+    misspelt = _read(_schema("urn:t", _value("t:Missing")))
+    assert misspelt.faults == ("its schemas name the type {urn:t}Missing, which no document declares",)
+    differing = _read(_schema("urn:t", _DEGREES) + _schema("urn:t", _DEGREES.replace("9", "8") + _value("t:D")))
+    assert "each in its own way" in differing.faults[0]
+
+
+def test_a_folder_gives_what_references_do_not_lead_to(tmp_path):
+    types = _schema("urn:t", _import("urn:x", "http://www.example.org/x/1.0/types") + _import("urn:y") + _value("x:D"))
+    (tmp_path / "1.0").mkdir()
+    (tmp_path / "1.0" / "types.xsd").write_text(
+        _schema("urn:x", _import("urn:y") + _DEGREES.replace("xs:double", "y:E"))
+    )
+    (tmp_path / "types.xsd").write_text(_schema("urn:other", ""))
+    (tmp_path / "y.xsd").write_text(
+        _schema("urn:y", '<xs:simpleType name="E"><xs:restriction base="xs:double"/></xs:simpleType>')
+    )
+    folder = SchemaFolder(tmp_path)
+
+    def fetch(place):
+        return folder.at(place) or b""
+
+    found = read_services(_WSDL.replace("TYPES", types).encode(), "http://device/a/b.wsdl", fetch, locate=folder.locate)
+    assert (found.faults, found.notes) == ((), ())
+    assert not found.types.invalid(_answer("<v>9</v>"))
+    assert found.types.invalid(_answer("<v>10</v>"))
+    assert folder.at("http://www.example.org/nothing") is None
+
+
+@pytest.mark.parametrize("space", ["##targetNamespace", "##any"])
+def test_an_ambiguous_content_model_is_judged(space):
+    wild = f'<xs:any namespace="{space}" processContents="lax" minOccurs="0" maxOccurs="unbounded"/>'
+    many = '<xs:element name="v" type="xs:double" minOccurs="0" maxOccurs="unbounded"/>'
+    found = _read(_schema("urn:t", _got(f"<xs:sequence>{many}{wild}</xs:sequence>")))
+    assert found.faults == ()
+    assert "ambiguous" in found.notes[0]
+    for right in ("", "<v>1</v><v>2</v>", "<v>1</v><w/>", "<w/>"):
+        assert not found.types.invalid(_answer(right)), right
+    assert found.types.invalid(_answer("<v>far</v>"))
+
+
+def test_the_faults_of_a_standards_file_are_no_devices():
+    types = _schema("urn:t", _value("t:Missing"))
+    found = _read(types, source="standard.wsdl", foreign=True)
+    assert (found.faults, len(found.notes)) == ((), 1)
+
+
+_MANY = 12
+_MUTUAL = "".join(
+    f'<xs:complexType name="T{one}"><xs:sequence>'
+    + "".join(f'<xs:element name="e{other}" type="t:T{other}" minOccurs="0"/>' for other in range(_MANY))
+    + "</xs:sequence></xs:complexType>"
+    for one in range(_MANY)
+)
+_OFTEN = (
+    '<xs:sequence minOccurs="9" maxOccurs="999999999"><xs:element name="v" minOccurs="2" maxOccurs="{}"/></xs:sequence>'
+)
+_PATTERN = (
+    '<xs:simpleType name="D"><xs:restriction base="xs:string"><xs:pattern value="{}"/></xs:restriction></xs:simpleType>'
+)
+
+
+@pytest.mark.parametrize(
+    "types",
+    [
+        _MUTUAL + _value("t:T0"),
+        _got(_OFTEN.format("999999999")),
+        _got('<xs:sequence><xs:element name="v" minOccurs="999999999" maxOccurs="unbounded"/></xs:sequence>'),
+        *(
+            _simple("D", "xs:string", f'<xs:pattern value="{one}"/>') + _value("t:D")
+            for one in ("(a+)+b", "(a|aa)+b", "((a{1,99}){1,99}){1,99}b", "(.*a){20}b")
+        ),
+    ],
+)
+def test_schemas_cost_a_bounded_time(types):
+    started = time.process_time()
+    found = _read(_schema("urn:t", types))
+    found.types.invalid(_answer("<v>" + "a" * 60 + "</v>"))
+    declared = found.types.shape("{urn:t}Got")
+    assert len(ordinary(declared, optional=True).written()) < 10_000_000
+    assert time.process_time() - started < 10
+
+
+def test_entities_and_depth_are_no_way_in():
+    entity = '<!DOCTYPE w:definitions [<!ENTITY e SYSTEM "file:///etc/passwd"><!ENTITY f "x">]>'
+    wsdl = entity + _WSDL.replace(
+        "TYPES",
+        _schema(
+            "urn:t", f"<xs:annotation><xs:documentation>&e;&f;</xs:documentation></xs:annotation>{_value('xs:int')}"
+        ),
+    )
+    found = read_services(wsdl.encode(), "http://device/a.wsdl", lambda _: b"")
+    assert not found.types.invalid(_answer("<v>9</v>"))
