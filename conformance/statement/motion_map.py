@@ -52,7 +52,10 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def well_inside(self, position: float) -> float:
         """Return the position, or the nearest one that is a quarter of the range away from both limits."""
-        margin = (self.limits[1] - self.limits[0]) / 4
+        return self.within(position, margin=(self.limits[1] - self.limits[0]) / 4)
+
+    def within(self, position: float, margin: float = 0.0) -> float:
+        """Return the position, or the nearest one between the limits, with a margin."""
         return min(max(position, self.limits[0] + margin), self.limits[1] - margin)
 
 

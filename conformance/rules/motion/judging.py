@@ -89,8 +89,9 @@ def driven(drives: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
             if motion.velocity is not None
             and (one.was_kept(motion.velocity.hold_s) or not all(command.accepted for command in one.commands))
         ]
-        for one in shown:
-            yield from _driven(one, motion)
+        found = [outcome for one in shown for outcome in _driven(one, motion)]
+        cases = [one for one in found if isinstance(one, Case)]
+        yield from cases or found
         if not shown:
             yield NotTested("over this link the device was not driven on within its hold time")
 
@@ -100,7 +101,7 @@ def _driven(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
         return
     refused = next((one for one in drive.commands if not one.accepted), None)
     if refused is not None:
-        yield Case(holds=False, exchange=refused.exchange, expected=f"a 2xx for {drive.what}")
+        yield Case(holds=False, exchange=refused.exchange, expected=f"a 2xx for {drive.named}")
         return
     first = drive.commands[0]
     seen = [one for one in drive.under_way if one.sent >= first.answered + motion.velocity.settle_s]
@@ -112,7 +113,7 @@ def _driven(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
         yield Case(
             abs(found - wanted) <= motion.speed_tolerance(name),
             first.exchange,
-            f"{name} at {wanted:.4g} per second {motion.velocity.settle_s:g} s after the response ({drive.what})",
+            f"{name} at {wanted:.4g} per second {motion.velocity.settle_s:g} s after the response ({drive.named})",
             observed=f"{found:.4g}",
             cause=name,
         )
@@ -130,7 +131,7 @@ def _renewed(drive: Drive, name: str, wanted: float, motion: MotionMap) -> Itera
         yield Case(
             abs(found - wanted) <= motion.speed_tolerance(name),
             drive.commands[-1].exchange,
-            f"{name} still at {wanted:.4g} per second {hold_s:g} s after the first of several commands ({drive.what})",
+            f"{name} still at {wanted:.4g} per second {hold_s:g} s after the first of several commands ({drive.named})",
             observed=f"{found:.4g}",
             cause=f"{name} renewed",
         )

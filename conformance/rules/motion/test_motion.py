@@ -118,20 +118,25 @@ def stop_rests(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
             yield unusable
             continue
         goal, order = leg.commands[:2]
-        where = at(readings[:SEVERAL], motion)
-        soon = [one for one in readings if one.sent < readings[0].sent + _SOON_S]
-        moved = off(at(tuple(soon[-SEVERAL:]), motion), where, motion) or fastest(soon, motion)
+        where, (moved, seen) = at(readings[:SEVERAL], motion), _soon(readings, motion)
         arrived = not off(where, goal.targets, motion)
         rests_s = motion.stop.rests_within_s if motion.stop else 0.0
         yield Case(
             not moved and not arrived,
             order.exchange,
             f"rest {rests_s:g} s after {leg.what}, before the target",
-            observed=f"{moved}, {soon[-1].sent - order.sent:.2f} s after the stop"
+            observed=f"{moved}, {seen.sent - order.sent:.2f} s after the stop"
             if moved
             else f"the target reached all the same: {named(where)}",
             cause="moves" if moved else "arrived",
         )
+
+
+def _soon(readings: tuple[Reading, ...], motion: MotionMap) -> tuple[str, Reading]:
+    """Return what moves just when the device must rest, empty if nothing does, and the last reading that counts."""
+    soon = tuple(one for one in readings if one.sent < readings[0].sent + _SOON_S)
+    moved = off(at(soon[-SEVERAL:], motion), at(readings[:SEVERAL], motion), motion) or fastest(soon, motion)
+    return moved, soon[-1]
 
 
 @rule("motion/stop-lasts", on=(stops,))
@@ -141,6 +146,9 @@ def stop_lasts(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
         yield _NO_STOP
     for leg, readings, unusable in stopped(trace, motion):
         if unusable is None:
+            if _soon(readings, motion)[0]:
+                yield NotTested("the device did not come to rest in time: motion/stop")
+                continue
             where, last = at(readings[:SEVERAL], motion), at(readings[-SEVERAL:], motion)
             moved = off(last, where, motion) or fastest(readings, motion)
             after = readings[-1].sent - leg.commands[1].sent
@@ -244,15 +252,17 @@ def _of_one_driver(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
         accepted[-1].sent + (motion.velocity.hold_s or math.inf),
     )
     seen = [one for one in drive.under_way if begin <= one.sent and one.received <= end]
-    axes = motion.velocity.axes
-    found = {name: measured(seen, name, motion) for name in axes}
+    found = {name: measured(seen, name, motion) for name in motion.velocity.axes}
     speeds = {name: speed for name, speed in found.items() if speed is not None}
     if len(speeds) < len(found):
         # The hold time is too short for it, or the link too slow: positions tell enough of most devices.
         return
     fits = any(
-        # Each client drives one axis at its limit: nearer to that, or to rest, than to the other.
-        all(abs(speeds[name] - one.targets[name]) < max(axes[name].limits) / 2 for name in speeds)
+        # Each client drives one axis: nearer to its velocity, or to rest, than to the other.
+        all(
+            abs(speeds[name] - one.targets[name]) < max(abs(two.targets[name]) for two in drive.commands) / 2
+            for name in speeds
+        )
         for one in accepted
     )
     yield Case(fits, accepted[-1].exchange, "the velocity of one client", observed=named(speeds), cause="velocity")

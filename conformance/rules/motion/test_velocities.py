@@ -47,7 +47,7 @@ def stopped(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
 
 def _ended(drive: Drive, end: Command, settle_s: float, motion: MotionMap, *, excused: bool) -> Iterator[Outcome]:
     if not end.accepted:
-        yield Case(holds=False, exchange=end.exchange, expected=f"a 2xx for velocity 0 after {drive.what}")
+        yield Case(holds=False, exchange=end.exchange, expected=f"a 2xx for velocity 0 after {drive.named}")
         return
     due = must_rest_from(end, drive.readings, excused=excused) + settle_s
     moved = _at_rest([one for one in drive.after if one.sent >= due], motion)
@@ -55,7 +55,7 @@ def _ended(drive: Drive, end: Command, settle_s: float, motion: MotionMap, *, ex
         axes = motion.velocity.axes if motion.velocity else {}
         speeds = {axes[name].of: speed * axes[name].scale for name, speed in drive.wanted.items() if axes[name].of}
         moved = went_on(end, drive.readings, speeds, settle_s, motion) or moved
-    yield from _rests(moved, drive, f"rest {settle_s:g} s after velocity 0 ({drive.what})")
+    yield from _rests(moved, drive, f"rest {settle_s:g} s after velocity 0 ({drive.named})")
 
 
 def _rests(moved: str | None, drive: Drive, expected: str) -> Iterator[Outcome]:
@@ -75,7 +75,7 @@ def watchdog(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
         last, within_s = drive.commands[-1], motion.velocity.hold_s + motion.velocity.settle_s
         due = last.answered + within_s + longest_s(drive.readings)
         moved = _at_rest([one for one in drive.after if one.sent >= due], motion)
-        yield from _rests(moved, drive, f"rest {within_s:g} s after the last command ({drive.what})")
+        yield from _rests(moved, drive, f"rest {within_s:g} s after the last command ({drive.named})")
 
 
 def _held(drive: Drive, hold_s: float) -> tuple[float, float]:
@@ -105,7 +105,7 @@ def hold(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
                 yield Case(
                     found * wanted > 0 and abs(found) >= _STILL_DRIVES * abs(wanted),
                     last.exchange,
-                    f"{name} still driven {end - last.sent:.2g} s after the last command ({drive.what})",
+                    f"{name} still driven {end - last.sent:.2g} s after the last command ({drive.named})",
                     observed=f"{found:.4g} in place of {wanted:.4g} per second",
                     cause=name,
                 )

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.scenarios.motion.binding import Binding, JsonBinding, Made
+from conformance.scenarios.motion.room import Room
 from conformance.scenarios.motion.templates import NoValueError, at, filled, numbers_at, seconds_of
 from conformance.scenarios.motion.trace import SEVERAL, Command, Leg, Reading, fastest, middle_of
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
-from conformance.statement.motion_map import Goto, MotionMap, Switch, Velocity, names_in
+from conformance.statement.motion_map import Goto, MotionMap, Stop, Switch, Velocity, names_in
 from conformance.transport.exchange import Exchange
 
 #: For so long a device that has arrived is watched, s.
@@ -20,9 +22,8 @@ STAYS_S: Final = 0.3
 _PACE_S: Final = 0.02
 # The deadline of a stop, s.
 _STOP_S: Final = 2.0
-# A device that takes one move at a time may still finish the one before: it is asked again for so long, so often, s.
-_FINISHES_S: Final = 1.0
-_AGAIN_S: Final = 0.05
+# A device that takes one move at a time may still finish the one before: for so long it is asked again, so often, s.
+_FINISHES_S, _AGAIN_S = 1.0, 0.05
 # A device that takes no positions comes to rest in that time, s.
 _RESTS_S: Final = 5.0
 
@@ -40,6 +41,7 @@ class MappedDevice:
 
     Attributes:
         home: where it is brought between scenarios: near where it was at first, well within its limits.
+        room: how far its velocities take it.
 
     Raises:
         NotPossibleError: where it is cannot be read.
@@ -51,6 +53,7 @@ class MappedDevice:
     ) -> None:
         self.api, self.motion, self.clock = api, motion, clock
         self.binding: Binding = binding or JsonBinding(api)
+        self.room = Room(motion)
         self._answer: Any = None
         self._read_at = 0.0
         self.home = {name: motion.state.axes[name].well_inside(value) for name, value in self.where().items()}
@@ -94,8 +97,8 @@ class MappedDevice:
         Raises:
             NoAnswerError: there is no response.
         """
-        state, wait = self.motion.state, self._read_at + _PACE_S - self.clock.now()
-        self.clock.sleep(wait)
+        state = self.motion.state
+        self.clock.sleep(self._read_at + _PACE_S - self.clock.now())
         self._read_at = sent = self.clock.now()
         exchange, document = self.get(state.read)
         received = self.clock.now()
@@ -124,9 +127,12 @@ class MappedDevice:
         Raises:
             NoAnswerError: there is no response.
         """
-        return self.api.client.send(
+        sent = self.clock.now()
+        exchange = self.api.client.send(
             made.method, made.path, headers=made.headers, body=made.body, authorized=authorized, timeout_s=timeout_s
         )
+        self.room.slowest_s = max(self.room.slowest_s, self.clock.now() - sent)
+        return exchange
 
     def _action_state(self) -> str:
         action = self.motion.action
@@ -137,34 +143,31 @@ class MappedDevice:
         except NoValueError:
             return ""
 
-    def call_of(self, given: Goto | Velocity | Switch, values: Mapping[str, Any]) -> tuple[str, Any]:
+    def call_of(self, given: Goto | Velocity | Switch | Stop, values: Mapping[str, Any]) -> tuple[str, Any]:
         """Return call and body of a command.
 
         An axis without a value goes home, or stands still.
         """
         if isinstance(given, Goto):
             values = {**self.home, **values}
-            if given.relative:
-                here = self.where()
-                values = {
-                    name: value - here[name] if isinstance(value, int | float) else value
-                    for name, value in values.items()
-                }
-            values = {**values, "seconds": given.seconds}
+            here = self.where() if given.relative else {}
+            ways = {
+                name: value - here[name] for name, value in values.items() if isinstance(value, int | float) and here
+            }
+            values = {**values, **ways, "seconds": given.seconds}
         elif isinstance(given, Velocity):
             values = {**dict.fromkeys(given.axes, 0.0), **values}
         return filled(given.send, values, self._answer), filled(given.body, values, self._answer)
 
     def request_of(
-        self, given: Goto | Velocity | Switch, values: Mapping[str, Any], *, authorized: bool = True
+        self, given: Goto | Velocity | Switch | Stop, values: Mapping[str, Any], *, authorized: bool = True
     ) -> Made:
         """Return the request of a command; see call_of()."""
         return self.binding.made(*self.call_of(given, values), authorized=authorized)
 
-    def _command(self, given: Goto | Velocity, values: Mapping[str, float], targets: Position) -> Command:
-        made = self.request_of(given, values)
+    def _sent(self, made: Made, targets: Position, timeout_s: float | None = None) -> Command:
         sent = self.clock.now()
-        exchange = self.send(made)
+        exchange = self.send(made, timeout_s=timeout_s)
         return Command(sent, self.clock.now(), targets, exchange)
 
     def goto(self, targets: Mapping[str, float], ends: Mapping[str, float] | None = None) -> Command:
@@ -173,7 +176,7 @@ class MappedDevice:
         Raises:
             NoAnswerError: there is no response.
         """
-        command = self._command(self.moves, targets, {**self.home, **(ends or targets)})
+        command = self._sent(self.request_of(self.moves, targets), {**self.home, **(ends or targets)})
         if command.accepted:
             self.note(command.exchange)
         return command
@@ -184,7 +187,7 @@ class MappedDevice:
         Raises:
             NoAnswerError: there is no response.
         """
-        return self._command(self.drives, speeds, {**dict.fromkeys(self.drives.axes, 0.0), **speeds})
+        return self._sent(self.request_of(self.drives, speeds), {**dict.fromkeys(self.drives.axes, 0.0), **speeds})
 
     def note(self, exchange: Exchange) -> None:
         """Keep the response to an accepted move, if it can be read: a stop may name its id."""
@@ -200,14 +203,12 @@ class MappedDevice:
         if stop is None:
             return self.drive({}) if self.motion.velocity else None
         try:
-            made = self.binding.made(filled(stop.send, {}, self._answer), filled(stop.body, {}, self._answer))
+            made = self.request_of(stop, {})
         except NoValueError:
             return None
-        sent = self.clock.now()
-        exchange = self.send(made, timeout_s=max(_STOP_S, stop.rests_within_s))
-        return Command(sent, self.clock.now(), {}, exchange)
+        return self._sent(made, {}, timeout_s=max(_STOP_S, stop.rests_within_s))
 
-    def watch(self, until: float, is_over: Callable[[list[Reading]], bool] = lambda _: False) -> list[Reading]:
+    def watch(self, until: float, is_over: Callable[[list[Reading]], object] = lambda _: False) -> list[Reading]:
         """Read until a time, s of the clock, and once more after it, or until ``is_over``."""
         readings: list[Reading] = []
         while True:
@@ -215,11 +216,6 @@ class MappedDevice:
             readings.append(self.read())
             if late or is_over(readings):
                 return readings
-
-    def is_at(self, targets: Mapping[str, float], readings: list[Reading]) -> bool:
-        """Return whether the last readings show the device at a position."""
-        last = readings[-SEVERAL:]
-        return len(last) == SEVERAL and all(self.is_near(one.values, targets) for one in last)
 
     def is_near(self, here: Mapping[str, float], there: Mapping[str, float]) -> bool:
         """Return whether a position is another one, within the tolerances."""
@@ -239,15 +235,20 @@ class MappedDevice:
             raise NotPossibleError(f"{self.motion.state.read} got {came}, without numbers at {places}")
         return {name: middle_of(seen, name) for name in self.motion.state.axes}
 
-    def follow(self, command: Command) -> list[Reading]:
-        """Watch until the target of a command is reached and kept for a moment, or its time is over."""
-        seen: list[Reading] = []
+    def follow(self, command: Command, others: Sequence[Position] = ()) -> list[Reading]:
+        """Watch until the target of a command, or one of others, is reached and kept, or the command's time is over."""
+        seen, targets = list[Reading](), [command.targets, *others]
+
+        def among(ends: Sequence[Position], readings: list[Reading]) -> list[Position]:
+            last = readings[-SEVERAL:] if len(readings) >= SEVERAL else []
+            return [one for one in ends if last and all(self.is_near(reading.values, one) for reading in last)]
+
         while True:
-            seen += self.watch(self.due(command), lambda so_far: self.is_at(command.targets, so_far))
-            if self.is_at(command.targets, seen):
-                # A move with a duration lasts for that, also where the way is short.
+            seen += self.watch(self.due(command), partial(among, targets))
+            if there := among(targets, seen):
+                # A move with a duration lasts for that, also on a short way. Who only passes a target has left it then.
                 seen += self.watch(max(self.clock.now() + STAYS_S, command.answered + self._lasts_s))
-                if self.is_at(command.targets, seen):
+                if among(there, seen):
                     return seen
             if self.clock.now() > self.due(command):
                 # One reading after its time decides nothing.
@@ -291,10 +292,9 @@ class MappedDevice:
         if stop:
             self.stop()
         until = self.clock.now() + _RESTS_S
-        while True:
+        while self.clock.now() <= until:
             before = self.where()
             seen = self.watch(self.clock.now() + STAYS_S)
             if self.is_near(self.where(), before) and not fastest(seen, self.motion):
                 return
-            if self.clock.now() > until:
-                raise NotPossibleError("the device does not come to rest")
+        raise NotPossibleError("the device does not come to rest")

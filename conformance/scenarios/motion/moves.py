@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
+from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import MappedDevice, Position
 from conformance.scenarios.motion.trace import Command, Leg, Reading
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, PartialTraceError, scenario
@@ -64,7 +65,9 @@ def _to_targets(mapped: MappedDevice, effort: Effort, seed: int) -> Iterator[Leg
             yield mapped.go(f"a limit of {name}", {name: limit})
         yield mapped.go(f"{name} back", {})
     for _ in range(0 if effort.name == "quick" else effort.cases(3)):
-        yield mapped.go("all axes", {name: round(chance.uniform(*axis.limits), 3) for name, axis in axes.items()})
+        yield mapped.go(
+            "all axes", {name: axis.within(round(chance.uniform(*axis.limits), 3)) for name, axis in axes.items()}
+        )
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
@@ -151,8 +154,8 @@ def _drive_before(mapped: MappedDevice) -> None:
     velocity = mapped.motion.velocity
     if velocity is not None and velocity.hold_s is not None and velocity.hold_s <= _SHORT_HOLD_S:
         name, axis = next(iter(velocity.axes.items()))
-        mapped.come_to_rest()
-        last = mapped.drive({name: axis.limits[1] / 2})
+        half = with_room(mapped, [{name: axis.limits[1] / 2}], velocity.hold_s + velocity.settle_s)
+        last = mapped.drive(half[0])
         mapped.clock.sleep(last.answered + velocity.hold_s - mapped.clock.now())
         mapped.come_to_rest()
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Final
 
-from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice, Position
+from conformance.scenarios.motion.driving import with_room
+from conformance.scenarios.motion.mapped import MappedDevice, Position
 from conformance.scenarios.motion.moves import need_positions, recorded
-from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading
+from conformance.scenarios.motion.trace import Command, Drive, Leg
 from conformance.scenarios.motion.velocities import MEASURED_S
 from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Need, Stage
@@ -50,23 +50,17 @@ def several_clients(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
 def _of_clients(mapped: MappedDevice) -> Leg:
     mapped.bring_home()
     start, axes = mapped.where(), mapped.motion.state.axes.items()
-    several = (
-        {name: axis.limits[0] + (axis.limits[1] - axis.limits[0]) * client / (_CLIENTS - 1) for name, axis in axes}
-        for client in range(_CLIENTS)
-    )
+    # So that the last one is the limit itself, and not a little beyond it by rounding.
+    shares = [client / (_CLIENTS - 1) for client in range(_CLIENTS)]
+    several = [{name: axis.limits[0] * (1 - share) + axis.limits[1] * share for name, axis in axes} for share in shares]
     # A target where the device is already would be reached whatever becomes of the others.
     wanted = [one for one in several if not mapped.is_near(start, one)]
     commands = _at_once(mapped, mapped.moves, wanted)
     for one in commands:
         if one.accepted:
             mapped.note(one.exchange)
-    due = mapped.due(commands[-1])
-    seen = mapped.watch(due, partial(_is_at_one, mapped, wanted)) + mapped.watch(mapped.clock.now() + STAYS_S)
-    return Leg("targets of several clients", start, tuple(commands), tuple(seen), due)
-
-
-def _is_at_one(mapped: MappedDevice, wanted: list[Position], readings: list[Reading]) -> bool:
-    return any(mapped.is_at(one, readings) for one in wanted)
+    seen = mapped.follow(commands[-1], wanted)
+    return Leg("targets of several clients", start, tuple(commands), tuple(seen), mapped.due(commands[-1]))
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
@@ -85,11 +79,11 @@ def several_drivers(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
 
 
 def _of_drivers(mapped: MappedDevice, several: list[Position]) -> Drive:
-    mapped.come_to_rest()
-    commands = _at_once(mapped, mapped.drives, several)
-    hold_s, settle_s = mapped.drives.hold_s, mapped.drives.settle_s
+    settle_s = mapped.drives.settle_s
     # Nothing renews it: where the hold time is shorter than the time to settle, nothing can be measured.
-    until = commands[-1].answered + min(hold_s or settle_s + MEASURED_S, settle_s + MEASURED_S)
-    seen = mapped.watch(until)
+    lasts_s = min(mapped.drives.hold_s or settle_s + MEASURED_S, settle_s + MEASURED_S)
+    several = with_room(mapped, several, lasts_s + settle_s)
+    commands = _at_once(mapped, mapped.drives, several)
+    seen = mapped.watch(commands[-1].answered + lasts_s, lambda so_far: mapped.room.is_over(several, so_far, settle_s))
     end = mapped.drive({})
     return Drive("velocities of several clients", {}, tuple(commands), tuple(seen), end, ())

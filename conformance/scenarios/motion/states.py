@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from conformance.observe.polling import poll_for
+from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice
 from conformance.scenarios.motion.moves import recorded
 from conformance.scenarios.motion.templates import NoValueError, at, numbers_at
-from conformance.scenarios.motion.trace import SEVERAL, Switched, Told
+from conformance.scenarios.motion.trace import SEVERAL, Reading, Switched, Told
 from conformance.scenarios.scenario import NotDeclaredError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
@@ -44,19 +45,22 @@ def _told(mapped: MappedDevice) -> Iterator[Told]:
 
 def _told_of_a_drive(mapped: MappedDevice, wanted: set[str], side: int) -> Iterator[Told]:
     """Drive at all velocities at once, read them, and read them again at rest."""
-    speeds = {name: _SHARE * mapped.drives.axes[name].limits[side] for name in wanted}
-    mapped.come_to_rest()
-    last = mapped.drive(speeds)
-    until = last.answered + mapped.drives.settle_s
+    drives, requests = mapped.drives, SEVERAL * (2 + len(mapped.motion.state.agrees))
+    lasts_s = drives.settle_s + requests * mapped.room.slowest_s + (drives.hold_s or 0.0) + drives.settle_s
+    choices = [{name: _SHARE * drives.axes[name].limits[side] for name in wanted}]
+    speeds = with_room(mapped, choices, lasts_s)[0]
+    last, seen = mapped.drive(speeds), list[Reading]()
+    until = last.answered + drives.settle_s
     while mapped.clock.now() < until:
         last = mapped.drive(speeds)
-        mapped.read()
+        seen.append(mapped.read())
+    mapped.room.note(speeds, seen)
     for told in range(SEVERAL):
         last = mapped.drive(speeds) if told else last
         yield _read_all(mapped, wanted, "under way")
-    if mapped.drives.hold_s is None:
+    if drives.hold_s is None:
         mapped.drive({})
-    mapped.watch(last.answered + (mapped.drives.hold_s or 0.0) + mapped.drives.settle_s)
+    mapped.watch(last.answered + (drives.hold_s or 0.0) + drives.settle_s)
     yield from _all_told(mapped, wanted, _AT_REST)
 
 

@@ -124,6 +124,7 @@ class Drive:
         end: the command of velocity zero; None: nothing was sent any more.
         after: the readings after that.
         refused: a command after the last one that the device must refuse; None: none was sent.
+        slowed: that it was slower than planned, as the limits leave no room; empty: it was not.
     """
 
     what: str
@@ -133,6 +134,12 @@ class Drive:
     end: Command | None
     after: tuple[Reading, ...]
     refused: Command | None = None
+    slowed: str = ""
+
+    @property
+    def named(self) -> str:
+        """The drive as a noun phrase, with what it was slowed to."""
+        return self.what + self.slowed
 
     @property
     def readings(self) -> tuple[Reading, ...]:

@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
+from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import MappedDevice, Position
 from conformance.scenarios.motion.moves import TRIES, beyond, recorded
-from conformance.scenarios.motion.trace import Command, Drive, Reading
-from conformance.scenarios.scenario import NotDeclaredError, scenario
+from conformance.scenarios.motion.trace import SEVERAL, Command, Drive, Reading
+from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.verdict.effort import Effort
 
@@ -27,6 +28,8 @@ _KEPT: Final = 3
 _KEPT_S: Final = 0.1
 # After the time to rest it is watched for so long, s.
 _REST_S: Final = 0.5
+# The speed is learned from so many readings.
+_NOTED: Final = 50
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
@@ -130,31 +133,47 @@ def _drives(
         refused: velocities that the device must refuse, sent after the last command; None: none are.
         silent: whether nothing is read until the device must rest.
     """
-    wanted = {**dict.fromkeys(mapped.drives.axes, 0.0), **speeds, **(ends or {})}
+    drives, hold_s = mapped.drives, mapped.drives.hold_s or 0.0
+    lasts_s = max(drives.settle_s, hold_s if longer and hold_s <= _LONGEST_HOLD_S else 0.0) + MEASURED_S
     for _ in range(TRIES):
-        commands, readings = _kept_up(mapped, speeds, longer=longer)
-        commands += [mapped.drive(speeds) for _ in range(more)]
-        drive = Drive(what, wanted, tuple(commands), tuple(readings), None, ())
+        # What follows the last reading: velocity 0 or the hold time, and until the device rests.
+        rests_s = (let_go_s or 0.0) + more * mapped.room.slowest_s + drives.settle_s
+        made = with_room(mapped, [speeds], lasts_s + rests_s)[0]
+        if ends and made != speeds:
+            raise NotPossibleError(f"the limits leave no room for {what}")
+        slowed = "".join(f", slowed to {made[name]:.2g} for room" for name in made if made[name] != speeds[name])
+        commands, readings, whole = _kept_up(mapped, made, lasts_s, rests_s)
+        commands += [mapped.drive(made) for _ in range(more if whole else 0)]
+        wanted = {**dict.fromkeys(drives.axes, 0.0), **made, **(ends or {})}
+        drive = Drive(what, wanted, tuple(commands), tuple(readings), None, (), slowed=slowed)
+        if let_go_s is not None and not whole:
+            # The next try begins elsewhere, or is slower: this one has shown how far the device comes.
+            mapped.come_to_rest()
+            continue
         drive = _ended(mapped, drive, let_go_s, refused, silent=silent)
         yield drive
         in_time = drive.end is None or not drive.end.was_late(drive.readings)
-        if in_time and drive.was_kept(mapped.drives.hold_s):
-            break
+        if whole and in_time and drive.was_kept(drives.hold_s):
+            return
+    if let_go_s is not None and not whole:
+        raise NotPossibleError(f"the limits leave no room for {what}")
 
 
-def _kept_up(mapped: MappedDevice, speeds: Position, *, longer: bool) -> tuple[list[Command], list[Reading]]:
-    """Command velocities again and again for as long as they are measured."""
+def _kept_up(
+    mapped: MappedDevice, speeds: Position, lasts_s: float, rests_s: float
+) -> tuple[list[Command], list[Reading], bool]:
+    """Command velocities again and again for as long as they are measured; return whether there was room for that."""
     given = mapped.drives
-    mapped.come_to_rest()
     every_s = min(_KEPT_S, given.hold_s / _KEPT) if given.hold_s else _KEPT_S
     commands, readings = [mapped.drive(speeds)], list[Reading]()
-    hold_s = given.hold_s or 0.0
-    lasts_s = max(given.settle_s, hold_s if longer and hold_s <= _LONGEST_HOLD_S else 0.0) + MEASURED_S
     while mapped.clock.now() < commands[0].answered + lasts_s and commands[-1].accepted:
+        mapped.room.note(speeds, readings[-_NOTED:])
+        if mapped.room.is_over([speeds], readings, rests_s):
+            return commands, readings, False
         if mapped.clock.now() >= commands[-1].sent + every_s:
             commands.append(mapped.drive(speeds))
         readings.append(mapped.read())
-    return commands, readings
+    return commands, readings, True
 
 
 def _ended(
@@ -170,7 +189,14 @@ def _ended(
         answer = mapped.drive(refused)
     if silent:
         mapped.clock.sleep(rests_at - mapped.clock.now())
-    after += mapped.watch(rests_at + _REST_S)
+    due, speeds = rests_at + mapped.room.slowest_s, drive.wanted
+
+    def seen_enough(readings: list[Reading]) -> bool:
+        """Whether readings show that the device drives on, towards a limit."""
+        late = [one for one in readings if one.sent >= due]
+        return len(late) > 2 * SEVERAL and mapped.room.is_over([speeds], late, 0.0)
+
+    after += mapped.watch(rests_at + _REST_S, seen_enough)
     if end is None:
         mapped.stop()
     return replace(drive, end=end, after=tuple(after), refused=answer)

@@ -3,7 +3,7 @@
 from unittest.mock import patch
 
 import simulated
-from arm import Arm
+from arm import MAP, Arm
 from body import Body
 
 from conformance.observe.clock import SimulatedClock
@@ -70,7 +70,7 @@ def played(careless):
     arm = Arm(Body(simulated.LIMITS, clock.now, clock.sleep), fault=careless)
     api = _Api(arm, clock, lambda: 0.002)
     api.careless = careless
-    motion = simulated.map_of("arm")
+    motion = simulated.map_of(MAP)
     device = MappedDevice(api, motion, clock, _Binding(api))
 
     with (

@@ -76,25 +76,25 @@ def one_after_another(rounds):
     return [[one.client.send(one.method, one.path, headers=one.headers, body=one.body) for one in rounds[0]]]
 
 
-def map_of(name):
-    """Return a device's motion map."""
-    return msgspec.convert(tomllib.loads(DEVICES[name][2])["motion"], MotionMap)
+def map_of(text):
+    """Return a motion map from its TOML."""
+    return msgspec.convert(tomllib.loads(text)["motion"], MotionMap)
 
 
-def played(name, mutant=None, *, noise=0.0, seed=0, takes_s=lambda: 0.002):
-    """Yield what a device is recorded to do: scenario, trace, and what rules may ask for."""
+def played(name, mutant=None, *, noise=0.0, seed=0, takes_s=lambda: 0.002, toml=""):
+    """Yield what a device is recorded to do: scenario, trace, and what rules may ask for; ``toml``: another map."""
     device, limits, _ = DEVICES[name]
     clock = SimulatedClock()
     body = Body(limits, clock.now, clock.sleep, noise, seed)
     if mutant is not None:
         mutant(body)
-    motion = map_of(name)
+    motion = map_of(toml or DEVICES[name][2])
     api = Api(device(body), clock, takes_s)
     binding = SoapBinding(api, dome.messages_of()) if name == "dome" else None
     mapped = MappedDevice(api, motion, clock, binding)
     # Making and reading XML takes most of the time of a camera's run.
     effort = Effort("quick" if name == "dome" else "standard")
-    given = {"mapped": mapped, "effort": effort, "run": Run(seed=seed), "motion": motion}
+    given = {"mapped": mapped, "effort": effort, "run": Run(seed=seed), "motion": motion, "body": body}
     for scenario in _PLAYED:
         try:
             with patch.object(several, "send_together", one_after_another):

@@ -64,6 +64,19 @@ def test_mutants_by_rule_are_killed(name):
     assert len(survivors) <= 0.05 * len(tried), survivors
 
 
+@pytest.mark.parametrize("seconds", [1, 2, 4, 9])
+def test_a_slow_arm_that_passes_the_targets_of_other_clients_is_not_blamed(seconds):
+    # From the middle, the way to a limit leads through the targets between.
+    toml = MAP.replace("seconds = 0.5", f"seconds = {seconds}").replace("[-0.4, 0.6]", "[-0.4, 0.4]")
+    assert _failed("arm", toml=toml, noise=0.004)[0] == set()
+
+
+@pytest.mark.parametrize("mutant", ["stop-late", "stop-ignored", "stop-creeps", "stop-one-axis"])
+def test_a_stop_that_comes_late_is_one_finding(mutant):
+    failed = _failed("arm", MUTANTS["arm"][mutant])[0]
+    assert failed & {"motion/stop", "motion/stop-lasts"} == {"motion/stop"}
+
+
 def _reading(pan, sent=0.0):
     exchange = Exchange(Request("GET", "http://arm/state", (), b""), Response(200, (), b"{}", 1.0))
     return Reading(sent, sent, {} if pan is None else {"pan": pan, "tilt": 0.0}, None, exchange)

@@ -1,0 +1,92 @@
+"""Bring a device to where it has room for a drive."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from conformance.scenarios.motion.mapped import MappedDevice, Position
+from conformance.scenarios.motion.room import MEASURABLE, Span
+from conformance.scenarios.motion.trace import SEVERAL, Reading
+from conformance.scenarios.scenario import NotPossibleError
+
+# A drive back: this share of the limit, and so long at most, s.
+_BACK_SHARE: Final = 0.4
+_BACK_S: Final = 20.0
+# A slow drive shows in that time what it changes, s.
+_LEARNED_S: Final = 0.5
+
+
+def with_room(mapped: MappedDevice, choices: Sequence[Mapping[str, float]], lasts_s: float) -> list[Position]:
+    """Bring the device to rest where it can be driven at any of several velocities.
+
+    Args:
+        mapped: the device.
+        choices: velocities by name; one of them will be commanded.
+        lasts_s: from the first command until the device rests again, if every response comes at once, s.
+
+    Returns:
+        The same velocities, lower where the limits leave no room for such a drive.
+
+    Raises:
+        NotPossibleError: there is no room, or the device does not get to where it is.
+        NoAnswerError: there is no response.
+    """
+    for name in {name for one in choices for name, speed in one.items() if speed} & mapped.room.unknown:
+        _learn(mapped, name)
+    share, begin = mapped.room.plan(choices, lasts_s)
+    mapped.come_to_rest()
+    here = mapped.where()
+    away = {name: span for name, span in begin.items() if not span[0] <= here[name] <= span[1]}
+    if away and mapped.motion.goto is not None:
+        mapped.go("room for a drive", {**here, **{name: sum(span) / 2 for name, span in away.items()}})
+        mapped.come_to_rest()
+    else:
+        for axis, span in away.items():
+            _drive_back(mapped, axis, span)
+    here = mapped.where()
+    for axis, (least, greatest) in begin.items():
+        room = mapped.motion.tolerance(axis)
+        if not least - room <= here[axis] <= greatest + room:
+            raise NotPossibleError(f"the device does not get to where {axis} has room for a drive")
+    return [{name: share * speed for name, speed in one.items()} for one in choices]
+
+
+def _learn(mapped: MappedDevice, name: str) -> None:
+    """Drive slowly for a moment at a velocity of which the map does not say which axes it changes, and note these."""
+    drives, room = mapped.drives, mapped.room
+    room.unknown.discard(name)
+    speeds = {name: min(drives.axes[name].limits[1], MEASURABLE * mapped.motion.speed_tolerance(name))}
+    mapped.bring_home()
+    command, seen = mapped.drive(speeds), list[Reading]()
+    until = command.answered + drives.settle_s + _LEARNED_S
+    while command.accepted and (mapped.clock.now() < until or len(seen) < SEVERAL):
+        seen.append(mapped.read())
+        room.note(speeds, seen)
+        if room.is_over([speeds], seen, drives.settle_s):
+            break
+        command = mapped.drive(speeds)
+    mapped.drive({})
+    mapped.come_to_rest()
+
+
+def _drive_back(mapped: MappedDevice, axis: str, span: Span) -> None:
+    """Drive along an axis by velocity until the device is in a span."""
+    forward = mapped.where()[axis] < span[0]
+    speeds = [
+        {name: speed.limits[forward] * _BACK_SHARE}
+        for name, speed in mapped.drives.axes.items()
+        if speed.of == axis and speed.limits[forward]
+    ]
+    if not speeds:
+        raise NotPossibleError(f"no velocity of the map takes {axis} back to where it has room for a drive")
+    until, seen = mapped.clock.now() + _BACK_S, [mapped.read() for _ in range(SEVERAL)]
+    middle = sum(span) / 2
+    while mapped.clock.now() < until and not mapped.room.is_over(speeds, seen, mapped.drives.settle_s):
+        if not mapped.drive(speeds[0]).accepted:
+            break
+        seen.append(mapped.read())
+        if seen[-1].values and (seen[-1].values[axis] >= middle if forward else seen[-1].values[axis] <= middle):
+            break
+    mapped.drive({})
+    mapped.come_to_rest()

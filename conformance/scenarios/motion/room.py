@@ -1,0 +1,116 @@
+"""Room for a drive: a device that is given a velocity stays within the limits of its positions.
+
+A drive begins where there is room for it and ends before a limit, by the fastest speed and the slowest response seen.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from conformance.scenarios.motion.trace import LATE, SEVERAL, Reading, middle_of, usual_s
+from conformance.scenarios.scenario import NotPossibleError
+from conformance.statement.motion_map import MotionMap
+
+# Responses between the last look at the device that lets a drive go on and the moment when its end arrives: of that
+# reading, of a command, of the next reading, and of the end.
+_BLIND: Final = 3
+# Readings that are at least so far apart show how fast a device is, s.
+_APART_S: Final = 0.3
+# A drive is planned for a device that is so much faster than declared or seen: the fastest is seen under way only.
+_FASTER: Final = 1.25
+#: A velocity is not lowered to less than this many times the tolerance of its measurement.
+MEASURABLE: Final = 2.0
+
+Span = tuple[float, float]
+Speeds = Mapping[str, float]
+
+
+class Room:
+    """How far velocities take a device, and where its limits leave room for that.
+
+    Args:
+        motion: the map.
+
+    Attributes:
+        slowest_s: the slowest response so far, s.
+        unknown: velocities of which nobody knows yet which axes they change.
+    """
+
+    def __init__(self, motion: MotionMap) -> None:
+        self.slowest_s = 0.0
+        self._motion = motion
+        speeds = motion.velocity.axes if motion.velocity else {}
+        # By velocity and axis: least and greatest change per second at velocity 1.
+        self._rates: dict[str, dict[str, Span]] = {
+            name: {speed.of: (speed.scale, speed.scale)} if speed.of else {} for name, speed in speeds.items()
+        }
+        self.unknown = {name for name, speed in speeds.items() if not speed.of}
+
+    def plan(self, choices: Sequence[Speeds], lasts_s: float) -> tuple[float, dict[str, Span]]:
+        """Plan a drive at any of several velocities, until the device rests again.
+
+        Returns:
+            By how much the velocities must be multiplied, at most 1, and for each axis between which positions the
+            drive must begin.
+
+        Raises:
+            NotPossibleError: the limits leave no room for a velocity that can be measured.
+        """
+        share, ways = 1.0, dict[str, Span]()
+        for name, axis in self._motion.state.axes.items():
+            down, up = self._way(name, choices, _FASTER * (lasts_s + _BLIND * self.slowest_s))
+            if down + up > 0:
+                ways[name] = down, up
+                share = min(share, (axis.limits[1] - axis.limits[0]) / (down + up))
+        for name, speed in ((name, speed) for one in choices for name, speed in one.items() if speed):
+            if share < 1 and share * abs(speed) < MEASURABLE * self._motion.speed_tolerance(name):
+                raise NotPossibleError(
+                    f"the limits of {', '.join(ways)} leave no room to drive {name} for {lasts_s:.1f} s: the slowest "
+                    f"response took {self.slowest_s:.2f} s"
+                )
+        limits = {name: self._motion.state.axes[name].limits for name in ways}
+        begin = {
+            name: (limits[name][0] + share * down, limits[name][1] - share * up) for name, (down, up) in ways.items()
+        }
+        return share, begin
+
+    def note(self, speeds: Speeds, readings: Sequence[Reading]) -> None:
+        """Learn from the readings of a drive how fast one velocity changes each axis; of several nobody knows."""
+        driven = [(name, speed) for name, speed in speeds.items() if speed]
+        if len(driven) != 1:
+            return
+        (name, speed), late_s = driven[0], LATE * usual_s(readings)
+        seen = [one for one in readings if one.values and one.received - one.sent <= late_s]
+        for axis in self._motion.state.axes:
+            for first, last in itertools.combinations(seen, 2):
+                lapse_s = (last.sent + last.received - first.sent - first.received) / 2
+                way = last.values[axis] - first.values[axis]
+                if lapse_s >= _APART_S and abs(way) > self._motion.tolerance(axis):
+                    rate = way / lapse_s / speed
+                    least, greatest = self._rates[name].get(axis, (rate, rate))
+                    self._rates[name][axis] = min(least, rate), max(greatest, rate)
+
+    def is_over(self, choices: Sequence[Speeds], readings: Sequence[Reading], rests_s: float) -> bool:
+        """Return whether a drive has to end, as the device would pass a limit if it rested ``rests_s`` later."""
+        seen = [one for one in readings if one.values][-SEVERAL:]
+        if len(seen) < SEVERAL:
+            return False
+        for name, axis in self._motion.state.axes.items():
+            here, (down, up) = middle_of(seen, name), self._way(name, choices, rests_s + _BLIND * self.slowest_s)
+            if (down and here - down < axis.limits[0]) or (up and here + up > axis.limits[1]):
+                return True
+        return False
+
+    def _way(self, axis: str, choices: Sequence[Speeds], lasts_s: float) -> Span:
+        """Return how far an axis may go down and up."""
+        ends = [
+            sum(
+                edge([speed * rate * lasts_s for rate in self._rates[name].get(axis, (0.0,))])
+                for name, speed in one.items()
+            )
+            for one in choices
+            for edge in (min, max)
+        ]
+        return -min(0.0, *ends), max(0.0, *ends)

@@ -1,0 +1,70 @@
+"""Where a device is driven by velocity: never beyond the limits of its positions, whatever link and map."""
+
+import dome
+import pytest
+import rover
+from simulated import RULES, cases_of, played
+
+from conformance.scenarios.motion.trace import Drive
+
+
+def _without_goto(toml):
+    """Return a map of a device that takes velocities and no positions."""
+    begin, end = toml.index("[motion.goto]"), toml.index("[motion.velocity]")
+    return (
+        (toml[:begin] + toml[end:])
+        .replace('unit = "m"', "tolerance = 0.03")
+        .replace(", speed = 6 }", ", tolerance = 0.03 }")
+    )
+
+
+def _within(toml, limit):
+    clamps = 'tolerance = 0.03\nbeyond_limits = "clamped"'  # by the rover's own limits
+    return toml.replace("limits = [-0.6, 0.6]", f"limits = [-{limit}, {limit}]").replace(clamps, "tolerance = 0.03")
+
+
+_AGREES = 'agrees = { "GET /velocity" = { left = "/left" } }\n'
+_BY_POSITION = rover.MAP.replace('at = "/velocity/1"', 'of = "y"').replace(_AGREES, "")
+_MAPS = {
+    "rover": ("rover", rover.MAP),
+    "narrow": ("rover", _within(rover.MAP, 0.3)),
+    "narrow, both by position": ("rover", _within(_BY_POSITION, 0.25)),
+    "velocities only": ("rover", _without_goto(_BY_POSITION)),
+    "narrow, velocities only": ("rover", _within(_without_goto(_BY_POSITION), 0.3)),
+    "camera": ("dome", dome.MAP),
+    "camera, velocities only": ("dome", _without_goto(dome.MAP)),
+}
+
+
+@pytest.fixture
+def places(monkeypatch):
+    """Where the device was whenever it took a command or was read, by axis."""
+    found = []
+    right = rover.Body.at
+
+    def at(body, now):
+        here = right(body, now)
+        found.append(here)
+        return here
+
+    monkeypatch.setattr(rover.Body, "at", at)
+    return found
+
+
+@pytest.mark.parametrize("takes_s", [0.002, 0.08, 0.3])
+@pytest.mark.parametrize("name", _MAPS)
+def test_a_drive_ends_before_the_limits(name, takes_s, places):
+    device, toml = _MAPS[name]
+    drives, failed = 0, []
+    for scenario, trace, given in played(device, takes_s=lambda: takes_s, toml=toml):
+        axes = given["motion"].state.axes
+        drives += sum(isinstance(one, Drive) for one in trace) if isinstance(trace, tuple) else 0
+        for rule in RULES:
+            if scenario in rule.on:
+                failed.extend(one for one in cases_of(rule, trace, given) if not one.holds)
+    assert not failed
+    assert drives >= 4 or takes_s == 0.3  # over so slow a link there may be no room for any
+    for axis in axes:
+        room = 1e-6 if "clamped" in toml else given["motion"].tolerance(axis)
+        assert axes[axis].limits[0] - room <= min(one[axis] for one in places)
+        assert max(one[axis] for one in places) <= axes[axis].limits[1] + room
