@@ -11,9 +11,11 @@ import pytest
 from conformance.api.interfaces import Interfaces
 from conformance.api.rest.kept_exchanges import KeptExchanges
 from conformance.api.rest.observers import Observer
+from conformance.api.rest.references import collections_of
 from conformance.api.rest.values import Values
 from conformance.api.soap.observer import PASSIVE, SoapObserver, answers_of
 from conformance.api.soap.service import SoapService
+from conformance.documents.openapi import operations_of
 from conformance.scenarios.motion.binding import binding_of
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.other_exchanges import OtherExchanges
@@ -74,7 +76,8 @@ def kept_exchanges(run: Run, interfaces: Interfaces) -> KeptExchanges | None:
 @pytest.fixture(scope="session")
 def values(run: Run) -> Values:
     """Return the values that the run knows for parameters and bodies: the user's, and those seen in responses."""
-    return Values(run.statement.values)
+    operations = operations_of(run.contract) if run.contract.openapi_path else ()
+    return Values(run.statement.values, collections_of(operations))
 
 
 @pytest.fixture(scope="session")

@@ -5,6 +5,7 @@ A fault in one response of a hundred may meet none of the survey's requests, so 
 
 from typing import Final
 
+from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.request_context import RequestContext
 from conformance.api.rest.validity import VALID, validity
@@ -64,8 +65,11 @@ class OtherExchanges(Listener):
         hidden = any(item.required for where in ("header", "cookie") for item in operation.parameter(where))
         if not context.usual or hidden or "transfer-encoding" in names or context.accept not in _ANY_FORMAT:
             return ""
-        said = validity(contract, request.method, context.target, request.media_type, request.body)
-        return operation.label if said.verdict == VALID else ""
+        content_type = next((value for name, value in request.headers if name.lower() == "content-type"), "")
+        said = validity(contract, request.method, context.target, content_type, request.body)
+        sent = GeneratedRequest(request.method, context.target, content_type, request.body)
+        invents = self._api.values is not None and self._api.values.invents(operation, sent)
+        return operation.label if said.verdict == VALID and not invents else ""
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)

@@ -5,11 +5,14 @@ Over 300 lines because the survey and the generated requests share one surveyor.
 
 from __future__ import annotations
 
+import re
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Final
+from urllib.parse import unquote
 
 from hypothesis.errors import Unsatisfiable
 
@@ -21,8 +24,16 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.validity import UNCLEAR, Validity, validity
 from conformance.api.rest.values import Values
-from conformance.api.rest.variations import Kind, Variation, odd_variations, unknown_variations, valid_variations
+from conformance.api.rest.variations import (
+    UNKNOWN,
+    Kind,
+    Variation,
+    odd_variations,
+    unknown_variations,
+    valid_variations,
+)
 from conformance.documents.openapi import Operation, operations_of
+from conformance.documents.resources import known_path
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
@@ -46,6 +57,8 @@ _SLOW_SHARE: Final = 4
 # Statuses of an operation that is not there.
 _NOT_FOUND: Final = 404
 _NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
+# What differs between two responses to one request: times, and ids of requests.
+_VARYING: Final = re.compile(r"[0-9a-fA-F]*\d[0-9a-fA-F]*")
 # How often one request is sent again and again; and cases of Schemathesis, as many of each kind, of one operation.
 _REPEATS: Final = 200
 _FEWEST_REPEATS: Final = 60
@@ -68,6 +81,7 @@ class Probe:
         unanswered: the request without a response; None with one.
         validity: valid, invalid or unclear: the request by the description, read back as it was written.
         why: what is invalid in it.
+        invents: whether it refers to something, by an id or a cursor, that the device has not named.
     """
 
     operation: str
@@ -78,6 +92,7 @@ class Probe:
     unanswered: Unanswered | None = None
     validity: str = UNCLEAR
     why: str = ""
+    invents: bool = False
 
     @property
     def attempt(self) -> Attempt:
@@ -106,11 +121,13 @@ class Survey:
         probes: the requests.
         repeats: response times of one request that was sent again and again, ms.
         repeated: the last of these exchanges, or None.
+        elsewhere: for operations whose usual request was answered 404, a GET of a path beside it that is not described.
     """
 
     probes: tuple[Probe, ...] = ()
     repeats: tuple[float, ...] = ()
     repeated: Exchange | None = None
+    elsewhere: Mapping[str, Exchange] = field(default_factory=dict)
 
     def of(self, operation: str, *kinds: Kind) -> list[Probe]:
         """Return the probes of one operation, of these kinds or of all."""
@@ -119,12 +136,35 @@ class Survey:
     def lacks(self, operation: Operation) -> bool:
         """Return whether the device answered each usual request as if it did not have the operation.
 
-        A declared 404, or one for an identifier in the path, says that something else is not there.
+        A declared 404, or one for an identifier in the path, says that something else is not there. So does a 404 for
+        values in query or body, if others were accepted, or if a path that nobody describes is answered otherwise.
         """
+        if _has_input(operation) and any(one.ok for one in self.of(operation.label)):
+            return False
         named = bool(operation.parameter("path") or {"404", "4XX", "4xx"} & operation.responses.keys())
         absent = _NOT_THERE - {_NOT_FOUND} if named else _NOT_THERE
         usual = self.of(operation.label, Kind.USUAL)
+        unknown = self.elsewhere.get(operation.label)
+        if unknown is not None and any(one.exchange and _differ(one.exchange, unknown) for one in usual):
+            return False
         return bool(usual) and all(one.status in absent for one in usual)
+
+
+def _has_input(operation: Operation) -> bool:
+    return bool(operation.parameter("query") or operation.bodies)
+
+
+def _differ(one: Exchange, other: Exchange) -> bool:
+    """Return whether two responses differ in more than what they repeat of their requests, and in numbers."""
+    return _without_request(one) != _without_request(other)
+
+
+def _without_request(exchange: Exchange) -> tuple[int, str, str]:
+    answer, target = exchange.response, exchange.request.target
+    text = unquote(answer.body.decode("utf-8", "replace"))
+    for part in (target, *target.split("?", 1), exchange.request.method):
+        text = text.replace(unquote(part), "")
+    return answer.status, answer.media_type, _VARYING.sub("", text)
 
 
 @dataclass
@@ -136,6 +176,7 @@ class Surveyor:
     probes: list[Probe] = field(default_factory=list)
     usual: dict[str, Inputs] = field(default_factory=dict)
     given_up: set[str] = field(default_factory=set)
+    elsewhere: dict[str, Exchange] = field(default_factory=dict)
 
     def send(self, operation: Operation, variation: Variation, request: GeneratedRequest | None = None) -> Probe:
         """Send one request and record it.
@@ -164,6 +205,7 @@ class Surveyor:
             self.api.streams.add(operation.label)
         if exchange.response.ok:
             self.values.learn(operation, exchange)
+            self.values.accepted(operation, request)
         return self.probes[-1]
 
     def _described(self, operation: Operation, variation: Variation, request: GeneratedRequest) -> Probe:
@@ -172,8 +214,15 @@ class Surveyor:
             self.api.run.contract, request.method, request.target, request.content_type, request.body, request.headers
         )
         own = said if said.operation == operation else Validity(UNCLEAR)
+        invents = self.values.invents(operation, request)
         return Probe(
-            operation.label, variation.kind, variation.says, variation.place, validity=own.verdict, why=own.why
+            operation.label,
+            variation.kind,
+            variation.says,
+            variation.place,
+            validity=own.verdict,
+            why=own.why,
+            invents=invents,
         )
 
     def _recorded(self, request: GeneratedRequest, *, fresh: bool) -> Exchange:
@@ -191,6 +240,16 @@ class Surveyor:
     def record(self, probe: Probe) -> None:
         """Add a probe to the survey."""
         self.probes.append(probe)
+
+    def look_elsewhere(self, operation: Operation) -> None:
+        """Where an operation's usual requests were all answered 404, get a path beside it that is not described."""
+        usual = [one for one in self.probes if one.operation == operation.label and one.kind is Kind.USUAL]
+        if not _has_input(operation) or not usual or any(one.status != _NOT_FOUND for one in usual):
+            return
+        path = f"{operation.template.partition('{')[0].rstrip('/').rpartition('/')[0]}/{UNKNOWN}"
+        path = f"{path}/{UNKNOWN}" if known_path(self.api.run.contract, path) else path
+        with suppress(NoAnswerError):
+            self.elsewhere[operation.label] = self.api.client.send("GET", path)
 
     def begin(self, operation: Operation) -> None:
         """Find a valid request that the device accepts, and keep it as the usual one."""
@@ -299,6 +358,8 @@ def survey(api: RestInterface, values: Values) -> Survey:
         if operation.method == "GET" and operation.parameter("path") and operation.label not in surveyor.given_up:
             # What was created meanwhile has an id now.
             surveyor.begin(operation)
+    for operation in operations:
+        surveyor.look_elsewhere(operation)
     return _repeated(surveyor, operations)
 
 
@@ -321,7 +382,7 @@ def _repeated(surveyor: Surveyor, operations: list[Operation]) -> Survey:
                 surveyor.record(Probe(label, Kind.AGAIN, "", "", None, none.unanswered))
                 break
             times.append(last.response.elapsed_ms)
-    return Survey(tuple(surveyor.probes), tuple(times), last)
+    return Survey(tuple(surveyor.probes), tuple(times), last, surveyor.elsewhere)
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.DESCRIBE)

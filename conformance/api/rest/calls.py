@@ -9,8 +9,8 @@ from typing import Any
 from urllib.parse import quote
 
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.samples import sample
 from conformance.api.rest.validity import require_valid
-from conformance.api.rest.values import sample
 from conformance.documents.json_schema import Schema, kind_of
 from conformance.documents.openapi import SAFE, Operation, is_json
 from conformance.documents.parameters import Parameter

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from conformance.api.rest.generated_request import GeneratedRequest
+from conformance.api.rest.samples import sample
 from conformance.api.rest.validity import validity_by
-from conformance.api.rest.values import Values, sample
+from conformance.api.rest.values import Values
 from conformance.documents.field_reading import is_binary
 from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.documents.parameters import Parameter
@@ -141,7 +142,7 @@ def usual_inputs(operation: Operation, values: Values) -> list[Inputs]:
             base = base.having(item.where, item.name, known[0])
     bodies: list[tuple[str, Any]] = []
     for name, body in list(operation.bodies.items())[:1] if operation.bodies else []:
-        found = values.body(body.schema, body.examples)
+        found = values.body(body.schema, body.examples, operation)
         bodies = [(name, _with_files(value, body.schema, name)) for value in found]
     if bodies:
         base = replace(base, media_type=bodies[0][0], body=bodies[0][1])
@@ -160,8 +161,9 @@ def _with_files(value: Any, schema: dict[str, Any], media_type: str) -> Any:
     return {name: b"roaas" if is_binary(properties.get(name, {})) else item for name, item in value.items()}
 
 
-def whole_body(operation: Operation) -> tuple[str, Any]:
+def whole_body(operation: Operation, values: Values) -> tuple[str, Any]:
     """Return the media type and a body with all optional members; an empty media type without a body."""
     for name, body in operation.bodies.items():
-        return name, _with_files(sample(body.schema, whole=True), body.schema, name)
+        whole = values.filled(sample(body.schema, whole=True), body.schema, operation)
+        return name, _with_files(whole, body.schema, name)
     return "", NOTHING

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import Any, Final
 
 from conformance.api.rest.inputs import FORM, MULTIPART, NOTHING, Inputs, body_verdict, parameter_verdict
+from conformance.api.rest.samples import fits, sample
 from conformance.api.rest.validity import INVALID
-from conformance.api.rest.values import fits, sample
 from conformance.api.rest.variations import DEPTH, LONG, UNKNOWN, Kind, Steps, Variation, place_of, shown, with_member
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.openapi import Operation, is_json

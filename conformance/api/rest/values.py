@@ -7,39 +7,22 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from conformance.documents.json_schema import Schema, kinds_of, shape_of
+from conformance.api.rest.generated_request import GeneratedRequest
+from conformance.api.rest.references import in_link, plain_name, refers, singular, thing_of, values_in
+from conformance.api.rest.samples import backwards, fits, sample
+from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import Parameter
 from conformance.documents.representation import flat
+from conformance.documents.writing import text_of
 from conformance.transport.exchange import Exchange
 
 # As many values of one name are remembered, and as many are tried in one place.
 _REMEMBERED, _TRIED = 8, 4
 _DEPTH = 6
-_NAME = re.compile(r"[^a-z0-9]")
 #: What identifies an item of a collection, by the usual names of such members.
 IDS = ("id", "uuid", "name", "key", "slug")
-#: A value of each format that JSON Schema and OpenAPI name.
-FORMATS: Mapping[str, str] = {
-    "uuid": "3fa85f64-5717-4562-b3fc-2c963f66afa6",
-    "date-time": "2026-01-31T12:00:00Z",
-    "date": "2026-01-31",
-    "time": "12:00:00Z",
-    "duration": "PT1S",
-    "email": "someone@example.com",
-    "uri": "http://127.0.0.1/",
-    "url": "http://127.0.0.1/",
-    "hostname": "localhost",
-    "ipv4": "127.0.0.1",
-    "ipv6": "::1",
-    "byte": "AA==",
-}
-
-
-def plain_name(name: str) -> str:
-    """Return a name without case and separators, so that ``job_id`` and ``jobId`` are one."""
-    return _NAME.sub("", name.lower())
 
 
 class Values:
@@ -47,9 +30,14 @@ class Values:
 
     Args:
         given: values by the name of a parameter or member, from the user.
+        collections: names of the collections that the API has, in the singular.
     """
 
-    def __init__(self, given: Mapping[str, Sequence[Any]] | None = None) -> None:
+    def __init__(
+        self, given: Mapping[str, Sequence[Any]] | None = None, collections: frozenset[str] = frozenset()
+    ) -> None:
+        self.collections = collections
+        self._accepted: dict[str, set[str]] = defaultdict(set)
         self._given = {plain_name(name): list(values) for name, values in (given or {}).items()}
         self._seen: dict[str, list[Any]] = defaultdict(list)
         self._ids: dict[str, list[Any]] = defaultdict(list)
@@ -60,6 +48,8 @@ class Values:
         location = (response.header("location") or "").split("?", 1)[0].rstrip("/")
         if response.ok and location:
             self._remember(self._ids[operation.template.rstrip("/")], location.rsplit("/", 1)[-1])
+        for link in re.findall(r"<([^>]*)>", response.header("link") or ""):
+            self._learn_link(link)
         if not response.ok or not is_json(response.media_type):
             return
         value = read_json(response.body).value
@@ -81,10 +71,50 @@ class Values:
             for name, item in value.items():
                 if isinstance(item, str | int | float) and not isinstance(item, bool) and item != "":
                     self._remember(self._seen[plain_name(name)], item)
+                    self._learn_link(str(item))
                 self._learn(item, depth + 1)
         elif isinstance(value, list):
             for item in value[:_REMEMBERED]:
                 self._learn(item, depth + 1)
+
+    def _learn_link(self, text: str) -> None:
+        """Remember what a link carries, such as the cursor of the next page."""
+        for name, value in in_link(text):
+            self._remember(self._seen[plain_name(name)], value)
+
+    def accepted(self, operation: Operation, request: GeneratedRequest) -> None:
+        """Remember what stood in a request that the device accepted."""
+        for name, _, text in values_in(operation, request) if request.method == operation.method else ():
+            self._accepted[plain_name(name)].add(text)
+
+    def invents(self, operation: Operation, request: GeneratedRequest) -> bool:
+        """Return whether a request refers to something that the device has not named so far."""
+        return any(
+            refers(name, schema, self.collections) and not self._is_known(operation, name, schema, text)
+            for name, schema, text in values_in(operation, request)
+        )
+
+    def _is_known(self, operation: Operation, name: str, schema: Schema, text: str) -> bool:
+        plain = plain_name(name)
+        known = [*self.references(operation, name, schema), *self._given.get(plain, [])]
+        return text in self._accepted[plain] or text in map(text_of, known)
+
+    def references(self, operation: Operation, name: str, schema: Schema) -> list[Any]:
+        """Return what a reference of this name may refer to, by what the device has named; the likeliest first."""
+        items = flat(schema).get("items") if "array" in kinds_of(schema) else None
+        schema = items if isinstance(items, dict) else schema
+        plain, thing = plain_name(name), thing_of(name)
+        own = operation.template.split("/{", 1)[0].rstrip("/")
+        by_name = [value for key, values in self._seen.items() if key == plain for value in values]
+        by_end = [v for key, values in self._seen.items() if key != plain and key.endswith(plain) for v in values]
+        by_thing = [
+            value
+            for template, values in self._ids.items()
+            if thing and singular(template.rsplit("/", 1)[-1]) == thing
+            for value in values
+        ]
+        by_own = self._ids.get(own, []) if plain.endswith(("id", "uuid", "parent")) else []
+        return [value for value in _distinct([*by_name, *by_thing, *by_end, *by_own]) if fits(schema, value)]
 
     @staticmethod
     def _remember(known: list[Any], value: Any) -> None:
@@ -104,32 +134,44 @@ class Values:
         given = self._given.get(plain_name(parameter.name), [])
         named = parameter.where == "path" or plain_name(parameter.name).endswith(IDS)
         learned = self.known_ids(operation, parameter) if named else []
+        if parameter.where != "path" and refers(parameter.name, parameter.schema, self.collections):
+            learned = self.references(operation, parameter.name, parameter.schema)
+            if "array" in kinds_of(parameter.schema):
+                learned = [learned[:1]] if learned else []
         # An empty list or object is written as nothing, or as an empty text.
         made = sample(parameter.schema) or sample(parameter.schema, whole=True)
         found = [*given, *parameter.examples, *learned, made]
         return [value for value in _distinct(found) if value in given or fits(parameter.schema, value)][:_TRIED]
 
-    def body(self, schema: Schema, examples: Sequence[Any] = ()) -> list[Any]:
+    def body(self, schema: Schema, examples: Sequence[Any] = (), operation: Operation | None = None) -> list[Any]:
         """Return bodies to try, the most promising first: the examples, then two made from the schema.
 
         The first takes the first alternative of each union, the second the last one.
         """
-        made = [self._filled(sample(one), one) for one in (schema, _backwards(schema))]
+        made = [self.filled(sample(one), one, operation) for one in (schema, backwards(schema))]
         return _distinct([*(value for value in examples if not isinstance(value, str)), *made])[:_TRIED]
 
-    def _filled(self, value: Any, schema: Schema) -> Any:
+    def filled(self, value: Any, schema: Schema, operation: Operation | None = None) -> Any:
         """Return an object whose members have the values that the user gave, or that a response named."""
+        if isinstance(value, list):
+            items = flat(schema).get("items")
+            return [self.filled(item, items if isinstance(items, dict) else {}, operation) for item in value]
         if not isinstance(value, dict):
             return value
         properties = flat(schema).get("properties", {})
-        filled = {}
-        for name, item in value.items():
-            part, key = properties.get(name, {}), plain_name(name)
-            # Ids only: another member's value of the same name may be out of place.
-            seen = self._seen.get(key, []) if key.endswith(("id", "uuid")) else []
-            known = [one for one in [*self._given.get(key, []), *seen] if fits(part, one)]
-            filled[name] = known[0] if known else self._filled(item, part)
-        return filled
+        return {name: self._member(name, item, properties.get(name, {}), operation) for name, item in value.items()}
+
+    def _member(self, name: str, item: Any, schema: Schema, operation: Operation | None) -> Any:
+        given = [one for one in self._given.get(plain_name(name), []) if fits(schema, one)]
+        if given:
+            return given[0]
+        # References only: another member's value of the same name may be out of place.
+        if operation is None or not refers(name, schema, self.collections):
+            return self.filled(item, schema, operation)
+        known = self.references(operation, name, schema)
+        if isinstance(item, list):
+            return known[: len(item)] if len(known) >= len(item) else item
+        return known[0] if known else self.filled(item, schema, operation)
 
 
 def _distinct(values: Sequence[Any]) -> list[Any]:
@@ -138,119 +180,3 @@ def _distinct(values: Sequence[Any]) -> list[Any]:
         if not any(value == one and type(value) is type(one) for one in found):
             found.append(value)
     return found
-
-
-def fits(schema: Schema, value: Any) -> bool:
-    """Return whether a schema allows a value; a schema that no validator reads allows all."""
-    try:
-        return shape_of(schema).holds(value)
-    except ValueError:
-        return True
-
-
-def sample(schema: Schema, depth: int = 0, *, whole: bool = False) -> Any:
-    """Return a value that a schema allows, as far as that can be made.
-
-    Args:
-        schema: without references.
-        depth: how deep the value lies in another one.
-        whole: whether objects get their optional members too.
-    """
-    schema = flat(_not_null(schema))
-    named = [schema[key] for key in ("example", "const", "default") if key in schema]
-    named += [value for key in ("examples", "enum") if isinstance(schema.get(key), list) for value in schema[key]]
-    chosen = next((value for value in named if value is not None and fits(schema, value)), None)
-    if chosen is not None:
-        return chosen
-    kinds = kinds_of(schema)
-    if "object" in kinds:
-        return _object(schema, depth, whole=whole)
-    if "array" in kinds:
-        return _array(schema, depth, whole=whole)
-    if kinds & {"number", "integer"}:
-        return _number(schema, "integer" if "number" not in kinds else "number")
-    if kinds == {"boolean"}:
-        return True
-    return _text(schema)
-
-
-def _backwards(schema: Schema, depth: int = 0) -> Schema:
-    """Return a schema with the alternatives of its unions, and of its members' unions, in the opposite order."""
-    turned = {key: schema[key][::-1] for key in ("anyOf", "oneOf") if isinstance(schema.get(key), list)}
-    properties = schema.get("properties")
-    if isinstance(properties, dict) and depth < _DEPTH:
-        turned["properties"] = {name: _backwards(part, depth + 1) for name, part in properties.items()}
-    return {**schema, **turned}
-
-
-def _not_null(schema: Schema) -> Schema:
-    """Return a schema without the alternatives that allow only null."""
-    unions = {key: schema[key] for key in ("anyOf", "oneOf") if isinstance(schema.get(key), list)}
-    kept = {key: [part for part in parts if part.get("type") != "null"] for key, parts in unions.items()}
-    return {**schema, **{key: parts for key, parts in kept.items() if parts}}
-
-
-def _object(schema: Schema, depth: int, *, whole: bool) -> dict[str, Any]:
-    properties = schema.get("properties", {})
-    required = [name for name in schema.get("required", ()) if not properties.get(name, {}).get("readOnly")]
-    optional = [name for name in properties if name not in required and not properties[name].get("readOnly")]
-    names = required + (optional if whole else []) if depth < _DEPTH else []
-    return {name: sample(properties.get(name, {}), depth + 1, whole=whole) for name in names}
-
-
-def _array(schema: Schema, depth: int, *, whole: bool) -> list[Any]:
-    prefix = schema.get("prefixItems", [])
-    least = max(int(schema.get("minItems", 0)), 1 if whole else 0)
-    items = [sample(part, depth + 1) for part in prefix]
-    rest = schema.get("items") if isinstance(schema.get("items"), dict) else {}
-    for _ in range(min(least, schema.get("maxItems", least), 64) - len(items)):
-        item = sample(rest or {}, depth + 1)
-        items.append(_another(rest or {}, item, items) if schema.get("uniqueItems") else item)
-    return items
-
-
-def _another(schema: Schema, item: Any, others: list[Any]) -> Any:
-    """Return an item that is none of the others, as far as one can be made."""
-    number = len(others)
-    numbered = item + number if isinstance(item, int | float) else f"{item}{number}" if isinstance(item, str) else item
-    candidates = [item, *flat(schema).get("enum", ()), numbered]
-    return next((one for one in candidates if one not in others and fits(schema, one)), item)
-
-
-def _number(schema: Schema, kind: str) -> Any:
-    least, most = schema.get("minimum"), schema.get("maximum")
-    if isinstance(schema.get("exclusiveMinimum"), int | float):
-        least = schema["exclusiveMinimum"] + (1 if kind == "integer" else 1e-3)
-    if isinstance(schema.get("exclusiveMaximum"), int | float):
-        most = schema["exclusiveMaximum"] - (1 if kind == "integer" else 1e-3)
-    value = 1 if least is None and most is None else least if least is not None else min(1, most)  # type: ignore[type-var] # numbers of a schema
-    if isinstance(schema.get("multipleOf"), int | float) and value is not None:
-        step = schema["multipleOf"]
-        value = -(-value // step) * step
-    return value
-
-
-def _text(schema: Schema) -> str:
-    named = FORMATS.get(str(schema.get("format", "")))
-    if named is not None and fits(schema, named):
-        return named
-    length = max(1, int(schema.get("minLength", 1)))
-    plain = ("roaas" if length <= len("roaas") <= schema.get("maxLength", 5) else "a" * length)[: 1 << 16]
-    if "pattern" not in schema or fits(schema, plain):
-        return plain
-    return _matching(schema) or plain
-
-
-def _matching(schema: Schema) -> str:
-    """Return a short text that fits the schema's pattern, or empty."""
-    from hypothesis import find, settings  # noqa: PLC0415 - few schemas have a pattern
-    from hypothesis.errors import HypothesisException  # noqa: PLC0415 - as above
-    from hypothesis.strategies import from_regex  # noqa: PLC0415 - as above
-
-    try:
-        quiet = settings(database=None, derandomize=True, max_examples=200)
-        return find(
-            from_regex(str(schema["pattern"])), lambda text: fits(schema, text) and text.isprintable(), settings=quiet
-        )
-    except (HypothesisException, re.error, ValueError):
-        return ""

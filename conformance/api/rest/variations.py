@@ -13,8 +13,9 @@ from enum import StrEnum
 from typing import Any, Final
 
 from conformance.api.rest.inputs import NOTHING, Inputs, parameter_verdict, whole_body
+from conformance.api.rest.samples import fits, sample
 from conformance.api.rest.validity import VALID
-from conformance.api.rest.values import Values, fits, sample
+from conformance.api.rest.values import Values
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import Parameter
@@ -91,17 +92,26 @@ def valid_variations(operation: Operation, usual: Inputs, values: Values) -> Ite
             is_new = value != usual.at(item.where).get(item.name, NOTHING) and _sendable(item, value)
             if is_new and parameter_verdict(operation, item, value) == VALID:
                 yield Variation(kind, f"{shown(value)} as {place}", place, usual.having(item.where, item.name, value))
-    media_type, whole = whole_body(operation)
+    media_type, whole = whole_body(operation, values)
     if is_json(media_type) and isinstance(usual.body, dict):
         schema = operation.bodies[media_type].schema
         for example in operation.bodies[media_type].examples[:_FEW]:
             if example != usual.body and not isinstance(example, str):
                 yield Variation(Kind.EXAMPLE, "the example body", "body", replace(usual, body=example))
-        yield from _valid_members(usual, usual.body, schema, ())
+        yield from (_knowing(one, operation, values) for one in _valid_members(usual, usual.body, schema, ()))
     if whole is not NOTHING and whole != usual.body and media_type == usual.media_type:
         yield Variation(Kind.OPTIONAL, "all members of the body", "body", replace(usual, body=whole))
     for name in operation.formats[:_FEW] if len(operation.formats) > 1 else ():
         yield Variation(Kind.FORMAT, f"Accept: {name}", "header Accept", replace(usual, accept=name))
+
+
+def _knowing(variation: Variation, operation: Operation, values: Values) -> Variation:
+    """Return a variation with an optional member whose references are those that the device has named."""
+    if variation.kind is not Kind.OPTIONAL:
+        return variation
+    inputs = variation.inputs
+    filled = values.filled(inputs.body, operation.bodies[inputs.media_type].schema, operation)
+    return replace(variation, inputs=replace(inputs, body=filled))
 
 
 def _valid_values(schema: Schema, examples: Any, known: list[Any], required: bool) -> Iterator[tuple[Kind, Any]]:  # noqa: FBT001 - a column of the table

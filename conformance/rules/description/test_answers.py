@@ -30,6 +30,8 @@ _ANY_TIME = frozenset(
 )
 # ... and these, unless the request was the operation's usual one.
 _OF_REQUEST = frozenset({405, 406, 415, 501})
+# By these a device says that it does not know what a request refers to.
+_NO_SUCH_THING = frozenset({400, 404, 409, 422})
 # Of these, HTTP knows these only as responses to requests with one of these fields (RFC 9110 13, 14).
 _ASKED_FOR = frozenset({206, 304})
 _ASKING = frozenset({"range", "if-range", "if-match", "if-none-match", "if-modified-since", "if-unmodified-since"})
@@ -61,6 +63,8 @@ def _in_question(probe: Probe, status: int) -> bool:
     if status in _ASKED_FOR:
         names = {name.lower() for name, _ in probe.exchange.request.headers} if probe.exchange else _ASKING
         return not names & _ASKING
+    if probe.invents and status in _NO_SUCH_THING:
+        return False
     if status == _BAD_REQUEST and (probe.kind is Kind.MALFORMED or _is_unreadable(probe)):
         return False  # any server may say so of content that it cannot read (RFC 9110 15.5.1)
     return status not in _ANY_TIME and (probe.kind in _PLAIN or status not in _OF_REQUEST)

@@ -81,7 +81,7 @@ def optional(trace: Survey) -> Iterable[Outcome]:
     for label in {one.operation: None for one in trace.probes}:
         least = trace.of(label, Kind.USUAL)
         more = [one for one in trace.of(label, Kind.OPTIONAL) if one.ok]
-        refused = [one for one in least if one.status in _REFUSED]
+        refused = [one for one in least if one.status in _REFUSED and not one.invents]
 
         def fault(
             probe: Probe, refused: list[Probe] = refused, least: list[Probe] = least, more: list[Probe] = more
@@ -126,7 +126,7 @@ def valid_accepted(trace: Survey) -> Iterable[Outcome]:
             return None
         return Fault(f"{probe.operation} {probe.status}", _refusal(probe.exchange))
 
-    valid = [one for one in generated if one.validity == VALID]
+    valid = [one for one in generated if one.validity == VALID and not one.invents]
     yield from told_once(valid, "a request that the description allows accepted", fault)
 
 
@@ -134,7 +134,8 @@ def _accepted(trace: Survey, kinds: tuple[Kind, ...], expected: str, *, anyway: 
     """Yield whether valid requests are accepted; unless ``anyway``, of operations whose usual request is."""
     works = {one.operation for one in trace.probes if one.kind is Kind.USUAL and one.ok}
     sent = [one for one in trace.probes if one.kind in kinds and one.exchange and one.validity != INVALID]
-    probes = [one for one in sent if anyway or one.operation in works]
+    # Nobody but the device knows which ids and cursors there are.
+    probes = [one for one in sent if (anyway or one.operation in works) and not one.invents]
 
     def fault(probe: Probe) -> Fault | None:
         if probe.status not in _REFUSED:

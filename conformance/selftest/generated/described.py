@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from conformance.api.rest.values import sample
+from conformance.api.rest.samples import sample
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.mutation.messages import Change, Request, Response

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
-from conformance.api.rest.values import sample
+from conformance.api.rest.samples import sample
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.openapi import Operation, is_json
 from conformance.mutation.messages import Change, Forward, Request, Response

@@ -6,7 +6,8 @@ import pytest
 
 from conformance.api.rest.inputs import NOTHING, Inputs, usual_inputs, written
 from conformance.api.rest.invalid_variations import invalid_variations
-from conformance.api.rest.values import Values, fits
+from conformance.api.rest.samples import fits
+from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, odd_variations, unknown_variations, valid_variations
 from conformance.documents.openapi import read_operations
 

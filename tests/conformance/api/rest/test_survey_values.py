@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from conformance.api.rest.values import Values, fits, sample
+from conformance.api.rest.samples import fits, sample
+from conformance.api.rest.values import Values
 from conformance.documents.json_schema import modern
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import Parameter

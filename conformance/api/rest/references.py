@@ -1,0 +1,135 @@
+"""References to what a device has: ids, cursors and names of other resources, which a client cannot invent."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from typing import Any, Final
+from urllib.parse import parse_qsl, urlsplit
+
+from conformance.api.rest.generated_request import GeneratedRequest
+from conformance.documents.field_reading import pairs_of
+from conformance.documents.json_schema import Schema, kinds_of
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation, is_json
+from conformance.documents.parameter_reading import decoded_query
+from conformance.documents.representation import flat
+from conformance.documents.writing import text_of
+
+_NO_LETTER: Final = re.compile(r"[^a-z0-9]")
+# How the names of references end: what they identify, or where a list goes on.
+_ENDS: Final = ("id", "ids", "uuid", "guid", "cursor", "token", "reference", "href", "parent", "etag")
+# Whole names of the same kind, which are also the ends of other words.
+_WHOLE: Final = frozenset({"ref", "slug", "key", "after", "before", "since", "next", "previous", "startafter"})
+# Words that end like these, and identify nothing.
+_NO_REFERENCES: Final = frozenset(
+    [
+        "acid",
+        "android",
+        "avoid",
+        "bid",
+        "centroid",
+        "cuboid",
+        "ellipsoid",
+        "fluid",
+        "grid",
+        "humid",
+        "hybrid",
+        "invalid",
+        "lid",
+        "liquid",
+        "paid",
+        "pyramid",
+        "rapid",
+        "solenoid",
+        "solid",
+        "transparent",
+        "valid",
+        "void",
+    ]
+)
+_WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+_FORM: Final = "application/x-www-form-urlencoded"
+_DEPTH: Final = 6
+
+
+def plain_name(name: str) -> str:
+    """Return a name without case and separators, so that ``job_id`` and ``jobId`` are one."""
+    return _NO_LETTER.sub("", name.lower())
+
+
+def collections_of(operations: Iterable[Operation]) -> frozenset[str]:
+    """Return the plain names of the collections whose items an API has paths for, in the singular."""
+    templates = {item.template for item in operations}
+    found = {before for template in templates for before in re.findall(r"([^/{}]+)/\{", template)}
+    return frozenset(singular(name) for name in found)
+
+
+def singular(name: str) -> str:
+    """Return the plain name of one item of a collection: ``valve`` for ``Valves``."""
+    plain = plain_name(name)
+    if plain.endswith("ies"):
+        return f"{plain[:-3]}y"
+    return plain[:-1] if plain.endswith("s") and not plain.endswith("ss") else plain
+
+
+def thing_of(name: str) -> str:
+    """Return the plain name of what a reference refers to: ``valve`` for ``valve_id``; empty for ``id``."""
+    plain = plain_name(name)
+    end = next((end for end in ("ids", "uuid", "guid", "id", "name", "ref") if plain.endswith(end)), "")
+    return singular(plain.removesuffix(end))
+
+
+def refers(name: str, schema: Schema, collections: frozenset[str]) -> bool:
+    """Return whether a parameter or member refers to something that the device has to know."""
+    kinds = kinds_of(schema) or {"string"}
+    given = flat(schema)
+    if not kinds & {"string", "integer", "array"} or "enum" in given or "const" in given:
+        return False
+    plain = plain_name(name)
+    last = (_WORD.findall(name) or [""])[-1].lower()
+    ends = last.endswith(_ENDS) and last not in _NO_REFERENCES
+    return ends or plain in _WHOLE or given.get("format") == "uuid" or thing_of(name) in collections
+
+
+def values_in(operation: Operation, request: GeneratedRequest) -> Iterator[tuple[str, Schema, str]]:
+    """Yield name, schema and text of each scalar in the query and body of a request."""
+    schemas = {item.name: item.schema for item in operation.parameter("query")}
+    yield from _fields(schemas, request.target.partition("?")[2])
+    body = operation.bodies.get(request.media_type)
+    if body is None:
+        return
+    if is_json(request.media_type):
+        yield from _scalars("", body.schema, read_json(request.body).value, 0)
+    elif request.media_type == _FORM:
+        yield from _fields(flat(body.schema).get("properties", {}), request.body.decode("latin-1"))
+
+
+def _fields(schemas: dict[str, Schema], text: str) -> Iterator[tuple[str, Schema, str]]:
+    try:
+        pairs = [(name, decoded_query(value)) for name, value in pairs_of(text)]
+    except ValueError:
+        return
+    for name, value in pairs:
+        parts = value.split(",") if "array" in kinds_of(schemas.get(name, {})) else [value]
+        yield from ((name, schemas.get(name, {}), part) for part in parts)
+
+
+def _scalars(name: str, schema: Schema, value: Any, depth: int) -> Iterator[tuple[str, Schema, str]]:
+    if depth > _DEPTH:
+        return
+    if isinstance(value, dict):
+        properties = flat(schema).get("properties", {})
+        for member, item in value.items():
+            yield from _scalars(member, properties.get(member, {}), item, depth + 1)
+    elif isinstance(value, list):
+        items = flat(schema).get("items", {})
+        for item in value:
+            yield from _scalars(name, items if isinstance(items, dict) else {}, item, depth + 1)
+    elif isinstance(value, str | int) and not isinstance(value, bool):
+        yield name, schema, text_of(value)
+
+
+def in_link(text: str) -> list[tuple[str, str]]:
+    """Return the names and values in the query of a link; empty if a text is none."""
+    return parse_qsl(urlsplit(text).query) if "?" in text and "=" in text else []

@@ -1,0 +1,143 @@
+"""Values that a schema allows, made from the schema alone."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from conformance.documents.json_schema import Schema, kinds_of, shape_of
+from conformance.documents.representation import flat
+
+_DEPTH = 6
+#: A value of each format that JSON Schema and OpenAPI name.
+FORMATS: Mapping[str, str] = {
+    "uuid": "3fa85f64-5717-4562-b3fc-2c963f66afa6",
+    "date-time": "2026-01-31T12:00:00Z",
+    "date": "2026-01-31",
+    "time": "12:00:00Z",
+    "duration": "PT1S",
+    "email": "someone@example.com",
+    "uri": "http://127.0.0.1/",
+    "url": "http://127.0.0.1/",
+    "hostname": "localhost",
+    "ipv4": "127.0.0.1",
+    "ipv6": "::1",
+    "byte": "AA==",
+}
+
+
+def fits(schema: Schema, value: Any) -> bool:
+    """Return whether a schema allows a value; a schema that no validator reads allows all."""
+    try:
+        return shape_of(schema).holds(value)
+    except ValueError:
+        return True
+
+
+def sample(schema: Schema, depth: int = 0, *, whole: bool = False) -> Any:
+    """Return a value that a schema allows, as far as that can be made.
+
+    Args:
+        schema: without references.
+        depth: how deep the value lies in another one.
+        whole: whether objects get their optional members too.
+    """
+    schema = flat(_not_null(schema))
+    named = [schema[key] for key in ("example", "const", "default") if key in schema]
+    named += [value for key in ("examples", "enum") if isinstance(schema.get(key), list) for value in schema[key]]
+    chosen = next((value for value in named if value is not None and fits(schema, value)), None)
+    if chosen is not None:
+        return chosen
+    kinds = kinds_of(schema)
+    if "object" in kinds:
+        return _object(schema, depth, whole=whole)
+    if "array" in kinds:
+        return _array(schema, depth, whole=whole)
+    if kinds & {"number", "integer"}:
+        return _number(schema, "integer" if "number" not in kinds else "number")
+    if kinds == {"boolean"}:
+        return True
+    return _text(schema)
+
+
+def backwards(schema: Schema, depth: int = 0) -> Schema:
+    """Return a schema with the alternatives of its unions, and of its members' unions, in the opposite order."""
+    turned = {key: schema[key][::-1] for key in ("anyOf", "oneOf") if isinstance(schema.get(key), list)}
+    properties = schema.get("properties")
+    if isinstance(properties, dict) and depth < _DEPTH:
+        turned["properties"] = {name: backwards(part, depth + 1) for name, part in properties.items()}
+    return {**schema, **turned}
+
+
+def _not_null(schema: Schema) -> Schema:
+    """Return a schema without the alternatives that allow only null."""
+    unions = {key: schema[key] for key in ("anyOf", "oneOf") if isinstance(schema.get(key), list)}
+    kept = {key: [part for part in parts if part.get("type") != "null"] for key, parts in unions.items()}
+    return {**schema, **{key: parts for key, parts in kept.items() if parts}}
+
+
+def _object(schema: Schema, depth: int, *, whole: bool) -> dict[str, Any]:
+    properties = schema.get("properties", {})
+    required = [name for name in schema.get("required", ()) if not properties.get(name, {}).get("readOnly")]
+    optional = [name for name in properties if name not in required and not properties[name].get("readOnly")]
+    names = required + (optional if whole else []) if depth < _DEPTH else []
+    return {name: sample(properties.get(name, {}), depth + 1, whole=whole) for name in names}
+
+
+def _array(schema: Schema, depth: int, *, whole: bool) -> list[Any]:
+    prefix = schema.get("prefixItems", [])
+    least = max(int(schema.get("minItems", 0)), 1 if whole else 0)
+    items = [sample(part, depth + 1) for part in prefix]
+    rest = schema.get("items") if isinstance(schema.get("items"), dict) else {}
+    for _ in range(min(least, schema.get("maxItems", least), 64) - len(items)):
+        item = sample(rest or {}, depth + 1)
+        items.append(_another(rest or {}, item, items) if schema.get("uniqueItems") else item)
+    return items
+
+
+def _another(schema: Schema, item: Any, others: list[Any]) -> Any:
+    """Return an item that is none of the others, as far as one can be made."""
+    number = len(others)
+    numbered = item + number if isinstance(item, int | float) else f"{item}{number}" if isinstance(item, str) else item
+    candidates = [item, *flat(schema).get("enum", ()), numbered]
+    return next((one for one in candidates if one not in others and fits(schema, one)), item)
+
+
+def _number(schema: Schema, kind: str) -> Any:
+    least, most = schema.get("minimum"), schema.get("maximum")
+    if isinstance(schema.get("exclusiveMinimum"), int | float):
+        least = schema["exclusiveMinimum"] + (1 if kind == "integer" else 1e-3)
+    if isinstance(schema.get("exclusiveMaximum"), int | float):
+        most = schema["exclusiveMaximum"] - (1 if kind == "integer" else 1e-3)
+    value = 1 if least is None and most is None else least if least is not None else min(1, most)  # type: ignore[type-var] # numbers of a schema
+    if isinstance(schema.get("multipleOf"), int | float) and value is not None:
+        step = schema["multipleOf"]
+        value = -(-value // step) * step
+    return value
+
+
+def _text(schema: Schema) -> str:
+    named = FORMATS.get(str(schema.get("format", "")))
+    if named is not None and fits(schema, named):
+        return named
+    length = max(1, int(schema.get("minLength", 1)))
+    plain = ("roaas" if length <= len("roaas") <= schema.get("maxLength", 5) else "a" * length)[: 1 << 16]
+    if "pattern" not in schema or fits(schema, plain):
+        return plain
+    return _matching(schema) or plain
+
+
+def _matching(schema: Schema) -> str:
+    """Return a short text that fits the schema's pattern, or empty."""
+    from hypothesis import find, settings  # noqa: PLC0415 - few schemas have a pattern
+    from hypothesis.errors import HypothesisException  # noqa: PLC0415 - as above
+    from hypothesis.strategies import from_regex  # noqa: PLC0415 - as above
+
+    try:
+        quiet = settings(database=None, derandomize=True, max_examples=200)
+        return find(
+            from_regex(str(schema["pattern"])), lambda text: fits(schema, text) and text.isprintable(), settings=quiet
+        )
+    except (HypothesisException, re.error, ValueError):
+        return ""

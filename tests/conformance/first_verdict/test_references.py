@@ -1,0 +1,112 @@
+"""Ids, cursors and names of other resources are the device's: a refusal of an invented one is no fault."""
+
+import json
+
+import pytest
+from aiohttp import web
+from small_device import REFUSED, answers, certified, constant, described, error, reading, small_device
+
+_TEXT = {"type": "string"}
+_ID = {"name": "id", "in": "path", "required": True, "schema": _TEXT}
+_VALVES = [{"id": "v-17", "open": True}, {"id": "v-18", "open": False}]
+
+
+def _query(*names, required=True):
+    return [{"name": name, "in": "query", "required": required, "schema": _TEXT} for name in names]
+
+
+def _taking(properties, required, status="201"):
+    schema = {"type": "object", "required": required, "properties": properties}
+    body = {"required": True, "content": {"application/json": {"schema": schema}}}
+    return {"post": {"requestBody": body, "responses": {status: answers({"type": "object"}), "400": REFUSED}}}
+
+
+_PATHS = {
+    "/valves": reading({"type": "array"}),
+    "/valves/{id}": reading(
+        {"type": "object"}, parameters=[{"name": "id", "in": "path", "required": True, "schema": _TEXT}]
+    ),
+    "/openings": _taking({"valve": _TEXT, "share": {"type": "integer", "minimum": 0}}, ["valve"]),
+    "/events": reading({"type": "object"}, parameters=_query("cursor", required=False)),
+    "/frames": {**reading({"type": "array"}), **_taking({"name": _TEXT, "parent_id": _TEXT}, ["name"])},
+    "/scan": {
+        "get": {"parameters": _query("session_id"), "responses": {"200": answers({"type": "object"}), "400": REFUSED}}
+    },
+}
+
+
+async def _object(request, name):
+    """Return the JSON object of a request, in which this member is a text; None for any other content."""
+    try:
+        given = json.loads(await request.text()) if request.content_type == "application/json" else None
+        return given if isinstance(given[name], str) else None
+    except (ValueError, KeyError, TypeError):
+        return None
+
+
+async def _valve(request):
+    found = [one for one in _VALVES if one["id"] == request.match_info["id"]]
+    return web.json_response(found[0]) if found else error(404, "no such valve")
+
+
+async def _opening(request):
+    given = await _object(request, "valve")
+    share = (given or {}).get("share", 1)
+    if given is None or type(share) is not int or share < 0:
+        return error(400, "not a valid opening")
+    if given["valve"] not in {one["id"] for one in _VALVES}:
+        return error(422, f"no valve {given['valve']}")
+    return web.json_response({}, status=201)
+
+
+async def _events(request):
+    right = request.query.getall("cursor", ["c-0"]) in (["c-0"], ["c-1"])
+    return web.json_response({"next": "/events?cursor=c-1"}) if right else error(400, "no such cursor")
+
+
+async def _scan(request):
+    session = request.query.get("session_id")
+    return error(400, "no session") if session is None else error(404, f"no session {session}")
+
+
+def _device():
+    frames = {}
+
+    async def frame(request):
+        given = await _object(request, "name")
+        if given is None or not isinstance(given.get("parent_id", ""), str):
+            return error(400, "not a valid frame")
+        if given.get("parent_id") not in {None, *frames}:
+            return error(409, "no such parent")
+        id_ = f"f-{len(frames)}"
+        frames[id_] = given
+        return web.json_response({"id": id_}, status=201)
+
+    async def all_frames(_):
+        return web.json_response([{"id": id_} for id_ in frames])
+
+    return {
+        "/valves": constant(_VALVES),
+        "/valves/{id}": {"GET": _valve},
+        "/openings": {"POST": _opening},
+        "/events": {"GET": _events},
+        "/frames": {"GET": all_frames, "POST": frame},
+        "/scan": {"GET": _scan},
+    }
+
+
+@pytest.mark.parametrize("effort", ["quick", "standard"])
+def test_what_the_device_named_is_used_and_what_is_invented_may_be_refused(tmp_path, effort):
+    with small_device(described(_PATHS), _device()) as url:
+        seen = certified(f"{url}/openapi.json", tmp_path / "out", "--call", "*", effort=effort)
+    assert seen.blamed == {}
+    counts = {one["operation"]: one["statuses"] for one in seen.result["api"]["operations"]}
+    assert counts["POST /openings"].get("201")
+    assert counts["POST /frames"].get("201")
+
+
+def test_an_operation_whose_404_is_that_of_any_path_is_missing(tmp_path):
+    routes = {path: methods for path, methods in _device().items() if path != "/scan"}
+    with small_device(described(_PATHS), routes) as url:
+        seen = certified(f"{url}/openapi.json", tmp_path / "out")
+    assert seen.blamed["description/operations"] == "fail"
