@@ -17,6 +17,8 @@ UNRESOLVED_NAME: Final = "unresolved.json"
 TITLE: Final = "its own description"
 #: The class that a motion map claims.
 MOTION: Final = "motion"
+#: The class of a device that is known by its WSDL.
+SOAP: Final = "soap"
 _CLASSES: Final = ("description", "robustness", "http")
 # The class `description` judges these of each operation, and tells what operations have in common once.
 _WITHOUT: Final = ("http/declared-status", "http/declared-body", "http/json-integers", "http/no-traceback")

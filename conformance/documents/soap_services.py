@@ -13,6 +13,7 @@ from urllib.parse import urlsplit
 
 from lxml import etree
 
+from conformance.documents.addressing import addressing_action, wants_addressing
 from conformance.documents.wsdl_gaps import gaps
 from conformance.documents.wsdl_imports import Fetch, Locate, collect
 from conformance.documents.xml_names import ENVELOPE, WSDL, WSDL_SOAP, XSD, clark, namespace
@@ -39,6 +40,8 @@ class SoapOperation:
         request: tag of the request's element, in Clark notation; empty: the Body is empty.
         response: tag of the response's element; None for a one-way operation.
         remark: why it cannot be called, or empty.
+        headers: tags of the header blocks that its messages have (WSDL 1.1, 3.7).
+        addressed: the WS-Addressing action, if its messages must have WS-Addressing's header blocks; else empty.
     """
 
     name: str
@@ -46,6 +49,8 @@ class SoapOperation:
     request: str
     response: str | None
     remark: str = ""
+    headers: tuple[str, ...] = ()
+    addressed: str = ""
 
 
 @dataclass(frozen=True)
@@ -174,18 +179,25 @@ class _Reader:
             service = port.getparent()
             if binding is not None:
                 of = service.get("name", "") if service is not None else ""
-                yield from self._port(binding, of, port.get("name", ""), url)
+                yield from self._port(binding, of, port.get("name", ""), url, port)
 
     def bindings(self, address: str) -> Iterator[SoapPort]:
         """Yield each SOAP binding as a port at an address."""
         for binding in self._all("w:binding"):
             yield from self._port(binding, "", binding.get("name", ""), address)
 
-    def _port(self, binding: etree._Element, service: str, name: str, url: str) -> Iterator[SoapPort]:
+    def _port(
+        self, binding: etree._Element, service: str, name: str, url: str, port: etree._Element | None = None
+    ) -> Iterator[SoapPort]:
         soap, kind = _soap(binding, "binding"), self._named("w:portType", binding, "type")
         if soap is not None and kind is not None:
             envelope = _SPACES[etree.QName(soap).namespace or ""]
-            yield SoapPort(service, name, url, envelope, tuple(self._operations(binding, soap, kind)))
+            operations = tuple(self._operations(binding, soap, kind))
+            if not wants_addressing(
+                [binding, *([] if port is None else [port])], self._all("//*[local-name()='Policy']")
+            ):
+                operations = tuple(replace(one, addressed="") for one in operations)
+            yield SoapPort(service, name, url, envelope, operations)
 
     def _operations(
         self, binding: etree._Element, soap: etree._Element, kind: etree._Element
@@ -211,7 +223,19 @@ class _Reader:
                     break
                 tags[way] = self._tag(message, style, name if way == "input" else f"{name}Response", body)
             action = (own.get("soapAction") if own is not None else None) or ""
-            yield SoapOperation(name, action, tags.get("input", ""), tags.get("output"), remark)
+            headers = tuple(self._headers(bound))
+            addressed = addressing_action(declared, kind, action)
+            yield SoapOperation(name, action, tags.get("input", ""), tags.get("output"), remark, headers, addressed)
+
+    def _headers(self, bound: etree._Element) -> Iterator[str]:
+        """Yield the tags of the header blocks of a request (WSDL 1.1, 3.7)."""
+        for block in [
+            one for space in _SPACES for one in bound.iterfind(f"{clark(WSDL, 'input')}/{clark(space, 'header')}")
+        ]:
+            message = self._named("w:message", block, "message")
+            for part in message.iterfind(clark(WSDL, "part")) if message is not None else ():
+                if part.get("name") == block.get("part") and part.get("element"):
+                    yield _qname(part, part.get("element") or "")
 
     def _tag(self, reference: etree._Element, style: str, wrapper: str, body: etree._Element | None) -> str:
         """Return the tag of a message's element; empty if the Body is empty."""

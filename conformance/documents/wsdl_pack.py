@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from conformance.contract.described import MOTION, TITLE
+from conformance.contract.described import MOTION, SOAP, TITLE
 from conformance.contract.locating import MANIFEST
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import basic_string
@@ -20,7 +20,6 @@ from conformance.documents.xsd_shapes import Element
 
 #: The documents of the WSDL, by location, and which of them comes first.
 DOCUMENTS_NAME: Final = "wsdl.json"
-CLASS: Final = "soap"
 # Operations that only read, by their first word. Others may sound so and move: FindHome, SearchReference.
 _READS: Final = re.compile(r"(?:[Gg]et|[Ll]ist|[Dd]escribe)(?![a-z])")
 # The first child of a Body, whatever the prefixes.
@@ -65,7 +64,7 @@ def write_soap_pack(
         f"title = {basic_string(TITLE)}",
         "closed_answers = true",
         "described = true",
-        *(f'\n[[class]]\nname = "{class_}"' for class_ in (CLASS, *((MOTION,) if moves else ()))),
+        *(f'\n[[class]]\nname = "{class_}"' for class_ in (SOAP, *((MOTION,) if moves else ()))),
     ]
     (folder / MANIFEST).write_text("\n".join(lines) + "\n", encoding="utf-8")
     (folder / "openapi.json").write_text(json.dumps(_operations(found)), encoding="utf-8")

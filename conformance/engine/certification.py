@@ -11,7 +11,8 @@ from typing import Any, TextIO
 import pytest
 
 from conformance.commandline.exit_codes import OF_VERDICT, ExitCode
-from conformance.contract.described import MOTION
+from conformance.contract.classes import Prerequisite
+from conformance.contract.described import MOTION, SOAP
 from conformance.engine.checks_plugin import ChecksPlugin
 from conformance.engine.interruption import remembered
 from conformance.engine.planning import pytest_options
@@ -132,8 +133,12 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
             judge.stopped(requirement.id, run.aborted)
     seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, run.scored)
     if run.contract.described:
-        # What the motion map declares is claimed.
-        _leave_out(seen[id_] for id_, item in run.contract.ledger.items() if item.class_ != MOTION)
+        # What the motion map declares is claimed, and so is that the operations of a WSDL answer.
+        _leave_out(
+            seen[id_]
+            for id_, item in run.contract.ledger.items()
+            if item.class_ != MOTION and (item.class_ != SOAP or Prerequisite.SEEN in item.needs)
+        )
     verdicts = [
         verdict_of(requirement, seen[requirement.id], run.claims, run.statement.undeclared)
         for requirement in run.contract.ledger.values()

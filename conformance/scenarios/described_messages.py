@@ -9,9 +9,11 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.messages import ordinary, simple_leaves, unknown_in, with_text
 from conformance.api.soap.username_token import block_of
+from conformance.documents.addressing import addressing_blocks
 from conformance.documents.soap_services import SoapDescription, SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import services_of
 from conformance.documents.xml import parse
+from conformance.documents.xml_names import local
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Element
 from conformance.scenarios.scenario import NotPossibleError
@@ -53,11 +55,25 @@ class DescribedMessages:
         return cls(found, api.run.statement.values, token)
 
     def message(
-        self, port: SoapPort, node: Node | None, *more: Node, space: str = "", authorized: bool = True
+        self,
+        port: SoapPort,
+        operation: SoapOperation,
+        node: Node | None,
+        *more: Node,
+        space: str = "",
+        authorized: bool = True,
     ) -> bytes:
-        """Return a message, with further header blocks, or in another namespace than that of the port's Envelope."""
+        """Return a message, with further header blocks, or in another namespace than that of the port's Envelope.
+
+        It has the header blocks that the WSDL demands.
+
+        Raises:
+            NotPossibleError: one of them cannot be made.
+        """
         token = self.token if authorized else None
-        blocks = (*([block_of(token, space or port.envelope)] if token else ()), *more)
+        own = (self._made(tag, operation)[1] for tag in operation.headers)
+        addressed = addressing_blocks(operation.addressed, port.url) if operation.addressed else ()
+        blocks = (*([block_of(token, space or port.envelope)] if token else ()), *own, *addressed, *more)
         whole = envelope((node,) if node else (), blocks or None, space or port.envelope)
         return b'<?xml version="1.0" encoding="utf-8"?>\n' + whole.written()
 
@@ -71,11 +87,17 @@ class DescribedMessages:
         Raises:
             NotPossibleError: none can be made.
         """
-        if not operation.request:
-            return None, None
-        declared = self.found.types.shape(operation.request)
+        return self._made(operation.request, operation, turn) if operation.request else (None, None)
+
+    def _made(self, tag: str, operation: SoapOperation, turn: int = 0) -> tuple[Element, Node]:
+        """Return the declaration of an element of an operation's messages, and a valid element.
+
+        Raises:
+            NotPossibleError: none can be made.
+        """
+        declared = self.found.types.shape(tag)
         if declared is None:
-            raise NotPossibleError(f"no schema declares {operation.request}")
+            raise NotPossibleError(f"no schema declares {tag} of {operation.name}")
         fault = ""
         for optional in (False, True):
             node = ordinary(declared, optional=optional)
@@ -89,7 +111,7 @@ class DescribedMessages:
             fault = self.found.types.invalid(parse(node.written()))
             if not fault:
                 return declared, node
-        raise NotPossibleError(f"no valid message can be made for {operation.name}: {fault}")
+        raise NotPossibleError(f"no valid {local(tag)} can be made for {operation.name}: {fault}")
 
 
 def target_of(port: SoapPort) -> str:

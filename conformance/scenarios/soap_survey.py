@@ -70,11 +70,12 @@ class SoapProbe:
 
 @dataclass
 class _Caller:
-    """Sends messages and records them."""
+    """Sends messages and records them; ``left_out`` are operations with the reason why they are not called."""
 
     api: RestInterface
     messages: DescribedMessages
     probes: list[SoapProbe] = field(default_factory=list)
+    left_out: list[tuple[str, str]] = field(default_factory=list)
 
     def send(self, port: SoapPort, operation: SoapOperation, kind: Kind, says: str, octets: bytes) -> SoapProbe:
         """Send octets to a port.
@@ -111,16 +112,21 @@ def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
     if messages is None:
         raise NotPossibleError("the device has no WSDL")
     found, caller = messages.found, _Caller(api, messages)
-    may = {item.label for item in operations_of(api.run.contract) if api.call_rules.decide(item).may}
-    reasons: list[str] = []
+    described = {item.label: api.call_rules.decide(item) for item in operations_of(api.run.contract)}
     for port, operation in each(found.ports):
-        if label_of(port, operation) in may and port.url.startswith(base_of(found)):
-            try:
+        rule = described[label_of(port, operation)]
+        why = operation.remark or ("" if rule.may else str(rule))
+        why = why or ("" if port.url.startswith(base_of(found)) else f"its port is at another server, {port.url}")
+        try:
+            if not why:
                 _explore(caller, port, operation)
-            except NotPossibleError as error:
-                reasons.append(str(error))
+        except NotPossibleError as error:
+            why = str(error)
+        if why:
+            caller.left_out.append((label_of(port, operation), why))
     if not caller.probes:
-        raise NotPossibleError(reasons[0] if reasons else "no operation of the WSDL may be called")
+        told = "; ".join(f"{label.rpartition('/')[2]}: {why}" for label, why in caller.left_out)
+        raise NotPossibleError(f"no operation could be called. {told or 'The WSDL describes none'}")
     return tuple(caller.probes)
 
 
@@ -129,17 +135,21 @@ def _explore(caller: _Caller, port: SoapPort, operation: SoapOperation) -> None:
     declared, node = caller.messages.usual(operation)
     effort = caller.api.run.effort
     for _ in range(1 if effort.name == "quick" else _USUAL):
-        caller.send(port, operation, Kind.USUAL, "a valid message", caller.messages.message(port, node))
+        caller.send(port, operation, Kind.USUAL, "a valid message", caller.messages.message(port, operation, node))
     until = time.monotonic() + _BUDGET_S
     invalid = list(_invalid(caller.messages.found, declared, node)) if declared and node else []
     for says, wrong in effort.draw(invalid, _MOST, f"{caller.api.run.seed}/{label_of(port, operation)}"):
         if time.monotonic() < until:
-            caller.send(port, operation, Kind.INVALID, says, caller.messages.message(port, wrong))
-    for kind, says, octets in _odd(caller, port, node):
+            caller.send(port, operation, Kind.INVALID, says, caller.messages.message(port, operation, wrong))
+    for kind, says, octets in _odd(caller, port, operation, node):
         if time.monotonic() < until:
             caller.send(port, operation, kind, says, octets)
             caller.send(
-                port, operation, Kind.AGAIN, f"a valid message after {says}", caller.messages.message(port, node)
+                port,
+                operation,
+                Kind.AGAIN,
+                f"a valid message after {says}",
+                caller.messages.message(port, operation, node),
             )
 
 
@@ -160,14 +170,24 @@ def _invalid(found: SoapDescription, declared: Element, node: Node) -> Iterator[
             yield says, wrong
 
 
-def _odd(caller: _Caller, port: SoapPort, node: Node | None) -> Iterator[tuple[Kind, str, bytes]]:
+def _odd(
+    caller: _Caller, port: SoapPort, operation: SoapOperation, node: Node | None
+) -> Iterator[tuple[Kind, str, bytes]]:
     """Yield messages that are wrong whatever the operation is."""
-    whole = caller.messages.message(port, node)
+    whole = caller.messages.message(port, operation, node)
     yield Kind.UNREADABLE, "XML that is not well-formed", whole[: len(whole) * 2 // 3]
     yield Kind.UNREADABLE, "octets that are no XML", b"roaas"
     yield Kind.EMPTY, "an empty body", b""
-    yield Kind.VERSION, "an Envelope of an unknown namespace", caller.messages.message(port, node, space=_STRANGE)
+    yield (
+        Kind.VERSION,
+        "an Envelope of an unknown namespace",
+        caller.messages.message(port, operation, node, space=_STRANGE),
+    )
     block = Node(clark(_STRANGE, "Strange"), "1", (), ((clark(port.envelope, "mustUnderstand"), "1"),))
-    yield Kind.UNDERSTAND, "a header block that must be understood", caller.messages.message(port, node, block)
-    head, rest = caller.messages.message(port, node).split(b"\n", 1)
+    yield (
+        Kind.UNDERSTAND,
+        "a header block that must be understood",
+        caller.messages.message(port, operation, node, block),
+    )
+    head, rest = caller.messages.message(port, operation, node).split(b"\n", 1)
     yield Kind.DOCTYPE, "a DOCTYPE", head + b'\n<!DOCTYPE e [<!ENTITY a "b">]>' + rest

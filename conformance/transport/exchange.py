@@ -99,7 +99,13 @@ class Request:
             words += ["-H", f"{name}: {value}" if value else f"{name};"]
         pipe = ""
         if self.body:
-            if _is_plain(self.body):
+            text = self.body.decode("utf-8", "replace")
+            if _is_plain(self.body) and {"\n", "\t"} & set(text):
+                # In one line, as terminals and tables show it: printf makes line ends and tabs of the escapes.
+                escaped = text.replace("\\", "\\\\").replace("\n", "\\n").replace("\t", "\\t")
+                pipe = f"printf %b {quoted(escaped) or shlex.quote(escaped)} | "
+                words += ["--data-binary", "@-"]
+            elif _is_plain(self.body):
                 words += ["--data-binary", self.body.decode()]
             else:
                 pipe = f"{_printed(self.body)} | "

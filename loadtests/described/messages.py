@@ -41,7 +41,7 @@ def described_message(device: Device, messages: DescribedMessages, operation: Op
     reply = Reply(local(own.response or ""))
     good, bad = list[bytes](), list[bytes]()
     for node in list(dict.fromkeys(_bodies(messages, own)))[: None if operation.safe else _TRIED]:
-        message = messages.message(port, node)
+        message = messages.message(port, own, node)
         try:
             sent = device.api.client.send("POST", target_of(port), headers=fields_of(port, own), body=message)
             answer, request = sent.response, sent.request

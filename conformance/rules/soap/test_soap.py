@@ -5,13 +5,15 @@ Over 300 lines because sixteen short rules share what reads a message.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
+from conformance.documents.multipart import parts_of, root_of
 from conformance.documents.soap_services import ENVELOPE_12
 from conformance.documents.traceback import inside_shown
 from conformance.documents.wsdl_pack import services_of
-from conformance.documents.xml import NotXmlError, elements, parse, text_of
+from conformance.documents.xml import NotXmlError, elements, text_of
 from conformance.documents.xml_names import clark, local
 from conformance.scenarios.rule import Case, Outcome, rule
 from conformance.scenarios.soap_survey import Kind, SoapProbe, soap_survey, wsdl_faults
@@ -27,6 +29,8 @@ _OK, _BAD, _FAILED = 200, 400, 500
 _CODES_12 = frozenset({"VersionMismatch", "MustUnderstand", "DataEncodingUnknown", "Sender", "Receiver"})
 # What shows no version of SOAP may be answered by a fault of any, or by none.
 _OF_NO_VERSION = frozenset({Kind.VERSION, Kind.UNREADABLE, Kind.EMPTY})
+# Values in what is wrong, which are no other cause; names of elements and prefixes are.
+_VALUES = re.compile(r"'(?!\{)[^']*'|(?<=fault: ).*|\d+(?=, column|\)|$)", re.DOTALL)
 Trace = tuple[SoapProbe, ...]
 
 
@@ -41,9 +45,9 @@ def _body(answer: Response, envelope: str) -> list[etree._Element]:
         _NotSoapError: there is none.
     """
     try:
-        root = parse(answer.body, doctype=True)
-    except NotXmlError as error:
-        raise _NotSoapError(f"content that is not well-formed XML: {error}") from error
+        root = root_of(answer.header("content-type") or "", answer.body)
+    except (NotXmlError, ValueError) as error:
+        raise _NotSoapError(f"content that cannot be read: {error}") from error
     if root.tag != clark(envelope, "Envelope"):
         raise _NotSoapError(f"the root element {root.tag}")
     body = [one for one in elements(root) if one.tag == clark(envelope, "Body")]
@@ -68,20 +72,30 @@ def _succeeded(probe: SoapProbe) -> bool:
 def _told(
     trace: Iterable[SoapProbe], expected: str, wrong: Callable[[SoapProbe], str | None], *, by_kind: bool = False
 ) -> Iterator[Outcome]:
-    """Yield a case for each probe of which ``wrong`` returns what is wrong, or an empty text; not where it is None."""
-    for probe in trace:
+    """Yield a case for each probe of which ``wrong`` returns what is wrong, or an empty text; not where it is None.
+
+    One cause is one finding, whatever operations it has. It shows a valid message if one fails: a message that has
+    another fault as well would show two things.
+    """
+    plain: dict[str, tuple[SoapProbe, str]] = {}
+    for probe in sorted(trace, key=lambda one: one.kind is not Kind.USUAL):
         found = wrong(probe)
-        if found is not None:
-            name = probe.operation.rpartition("/")[2]
-            yield Case(
-                not found,
-                probe.exchange or probe.unanswered,
-                f"{expected} for {probe.says} of {name}",
-                observed=found,
-                cause=f"{found.partition(':')[0]} {probe.kind if by_kind else ''}",
-                subject=name,
-                operations=(probe.operation,),
-            )
+        if found is None:
+            continue
+        cause = f"{_VALUES.sub('#', found)} {probe.kind if by_kind else ''}"
+        shown = probe, found
+        if found and not by_kind:
+            shown = plain.setdefault(cause, shown) if probe.kind is Kind.USUAL else plain.get(cause, shown)
+        name = shown[0].operation.rpartition("/")[2]
+        yield Case(
+            not found,
+            shown[0].exchange or shown[0].unanswered,
+            f"{expected} for {shown[0].says} of {name}",
+            observed=shown[1],
+            cause=cause,
+            subject=name,
+            operations=(probe.operation,),
+        )
 
 
 @rule("soap/wsdl", on=(wsdl_faults,))
@@ -140,7 +154,10 @@ def media_type(trace: Trace) -> Iterator[Outcome]:
         except _NotSoapError:
             return None
         wanted = "application/soap+xml" if probe.envelope == ENVELOPE_12 else "text/xml"
-        return "" if answer.media_type == wanted else f"Content-Type: {answer.media_type or '(none)'}"
+        given = answer.media_type
+        if given == "multipart/related":
+            given = parts_of(answer.header("content-type") or "", answer.body)[0].media_type
+        return "" if given == wanted else f"Content-Type: {given or '(none)'}"
 
     return _told(trace, "the media type of the SOAP version", wrong)
 
@@ -156,6 +173,8 @@ def response_valid(trace: Trace, run: Run) -> Iterator[Outcome]:
         try:
             inside = _body(probe.exchange.response, probe.envelope)
         except _NotSoapError:
+            return None
+        if probe.response and found.types.shape(probe.response) is None:
             return None
         if not probe.response:
             return "" if not inside else f"{inside[0].tag} in a Body that must be empty"

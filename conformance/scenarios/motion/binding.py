@@ -111,7 +111,7 @@ class SoapBinding:
             NotPossibleError: no schema declares the message.
         """
         port, operation, node = self._node(call, body)
-        message = self._messages.message(port, node, authorized=authorized)
+        message = self._messages.message(port, operation, node, authorized=authorized)
         return Made("POST", target_of(port), fields_of(port, operation), message)
 
     def _node(self, call: str, body: Any) -> tuple[SoapPort, SoapOperation, Node | None]:
