@@ -1,13 +1,18 @@
 """Recognise tracebacks and other internals of a program in response bodies."""
 
+import html
 import re
+from urllib.parse import unquote, unquote_plus
 
-from conformance.transport.exchange import Request
+from conformance.transport.exchange import Exchange, Request
 
 # As much of a body is looked through, octets.
 _LOOKED_THROUGH = 200_000
 _SHOWN = 120
-# What error pages of the usual languages and frameworks look like; none of it is in any request of the suite.
+# What a text that a response repeats may have lost or got: escapes of JSON, and a full stop of the sentence around it.
+_ESCAPED = re.compile(r"\\([\\\"/])")
+_END = " .,;:!"
+# What error pages of the usual languages and frameworks look like.
 _INSIDES = re.compile(
     rb"Traceback \(most recent call last\)"
     rb"|File (?:\"|&quot;|&#34;|\\\")[^\"&]{1,300}\.py(?:\"|&quot;|&#34;|\\\"), line \d+"
@@ -26,10 +31,9 @@ _INSIDES = re.compile(
 )
 
 
-def inside_shown(body: bytes) -> str:
-    """Return the first part of a traceback or of similar internals in a body, or empty."""
-    found = _INSIDES.search(body[:_LOOKED_THROUGH])
-    return found[0].decode("utf-8", "replace")[:_SHOWN] if found else ""
+def inside_shown(exchange: Exchange) -> str:
+    """Return the first part of a traceback or of similar internals in a response, or empty; see _first()."""
+    return _first(_INSIDES, exchange)
 
 
 # A file of a program: an absolute path with at least three segments, or with a drive letter.
@@ -39,9 +43,29 @@ _PATH = re.compile(
 )
 
 
-def path_shown(body: bytes, request: Request) -> str:
-    """Return the first path of the server's file system in a body that was not in the request, or empty."""
-    for found in _PATH.finditer(body[:_LOOKED_THROUGH]):
-        if found[0] not in request.url.encode() and found[0] not in request.body:
-            return found[0].decode("utf-8", "replace")[:_SHOWN]
+def path_shown(exchange: Exchange) -> str:
+    """Return the first path of the server's file system in a response, or empty; see _first()."""
+    return _first(_PATH, exchange)
+
+
+def _first(pattern: re.Pattern[bytes], exchange: Exchange) -> str:
+    """Return the first match in a response that does not repeat a part of its request, or empty."""
+    sent = None
+    for found in pattern.finditer(exchange.response.body[:_LOOKED_THROUGH]):
+        sent = sent if sent is not None else _sent(exchange.request)
+        text = found[0].decode("utf-8", "replace")
+        if _plain(text).strip(_END) not in sent:
+            return text[:_SHOWN]
     return ""
+
+
+def _sent(request: Request) -> str:
+    """Return all texts of a request as a response may repeat them, in lower case."""
+    given = [request.url, *(value for _, value in request.headers), request.body.decode("utf-8", "replace")]
+    given += [request.raw.decode("utf-8", "replace")] if request.raw else []
+    # A form is decoded twice where a device decodes a query that holds one.
+    return "\n".join(_plain(form) for text in given for form in (text, unquote_plus(text), unquote_plus(unquote(text))))
+
+
+def _plain(text: str) -> str:
+    return _ESCAPED.sub(r"\1", html.unescape(unquote(text))).lower()

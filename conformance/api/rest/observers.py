@@ -68,7 +68,7 @@ class Observer(Listener):
             expected = "content in the charset that Content-Type names"
             expect(api.run.judge, "rest-formats/charset", exchange).that(not wrong, expected, wrong)
         if answer.status >= HTTPStatus.BAD_REQUEST:
-            inside = inside_shown(answer.body)
+            inside = inside_shown(exchange)
             expected, found = "an error that shows nothing of the program", f"{inside!r} in the response"
             expect(api.run.judge, "http/no-traceback", exchange).that(not inside, expected, found, cause="traceback")
             problem.judge(api, exchange, answer, context)

@@ -77,7 +77,7 @@ class SoapObserver(Listener):
             return
         rules = _Rules(self._judge, exchange)
         rules.judge("R1141", response.http_version in {"HTTP/1.1", "HTTP/1.0"}, "HTTP/1.1 or HTTP/1.0")
-        inside = inside_shown(response.body)
+        inside = inside_shown(exchange)
         expected = "a response that shows nothing of the program"
         rules.judge("fault-no-traceback", not inside, expected, lambda: f"{inside!r} in the response")
         if response.body:

@@ -88,8 +88,7 @@ def no_internals(trace: Survey) -> Iterable[Outcome]:
         exchange = probe.exchange
         if exchange is None:
             return None
-        body = exchange.response.body
-        shown = inside_shown(body) or path_shown(body, exchange.request)
+        shown = inside_shown(exchange) or path_shown(exchange)
         return Fault("insides", f"status {probe.status} with {shown!r}") if shown else None
 
     yield from told_once(errors, "an error that shows nothing of the program", fault, apart=True)

@@ -323,7 +323,7 @@ def no_internals(trace: Trace) -> Iterator[Outcome]:
     def wrong(probe: SoapProbe) -> str | None:
         if probe.exchange is None or probe.exchange.response.ok:
             return None
-        shown = inside_shown(probe.exchange.response.body)
+        shown = inside_shown(probe.exchange)
         return f"{shown!r}" if shown else ""
 
     return _told(trace, "an error that shows nothing of the program", wrong)
