@@ -10,6 +10,7 @@ import click
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.terminal import inert
 from conformance.contract.classes import QUESTIONS
+from conformance.verdict.finding import counted
 
 if TYPE_CHECKING:
     from conformance.engine.certification import Certification
@@ -19,6 +20,9 @@ _MARKS = {"pass": "pass", "fail": "FAIL", "inconclusive": "inconclusive", "not-c
 # A device that is judged by its own description conforms to no contract.
 _SHOWN_CURL = 1000
 _SHOWN_BLOCKED = 5
+# Findings of one requirement that are printed in full; each further one has a line.
+_IN_FULL = 5
+_LINE = 160
 
 
 def print_summary(outcome: Certification) -> None:
@@ -42,8 +46,13 @@ def print_summary(outcome: Certification) -> None:
         found = [(cause, item) for cause, item in found if item["verdict"] in {"fail", "warn"}]
         if found:
             click.echo(f"\n{question}")
+        printed = Counter[str]()
         for cause, requirement in found:
-            _print_cause(cause, requirement)
+            printed[requirement["id"]] += 1
+            if printed[requirement["id"]] <= _IN_FULL:
+                _print_cause(cause, requirement)
+            else:
+                _print_line(cause, requirement)
     if document["causes"]:
         id_ = document["causes"][0]["requirement"]
         click.echo(f"\nwhy a requirement matters and how to meet it: roaas explain ID, as in roaas explain {id_}")
@@ -60,6 +69,16 @@ def print_summary(outcome: Certification) -> None:
         f"{document['requests']} requests in {document['duration_s']:.1f} s, seed {document['seed']}"
     )
     click.echo(f"result: {outcome.path}")
+
+
+def _print_line(cause: dict[str, Any], requirement: dict[str, Any]) -> None:
+    """Print a further finding of a requirement on one line."""
+    failure = next(item for item in requirement["failures"] if item["number"] == cause["number"])
+    said = f"{failure['subject']}: {failure['observed']}"
+    said = said if len(said) <= _LINE else f"{said[:_LINE]}…"
+    others = len(failure.get("operations", ())) - 1
+    more = f" … and {counted(others, 'more operation')}" if others > 0 else ""
+    click.echo(f"{cause['number']}. {requirement['verdict'].upper()} {requirement['id']}: {inert(said)}{more}")
 
 
 def _print_cause(cause: dict[str, Any], requirement: dict[str, Any]) -> None:

@@ -25,6 +25,9 @@ RESULT_FORMAT = "roaas-result/1"
 # As much of a body as a reader looks at; its length is always told.
 _SHOWN_BODY = 4096
 _SHOWN_CURL = 20_000
+# Of the operations of one finding, as many have a command of their own, if it is no longer than this.
+_COMMANDS = 30
+_SHORT_CURL = 2000
 _LIBRARIES = ("schemathesis", "hypothesis", "zeep", "lxml", "xmlschema", "h11")
 
 
@@ -169,11 +172,22 @@ def _failure(finding: Finding) -> dict[str, Any]:
         "observed": finding.observed,
         "cause": finding.cause,
         "seen": finding.seen,
+        **({"operations": _operations(finding)} if finding.operations else {}),
         "request": _request(finding.exchange) if finding.exchange else None,
         "response": _response(finding.exchange) if finding.exchange else None,
         **({"again": {"came_back": finding.again.came_back, "sent": finding.again.sent}} if finding.again else {}),
         "sequence": written(finding.sequence),
     }
+
+
+def _operations(finding: Finding) -> list[dict[str, Any]]:
+    """Return all operations that show a finding; the first ones with a command that shows it for each."""
+    found = []
+    for place, one in enumerate(finding.operations.values()):
+        curl = one.request.curl() if one.request and place < _COMMANDS else ""
+        command = {"curl": curl} if curl and len(curl) <= _SHORT_CURL else {}
+        found.append({"operation": one.operation, "seen": one.seen, **command})
+    return found
 
 
 def _request(exchange: Attempt) -> dict[str, Any]:

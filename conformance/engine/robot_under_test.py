@@ -106,6 +106,7 @@ class RobotUnderTest:
             self.permission.may_call_ports(self.rest.client.base_url)
             self.log = OperationLog(self.run.contract, self.rest.client.base_url)
             self.connection.listeners.append(self.log)
+            self.run.judge.concerned = lambda request: sorted(self.log.concerned(request)) if self.log else ()
         with self._told(Interface.REST, where.rest):
             self._look(Interface.REST, self.rest.client, self.rest.path)
 

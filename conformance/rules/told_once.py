@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from conformance.api.rest.variations import Kind
 from conformance.scenarios.rule import Case
 from conformance.scenarios.survey import Probe
+from conformance.verdict.finding import Showing
 
-_LISTED = 12
 _LESS_PLAIN = frozenset({Kind.GENERATED, Kind.OTHER})
 _NUMBERS = re.compile(r"\d+(?:\.\d+)?")
 
@@ -52,25 +52,25 @@ def told_once(
     for cause, found in faults.items():
         # The smallest request shows it best; a usual one better than an odd one.
         probe, fault = min(found, key=lambda pair: (pair[0].kind in _LESS_PLAIN, pair[0].attempt.request.size))
-        operations = sorted({one.operation for one, _ in found} - {probe.operation})
+        showing = {probe.operation: Showing(probe.operation, 0), **{one: Showing(one, 0) for one in _labels(found)}}
+        for one, _ in found:
+            was = showing[one.operation]
+            sent = min(filter(None, (was.request, one.attempt.request)), key=lambda request: request.size)
+            showing[one.operation] = Showing(one.operation, was.seen + 1, sent)
         observed = f"{fault.observed}, for {probe.says}" if probe.says else fault.observed
         yield Case(
             holds=False,
             exchange=probe.attempt,
             expected=fault.expected or expected,
-            observed=observed + _others(operations),
+            observed=observed,
             cause=cause,
             subject=probe.operation,
-            operations=(probe.operation, *operations),
+            operations=tuple(showing.values()),
         )
 
 
-def _others(operations: list[str]) -> str:
-    if not operations:
-        return ""
-    more = f" and {len(operations) - _LISTED} more" if len(operations) > _LISTED else ""
-    count = f"{len(operations)} other operation{'s' if len(operations) > 1 else ''}"
-    return f". The same for {count}: {', '.join(operations[:_LISTED])}{more}"
+def _labels(found: list[tuple[Probe, Fault]]) -> list[str]:
+    return sorted({one.operation for one, _ in found})
 
 
 def without_numbers(text: str) -> str:

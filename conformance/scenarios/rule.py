@@ -8,6 +8,7 @@ from typing import Any
 from conformance.scenarios.scenario import Scenario
 from conformance.transport.exchange import Attempt
 from conformance.verdict.evidence import Judge
+from conformance.verdict.finding import Showing
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Case:
         observed: what the trace shows instead; empty: a description of the response.
         cause: failures of the same cause are one finding; empty: derived from the texts.
         subject: what was tested; empty: method and target of the request.
-        operations: labels of all operations that show it, if not only that of the request.
+        operations: how each operation shows it, that of the exchange first, if not only that of the request.
     """
 
     holds: bool
@@ -30,7 +31,7 @@ class Case:
     observed: str = ""
     cause: str = ""
     subject: str = ""
-    operations: tuple[str, ...] = ()
+    operations: tuple[Showing, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -125,10 +125,9 @@ def _groups(findings: Iterable[Finding]) -> list[list[Finding]]:
 
 
 def _kept(evidence: Evidence, told_by: Mapping[int, list[Finding]]) -> dict[str, Finding]:
-    """Return the findings that stay with a requirement: at least one if more cases failed than were kept."""
-    own = {
+    """Return the findings that stay with a requirement, because no other one has their cause."""
+    return {
         key: finding
         for key, finding in evidence.findings.items()
         if not (tellers := told_by.get(id(finding))) or any(told is finding for told in tellers)
     }
-    return own or (evidence.findings if evidence.unshown else {})

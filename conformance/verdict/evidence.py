@@ -7,20 +7,21 @@ import re
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from conformance.contract.classes import CauseKind
 from conformance.contract.ledger import Requirement, renamed
 from conformance.transport.exchange import Attempt, NoAnswer, Request, Unanswered
-from conformance.verdict.finding import Finding, Sent, causes_of, kind_of, observed_in, subject_of
+from conformance.verdict.finding import Finding, Sent, Showing, causes_of, kind_of, likeness, observed_in, subject_of
 
-# Findings of one requirement that are kept: those that break its rule, and those whose cause others may meet as well.
-MAX_FINDINGS = 5
-MAX_CAUSES = 20
+# Findings of one requirement that are kept: further causes share one more. And how many have all of their requests.
+MAX_FINDINGS = 100
+MAX_SEQUENCES = 10
 # Requests before a finding that are kept with it.
 MAX_SEQUENCE = 40
+_REST = "the rest"
 # What differs between two cases of one finding: numbers, and values in quotes.
 _VALUES = re.compile(r"[-+]?\d[\d.e+-]*|'[^']*'|\"[^\"]*\"")
 
@@ -48,7 +49,6 @@ class Evidence:
         notes: remarks that change no verdict.
         checks: names of the checks that judged it.
         unclaimed: why it does not apply to a robot for which no classes were named.
-        unshown: number of failed cases that are not kept as findings.
         because: the finding of another requirement that prevented the test, or None.
         parts: number of judged cases by the id that checks use, which may be an alias of the requirement.
     """
@@ -61,13 +61,12 @@ class Evidence:
     notes: list[str] = field(default_factory=list)
     checks: set[str] = field(default_factory=set)
     unclaimed: str = ""
-    unshown: int = 0
     because: Finding | None = None
 
     @property
     def failures(self) -> int:
         """Return the number of failed cases."""
-        return sum(finding.seen for finding in self.findings.values()) + self.unshown
+        return sum(finding.seen for finding in self.findings.values())
 
 
 class Judge:
@@ -82,6 +81,7 @@ class Judge:
         at_risk: the requirements that fail if the robot stops responding during a hostile request.
         met: findings of the running check, newest last.
         ended_by: the finding after which the robot stopped responding, or None.
+        concerned: returns the labels of the operations of a description that a request concerns.
     """
 
     def __init__(self, known: Collection[str] | Mapping[str, Requirement]) -> None:
@@ -90,6 +90,7 @@ class Judge:
         self.at_risk: tuple[str, ...] = ()
         self.met: list[Finding] = []
         self.ended_by: Finding | None = None
+        self.concerned: Callable[[Request], Iterable[str]] = lambda _: ()
         self._ledger: Mapping[str, Requirement] = known if isinstance(known, Mapping) else {}
         self._renamed = renamed(self._ledger)
         self._sent: deque[Sent] = deque(maxlen=MAX_SEQUENCE)
@@ -145,7 +146,7 @@ class Judge:
         found: str = "",
         cause: str = "",
         subject: str = "",
-        operations: Iterable[str] = (),
+        operations: Sequence[Showing] = (),
     ) -> bool:
         """Record whether one case meets a requirement.
 
@@ -157,7 +158,8 @@ class Judge:
             found: what the response showed; empty if status and media type alone are wrong.
             cause: failures of the same cause are one finding; by default the texts without their numbers.
             subject: what was tested; by default method and target of the request.
-            operations: labels of the operations of a description that show it.
+            operations: the operations of a description that show it, that of ``exchange`` first; by default those
+                that its request concerns.
 
         Returns:
             ``holds``.
@@ -166,13 +168,16 @@ class Judge:
         evidence = self.evidence.get(requirement)
         if evidence is None:
             return holds
-        evidence.cases += 1
-        evidence.parts[part] = evidence.parts.get(part, 0) + 1
+        cases = sum(one.seen for one in operations) or 1
+        evidence.cases += cases
+        evidence.parts[part] = evidence.parts.get(part, 0) + cases
         evidence.checks.add(self.check_name)
         if not holds:
             self.failed(requirement)
             subject = subject or subject_of(exchange, self.check_name)
-            self._found(evidence, requirement, exchange, expected, found, cause, subject, operations)
+            if not operations and exchange is not None:
+                operations = [Showing(label, 1, exchange.request) for label in self.concerned(exchange.request)]
+            self._found(evidence, requirement, exchange, expected, found, cause, subject, operations, cases)
         return holds
 
     def failed(self, requirement: str) -> None:
@@ -187,33 +192,33 @@ class Judge:
         found: str,
         cause: str,
         subject: str,
-        operations: Iterable[str],
+        operations: Sequence[Showing],
+        cases: int,
     ) -> None:
         """Add a failed case to an existing finding of its cause, or as a new finding."""
         kind = self._kind(requirement, exchange, found)
         observed = observed_in(exchange, found)
         causes = causes_of(kind, exchange)
-        # Without a word of the check, two causes are two findings, even where the texts are alike.
-        key = f"{kind} {cause or ' '.join((*causes, _VALUES.sub('#', f'{expected}|{observed}')))}"
+        key = f"{kind} {cause or ' '.join((_likeness(kind, exchange), _VALUES.sub('#', f'{expected}|{observed}')))}"
+        if key not in evidence.findings and len(evidence.findings) >= MAX_FINDINGS:
+            key = _REST
         finding = evidence.findings.get(key)
         if finding is not None:
-            finding.seen += 1
+            finding.seen += cases
             finding.causes |= causes
-            finding.operations.update(operations)
             self.met.append(finding)
             unsent = isinstance(exchange, Unanswered) and exchange.kind is NoAnswer.CIRCUIT_OPEN
             smaller = exchange and finding.exchange and exchange.request.size < finding.exchange.request.size
             if finding.unsent > unsent or (smaller and finding.unsent >= unsent):
                 finding.subject, finding.expected, finding.observed = subject, expected, observed
-                finding.exchange, finding.sequence = exchange, self._led_to(exchange)
-            return
-        breaks_rule = kind is CauseKind.RULE
-        alike = [one for one in evidence.findings.values() if (one.cause is CauseKind.RULE) == breaks_rule]
-        if len(alike) >= (MAX_FINDINGS if breaks_rule else MAX_CAUSES):
-            evidence.unshown += 1
-            self.met.append(alike[0])
+                finding.exchange = exchange
+                finding.sequence = self._led_to(exchange)[-len(finding.sequence) or -1 :]
+                finding.show(operations, first=True)
+            else:
+                finding.show(operations)
             return
         self._findings += 1
+        sequence = self._led_to(exchange)
         evidence.findings[key] = finding = Finding(
             requirement,
             self._ledger[requirement].source if requirement in self._ledger else "",
@@ -223,10 +228,11 @@ class Judge:
             exchange,
             kind,
             causes=causes,
-            operations=set(operations),
-            sequence=self._led_to(exchange),
+            rest=key == _REST,
+            sequence=sequence if len(evidence.findings) < MAX_SEQUENCES else sequence[-1:],
             met=self._findings,
         )
+        finding.show(operations)
         self.met.append(finding)
 
     def _kind(self, requirement: str, exchange: Attempt | None, found: str) -> CauseKind:
@@ -305,3 +311,15 @@ class Judge:
             self.error(requirement, reason)
         elif not evidence.findings:
             evidence.because = self.ended_by
+
+
+def _likeness(kind: CauseKind, exchange: Attempt | None) -> str:
+    """Return what two failures without a word of their check have in common if they have one cause.
+
+    A server error is known by its method and what its response says: one fault behind many paths is one finding.
+    """
+    if kind is CauseKind.RULE or exchange is None:
+        return ""
+    method = exchange.request.method.replace("HEAD", "GET")
+    said = "" if isinstance(exchange, Unanswered) else likeness(exchange)
+    return f"{method} {said}"

@@ -1,6 +1,7 @@
 """Findings, and their text: what the suite did, what it expected by which rule, and what it got."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from typing import NamedTuple
@@ -23,6 +24,10 @@ _SHOWN_TARGET = 120
 _SHOWN_FIELD = 100
 _SHOWN_BODY = 200
 _SHOWN_CURL = 2000
+# As many operations are named in a text; result.json and the pages have all of them.
+_NAMED = 10
+# What differs between two responses of one fault: numbers, times, ids.
+_NUMBERS = re.compile(r"[0-9a-f.:TZ+-]*\d[0-9a-f.:TZ+-]*")
 _FAULT = re.compile(rb"<(?:[\w.-]+:)?Fault[\s>]")
 
 
@@ -31,6 +36,14 @@ class Sent(NamedTuple):
 
     at_s: float
     request: Request
+
+
+class Showing(NamedTuple):
+    """How one operation of a description shows a failure: its label, how often, and its smallest failing request."""
+
+    operation: str
+    seen: int = 1
+    request: Request | None = None
 
 
 class Again(NamedTuple):
@@ -60,7 +73,8 @@ class Finding:
         exchange: the smallest failing request with its result, or None if none was sent.
         cause: the kind of cause.
         causes: keys of its causes; findings with a common key have the same cause.
-        operations: labels of the operations that show it, where a rule named them.
+        operations: by label, how each operation of a description shows it; the first is that of the exchange.
+        rest: whether it stands for all further causes, because the requirement has too many findings.
         among: number of requirements that the same check recorded it for.
         alone: whether only this requirement keeps the finding, because its request made the robot stop responding.
         seen: number of failed cases.
@@ -78,7 +92,8 @@ class Finding:
     exchange: Attempt | None
     cause: CauseKind = CauseKind.RULE
     causes: set[str] = field(default_factory=set)
-    operations: set[str] = field(default_factory=set)
+    operations: dict[str, Showing] = field(default_factory=dict)
+    rest: bool = False
     among: int = 1
     alone: bool = False
     seen: int = 1
@@ -86,6 +101,17 @@ class Finding:
     again: Again | None = None
     met: int = 0
     number: int = 0
+
+    def show(self, operations: Sequence[Showing], *, first: bool = False) -> None:
+        """Add operations that show it; those of its own exchange go ``first``."""
+        there = self.operations
+        for one in operations:
+            was = there.get(one.operation, Showing(one.operation, 0))
+            smaller = min(filter(None, (was.request, one.request)), key=lambda sent: sent.size, default=None)
+            there[one.operation] = Showing(one.operation, was.seen + one.seen, smaller)
+        if first:
+            own = {one.operation: there[one.operation] for one in operations}
+            self.operations = own | there
 
     @property
     def unsent(self) -> bool:
@@ -100,6 +126,13 @@ class Finding:
         parts = [did, f"Expected {_clause(self.expected)} ({rule}).", f"Got {_clause(self.observed)}."]
         if self.seen > 1:
             parts.append(f"Seen {self.seen} times.")
+        others = [f"`{one.operation}`" for one in list(self.operations.values())[1:]]
+        if others:
+            more = len(others) - _NAMED
+            listed = ", ".join(others[:_NAMED]) + (f" and {counted(more, 'more operation')}" if more > 0 else "")
+            parts.append(f"The same for {counted(len(others), 'other operation')}: {listed}.")
+        if self.rest:
+            parts.append("It stands for all further causes: the requirement has too many findings.")
         if self.again is not None:
             parts.append(_repeated(self.again))
         return " ".join(parts)
@@ -108,6 +141,11 @@ class Finding:
     def brief(self) -> str:
         """Return subject and observation, for a reference to the finding."""
         return f"{self.subject}: {_clause(self.observed)}"
+
+
+def counted(number: int, what: str) -> str:
+    """Return a number with its noun: "1 more operation", "9 more operations"."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def in_full(finding: Finding) -> str:
@@ -134,6 +172,14 @@ def kind_of(exchange: Attempt | None, found: str = "") -> CauseKind:
     if response.body and unreadable(response.media_type, response.body):
         return CauseKind.UNREADABLE
     return CauseKind.RULE
+
+
+def likeness(exchange: Exchange) -> str:
+    """Return what the responses of one fault have in common: status, media type, text without numbers and path."""
+    response, path = exchange.response, exchange.request.target.partition("?")[0]
+    said = response.body[:_SHOWN_BODY].decode("latin-1")
+    said = said.replace(path, "#") if len(path) > 1 else said
+    return f"{response.status} {response.media_type} {_NUMBERS.sub('#', said)}"
 
 
 def causes_of(kind: CauseKind, exchange: Attempt | None) -> set[str]:

@@ -16,6 +16,7 @@ MOST_OCTETS = 512 * 1024
 _MOST_SHOWN = 30
 _MOST_NAMED = 500
 _MOST_GROUPS = 30
+_LIMITS = {"in_full": 10, "most_named": _MOST_NAMED}
 _HEADINGS = {"fail": "What failed", "warn": "Warnings"}
 
 
@@ -35,7 +36,7 @@ def certificate_markdown(result: Mapping[str, Any]) -> str:
         found = sorted(values["certificate"].with_verdict(verdict), key=lambda r: (_topic(r), _urgency(r)))
         in_full: list[str] = []
         for requirement in found[:_MOST_SHOWN]:
-            block = markdown_page("requirement.md.j2", r=requirement, found=findings([requirement], result))
+            block = markdown_page("requirement.md.j2", r=requirement, found=findings([requirement], result), **_LIMITS)
             left -= len(block.encode())
             if left < 0:
                 break

@@ -19,6 +19,7 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.documents.traceback import inside_shown
 from conformance.transport.exchange import Exchange, Listener, NoAnswer, Request, Response, Unanswered
+from conformance.verdict.finding import Showing, likeness
 
 _CHARSET = re.compile(r"""charset\s*=\s*["']?([^\s;"']+)""", re.IGNORECASE)
 # Fields that clients act on, and that several values make meaningless (RFC 9110 5.3).
@@ -92,9 +93,9 @@ class Observer(Listener):
                 False,  # noqa: FBT003 - the condition of check()
                 exchange,
                 "a status below 500",
-                cause=f"{operation.label} {status}",
+                cause=likeness(exchange),
                 subject=operation.label,
-                operations=(operation.label,),
+                operations=(Showing(operation.label, 1, exchange.request),),
             )
 
     def unanswered(self, request: Unanswered) -> None:

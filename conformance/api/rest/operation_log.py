@@ -107,7 +107,7 @@ class OperationLog(Listener):
         operations = operations_of(self._contract)
         numbers: dict[str, list[int]] = {}
         for finding in findings:
-            for label in self._concerned(finding):
+            for label in finding.operations:
                 numbers.setdefault(label, []).append(finding.number)
         rows = [self._row(item, rules) | {"findings": sorted(numbers.get(item.label, ()))} for item in operations]
         called = [item for item in operations if self._records[item.label].sent]
@@ -134,11 +134,11 @@ class OperationLog(Listener):
             },
         }
 
-    def _concerned(self, finding: Finding) -> set[str]:
-        """Return the labels of the operations that a finding concerns: those of its resource if it has no own one."""
-        if finding.operations or finding.exchange is None:
-            return finding.operations
-        request = finding.exchange.request
+    def concerned(self, request: Request) -> set[str]:
+        """Return the labels of the operations that a request concerns: those of its resource if it has no own one."""
+        if self._services is not None:
+            operation = self._operation(request)
+            return {operation.label} if operation else set()
         resource = resource_at(self._contract, self._path(request)) if request.url.startswith(self._base_url) else None
         if resource is None:
             return set()

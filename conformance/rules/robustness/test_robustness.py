@@ -10,12 +10,13 @@ from http import HTTPStatus
 from conformance.api.rest.statuses import CRASHES
 from conformance.api.rest.variations import Kind
 from conformance.documents.traceback import inside_shown, path_shown
-from conformance.rules.told_once import Fault, told_once
+from conformance.rules.told_once import Fault, told_once, without_numbers
 from conformance.scenarios.other_exchanges import others
 from conformance.scenarios.rule import Case, NotTested, Outcome, rule
 from conformance.scenarios.survey import TIMED, Probe, Survey, generated_requests, survey
 from conformance.scenarios.timed_again import TimedAgain, timed_again
 from conformance.transport.exchange import Exchange, NoAnswer
+from conformance.verdict.finding import Showing, likeness
 
 _ON = (survey, generated_requests)
 # A response time has grown when its median is so many times, and so many ms, above that of the first requests.
@@ -29,9 +30,11 @@ def no_server_error(trace: Survey) -> Iterable[Outcome]:
     """Judge whether any request makes the device fail with 500, 502 or 504."""
 
     def fault(probe: Probe) -> Fault | None:
-        return Fault(str(probe.status), f"status {probe.status}") if probe.status in CRASHES else None
+        if probe.exchange is None or probe.status not in CRASHES:
+            return None
+        return Fault(likeness(probe.exchange), f"status {probe.status}")
 
-    yield from told_once(trace.probes, "a status below 500", fault, apart=True)
+    yield from told_once(trace.probes, "a status below 500", fault)
 
 
 @rule("robustness/no-crash", on=(*_ON, others))
@@ -41,9 +44,9 @@ def no_crash(trace: Survey) -> Iterable[Outcome]:
     def fault(probe: Probe) -> Fault | None:
         none = probe.unanswered
         lost = none is not None and none.kind in {NoAnswer.CLOSED, NoAnswer.REFUSED, NoAnswer.MALFORMED}
-        return Fault("closed", none.problem if none else "") if lost else None
+        return Fault(f"closed {none.problem}", none.problem) if none and lost else None
 
-    yield from told_once(trace.probes, "a response", fault, apart=True)
+    yield from told_once(trace.probes, "a response", fault)
 
 
 @rule("robustness/no-hang", on=_ON)
@@ -57,7 +60,7 @@ def no_hang(trace: Survey) -> Iterable[Outcome]:
             return None
         return Fault("hang", none.problem) if probe.operation in answering or not _waits(probe.operation) else None
 
-    yield from told_once(trace.probes, "a response within the deadline", fault, apart=True)
+    yield from told_once(trace.probes, "a response within the deadline", fault)
 
 
 def _waits(operation: str) -> bool:
@@ -89,9 +92,9 @@ def no_internals(trace: Survey) -> Iterable[Outcome]:
         if exchange is None:
             return None
         shown = inside_shown(exchange) or path_shown(exchange)
-        return Fault("insides", f"status {probe.status} with {shown!r}") if shown else None
+        return Fault(without_numbers(str(shown)), f"status {probe.status} with {shown!r}") if shown else None
 
-    yield from told_once(errors, "an error that shows nothing of the program", fault, apart=True)
+    yield from told_once(errors, "an error that shows nothing of the program", fault)
 
 
 @rule("robustness/recovers", on=(survey,))
@@ -126,7 +129,12 @@ def steady_latency(trace: Survey | tuple[TimedAgain, ...]) -> Iterable[Outcome]:
         timed = [one.exchange for one in trace.of(label, Kind.AGAIN) if one.exchange is not None and one.ok]
         if len(timed) >= 3 * TIMED:
             times = [one.response.elapsed_ms for one in timed]
-            yield replace(_steady(timed[-1], times, TIMED), cause=label, subject=label, operations=(label,))
+            yield replace(
+                _steady(timed[-1], times, TIMED),
+                cause=label,
+                subject=label,
+                operations=(Showing(label, 1, timed[-1].request),),
+            )
 
 
 def _at_the_end(timed: TimedAgain) -> Case:
@@ -140,7 +148,7 @@ def _at_the_end(timed: TimedAgain) -> Case:
         f"{before:.1f} ms at the beginning, at least {after:.1f} ms at the end",
         cause=timed.operation,
         subject=timed.operation,
-        operations=(timed.operation,),
+        operations=(Showing(timed.operation, 1, timed.last.request),),
     )
 
 

@@ -18,6 +18,7 @@ from conformance.documents.xml_names import clark, local
 from conformance.scenarios.rule import Case, Outcome, rule
 from conformance.scenarios.soap_survey import Kind, SoapProbe, soap_survey, wsdl_faults
 from conformance.transport.exchange import NoAnswer, Response
+from conformance.verdict.finding import Showing
 from conformance.verdict.run import Run
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ def _told(
         shown = probe, found
         if found and not by_kind:
             shown = plain.setdefault(cause, shown) if probe.kind is Kind.USUAL else plain.get(cause, shown)
-        name = shown[0].operation.rpartition("/")[2]
+        name, own = shown[0].operation.rpartition("/")[2], probe.exchange or probe.unanswered
         yield Case(
             not found,
             shown[0].exchange or shown[0].unanswered,
@@ -94,7 +95,7 @@ def _told(
             observed=shown[1],
             cause=cause,
             subject=name,
-            operations=(probe.operation,),
+            operations=(Showing(probe.operation, 1, own.request if own else None),),
         )
 
 

@@ -5,7 +5,7 @@ import pytest
 from conformance.contract.classes import CauseKind
 from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
 from conformance.verdict.evidence import MAX_FINDINGS, Judge
-from conformance.verdict.finding import Again, in_full, kind_of
+from conformance.verdict.finding import Again, Showing, in_full, kind_of
 from conformance.verdict.run import Run
 
 _ID = "rest-resources/pose-type"
@@ -109,10 +109,32 @@ def test_kinds_of_causes(exchange, kind):
     assert kind_of(exchange) is kind
 
 
-def test_findings_beyond_those_that_are_kept_count_for_none_of_them():
+def test_causes_beyond_those_that_are_kept_share_one_finding_which_says_so_and_names_their_operations():
     judge = Judge({"http/x"})
-    for letter in "abcdefgh":
-        judge.check("http/x", False, None, f"thing {letter}", found="not so")
-    evidence = judge.evidence["http/x"]
-    assert [finding.seen for finding in evidence.findings.values()] == [1] * MAX_FINDINGS
-    assert (evidence.unshown, evidence.failures) == (3, 8)
+    for number in range(MAX_FINDINGS + 3):
+        label = f"GET /{number}"
+        judge.check("http/x", False, None, "thing", cause=label, operations=[Showing(label)])
+    *own, rest = judge.evidence["http/x"].findings.values()
+    assert [finding.seen for finding in own] == [1] * MAX_FINDINGS
+    assert (rest.seen, list(rest.operations)) == (3, [f"GET /{MAX_FINDINGS + i}" for i in range(3)])
+    assert "It stands for all further causes" in rest.text
+
+
+def test_one_server_error_behind_many_paths_is_one_finding_with_all_operations_and_how_often():
+    judge = Judge({"http/x"})
+    judge.concerned = lambda request: [f"{request.method} {request.target}"]
+    for number in (*range(200), 7):
+        exchange = Exchange(Request("OPTIONS", f"http://r2/{number}"), Response(500, (), b"oops at %d" % number, 1.0))
+        judge.check("http/x", False, exchange, "status 200")
+    (finding,) = judge.evidence["http/x"].findings.values()
+    assert len(finding.operations) == 200
+    assert (finding.seen, finding.operations["OPTIONS /7"].seen) == (201, 2)
+    assert "and 189 more operations" in finding.text
+    assert len(finding.text) < 1000
+
+
+def test_two_server_errors_of_one_operation_are_two_findings():
+    judge = Judge({"http/x"})
+    for said in (b"KeyError", b"TypeError"):
+        judge.check("http/x", False, Exchange(_GET, Response(500, (), said, 1.0)), "status 200")
+    assert len(judge.evidence["http/x"].findings) == 2
