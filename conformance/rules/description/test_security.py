@@ -12,4 +12,4 @@ def security(trace: tuple[Exchange, ...]) -> Iterable[Outcome]:
     """Judge whether what requires credentials is refused without them, and with wrong ones."""
     for exchange in trace:
         expected = "a refusal, because the description requires credentials"
-        yield Case(not exchange.response.ok, exchange, expected, cause=exchange.request.endpoint)
+        yield Case(not exchange.response.ok, exchange, expected, cause="served")

@@ -203,8 +203,10 @@ def test_what_operations_have_in_common_is_told_once(run):
     probes = [_page(418), _page(418, kind=Kind.INVALID, says="x"), _page(418, operation=_OTHER)]
     (finding,) = _failed(answers.status_declared, Survey(tuple(probes)), run)
     assert (finding.subject, finding.cause) == (_LABEL, "418") or finding.subject == _OTHER
-    assert "The same for 1 other operation: " in finding.observed
-    apart = [_probe(500), _probe(500, kind=Kind.ODD), _probe(500, operation=_OTHER)]
+    assert {one.operation: one.seen for one in finding.operations} == {_LABEL: 2, _OTHER: 1}
+    alike = [_probe(500), _probe(500, kind=Kind.ODD), _probe(500, operation=_OTHER)]
+    assert len(_failed(robustness.no_server_error, Survey(tuple(alike)), run)) == 1
+    apart = [_probe(500, {"detail": "no key"}), _probe(500, {"detail": "no value"})]
     assert len(_failed(robustness.no_server_error, Survey(tuple(apart)), run)) == 2
 
 

@@ -5,7 +5,7 @@ from conformance.api.rest.operation_log import OperationLog
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
-from conformance.verdict.finding import Finding
+from conformance.verdict.finding import Finding, Showing
 
 OK = {"200": {"content": {"application/json": {"schema": {"properties": {"x": {}, "y": {}}}}}}}
 API = {
@@ -34,7 +34,9 @@ def exchange(target, status=200, body=b"{}", method="GET"):
 
 
 def finding(number, attempt, *operations):
-    return Finding("http/x", "", "", "", "", attempt, operations=set(operations), number=number)
+    return Finding(
+        "http/x", "", "", "", "", attempt, operations={one: Showing(one) for one in operations}, number=number
+    )
 
 
 def test_the_matrix_counts_what_was_sent_and_seen(tmp_path):
@@ -43,10 +45,11 @@ def test_the_matrix_counts_what_was_sent_and_seen(tmp_path):
     log.answered(exchange("/joints/b", status=404))
     log.answered(exchange("/elsewhere"))
     log.unanswered(Unanswered(Request("GET", f"{BASE}/joints/c"), "closed", NoAnswer.CLOSED))
+    head, brew = exchange("/joints/b", method="HEAD"), exchange("/joints/b", method="BREW")
     findings = [
         finding(1, exchange("/joints/b"), "GET /joints/{name}", "GET /state"),
-        finding(2, exchange("/joints/b", method="HEAD")),
-        finding(3, exchange("/joints/b", method="BREW")),
+        finding(2, head, *log.concerned(head.request)),
+        finding(3, brew, *log.concerned(brew.request)),
         finding(4, None),
     ]
     document = log.document(CallRules(), findings)
