@@ -6,7 +6,7 @@ and validated as all others are.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 from urllib.parse import urlsplit
@@ -16,7 +16,7 @@ from lxml import etree
 from conformance.documents.addressing import addressing_action, wants_addressing
 from conformance.documents.wsdl_gaps import gaps
 from conformance.documents.wsdl_imports import Fetch, Locate, collect
-from conformance.documents.xml_names import ENVELOPE, WSDL, WSDL_SOAP, XSD, clark, namespace
+from conformance.documents.xml_names import ENVELOPE, WSDL, WSDL_SOAP, XSD, clark
 from conformance.documents.xsd import SchemaError, Types
 from conformance.documents.xsd_assembly import SchemaDocument
 
@@ -86,6 +86,7 @@ class SoapDescription:
         types: the compiled schemas.
         faults: what is wrong with the WSDL itself: documents that are missing, references without a target.
         notes: what the suite does not know of the WSDL, through no fault of the device.
+        foreign: whether the WSDL is not the device's own, as that of a standard.
     """
 
     name: str
@@ -93,6 +94,7 @@ class SoapDescription:
     types: Types
     faults: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    foreign: bool = False
 
 
 def read_services(
@@ -125,21 +127,18 @@ def read_services(
         types = Types.compiled([*found.schemas, *reader.wrappers])
     except SchemaError as error:
         raise WsdlError(f"the schemas of {location} do not compile: {error}") from error
-    faults, notes = gaps(found, types, location)
-    faults += [*reader.faults, *_undeclared(ports, types, found.lacking)]
+    named = [
+        (f"{operation.name} of port {port.name}", tag)
+        for port in ports
+        for operation in port.operations
+        for tag in filter(None, (operation.request, operation.response))
+    ]
+    faults, notes = gaps(found, types, location, named)
+    faults += reader.faults
     name = found.definitions[0].get("name") or ports[0].service
     if foreign:
         faults, notes = [], [*notes, *faults]
-    return SoapDescription(name, ports, types, tuple(dict.fromkeys(faults)), tuple(dict.fromkeys(notes)))
-
-
-def _undeclared(ports: Iterable[SoapPort], types: Types, lacking: Sequence[str]) -> Iterator[str]:
-    """Yield which elements of messages no schema declares, but for those whose documents are lacking."""
-    for port in ports:
-        for operation in port.operations:
-            for tag in filter(None, (operation.request, operation.response)):
-                if types.shape(tag) is None and namespace(tag) not in lacking:
-                    yield f"{operation.name} of port {port.name} names the element {tag}, which no schema declares"
+    return SoapDescription(name, ports, types, tuple(dict.fromkeys(faults)), tuple(dict.fromkeys(notes)), foreign)
 
 
 class _Reader:

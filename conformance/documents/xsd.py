@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from lxml import etree
 
-from conformance.documents.xml_names import XSD, clark
+from conformance.documents.xml_names import XSD, XSI, clark
 from conformance.documents.xsd_assembly import SchemaDocument, assemble
 from conformance.documents.xsd_shapes import Element, shape
 
@@ -23,6 +23,7 @@ _SHOWN: Final = 300
 _WAYS: Final = (("XMLSchema10", "strict"), ("XMLSchema11", "strict"), ("XMLSchema10", "lax"))
 
 
+_TYPE: Final = clark(XSI, "type")
 _PATTERN: Final = clark(XSD, "pattern")
 # A repeated group with a repetition or alternatives in it.
 _SLOW: Final = re.compile(r"\((?:.*[+*}|].*)\)[+*{]", re.DOTALL)
@@ -114,6 +115,8 @@ class Types:
 
     def invalid(self, element: etree._Element) -> str:
         """Return why an element is invalid according to both; empty if either finds it valid."""
+        if self.unknown:
+            element = self._without_unknown_types(element)
         first = self.libxml_problem(element)
         if self.libxml is not None and not first:
             return ""
@@ -121,6 +124,16 @@ class Types:
             return first[:_SHOWN]
         second = self.python_problem(element)
         return (first or second)[:_SHOWN] if second else ""
+
+    def _without_unknown_types(self, element: etree._Element) -> etree._Element:
+        """Return a copy without each xsi:type that names a type of which no document is there."""
+        alone, spaces = copy.deepcopy(element), {one.space for one in self.unknown}
+        for one in alone.iter(etree.Element):
+            prefix, _, name = one.get(_TYPE, "").strip().rpartition(":")
+            space = one.nsmap.get(prefix or None)
+            if space in spaces and clark(space, name) not in self.python.maps.types:
+                del one.attrib[_TYPE]
+        return alone
 
     def valid(self, element: etree._Element) -> bool:
         """Return whether both find the element valid."""

@@ -113,6 +113,9 @@ class _Reader:
         space, _, name = str(declared.name).rpartition("}")
         tag = str(declared.name) if space else name
         nillable = bool(declared.nillable)
+        if declared.elem is not None and declared.elem.get(UNKNOWN):
+            unknown = Complex(wildcard=True, unknown=True)
+            return Element(tag, unknown, declared.min_occurs, declared.max_occurs, nillable=nillable)
         return Element(tag, self._type(declared.type), declared.min_occurs, declared.max_occurs, nillable=nillable)
 
     def _type(self, declared: Any) -> Simple | Complex:

@@ -47,6 +47,13 @@ def allow_anything(spaces: Sequence[str], roots: Sequence[etree._Element], unkno
                     if whole.get("name"):
                         unknown.add(clark(space, whole.get("name", "")))
                     waiting = True
+    for root in roots:
+        # An element without a type holds anything, and an xsi:type may say what.
+        for element in root.iterfind(f".//{clark(XSD, 'element')}[@type]"):
+            prefix, _, local = element.get("type", "").rpartition(":")
+            if clark(element.nsmap.get(prefix or None), local) in unknown and "substitutionGroup" not in element.attrib:
+                del element.attrib["type"]
+                element.set(UNKNOWN, "true")
 
 
 def _make_any(whole: etree._Element) -> None:

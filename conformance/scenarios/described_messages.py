@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Final
 from urllib.parse import urlsplit
+
+from lxml import etree
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.envelope import envelope
@@ -13,12 +19,17 @@ from conformance.documents.addressing import addressing_blocks
 from conformance.documents.soap_services import SoapDescription, SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import services_of
 from conformance.documents.xml import parse
-from conformance.documents.xml_names import local
 from conformance.documents.xml_node import Node
+from conformance.documents.xsd_lexical import INTEGERS, STRINGS
 from conformance.documents.xsd_shapes import Element
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.client import Headers
 from conformance.transport.username_token import UsernameToken
+
+_NONE: Final[Mapping[str, Sequence[str]]] = MappingProxyType({})
+# Types whose values may refer to something, and names of numbers that do.
+_TEXTS: Final = STRINGS | {"anyURI", "ID", "IDREF", "NCName", "NMTOKEN", "Name", "QName"}
+_ID: Final = re.compile(r"(?:id|token|handle|index|ref|key|number|name)$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -77,19 +88,34 @@ class DescribedMessages:
         whole = envelope((node,) if node else (), blocks or None, space or port.envelope)
         return b'<?xml version="1.0" encoding="utf-8"?>\n' + whole.written()
 
-    def usual(self, operation: SoapOperation, turn: int = 0) -> tuple[Element | None, Node | None]:
+    def usual(
+        self, operation: SoapOperation, turn: int = 0, given: Mapping[str, Sequence[str]] = _NONE
+    ) -> tuple[Element | None, Node | None]:
         """Return the declaration of an operation's request, and a valid message of it; None if its Body is empty.
 
         Args:
             operation: the operation.
             turn: which of the given values to use, in rotation.
+            given: further values, which the device gave, by what they are called.
 
         Raises:
             NotPossibleError: none can be made.
         """
-        return self._made(operation.request, operation, turn) if operation.request else (None, None)
+        return self._made(operation.request, operation, turn, given) if operation.request else (None, None)
 
-    def _made(self, tag: str, operation: SoapOperation, turn: int = 0) -> tuple[Element, Node]:
+    def invented(self, declared: Element, node: Node) -> list[str]:
+        """Return the names of values that only the device can know: texts, and numbers that are ids."""
+        return [
+            node.at(path).name
+            for path, simple in simple_leaves(declared, node)
+            if not simple.enumeration
+            and (simple.builtin in _TEXTS or (simple.builtin in INTEGERS and _ID.search(node.at(path).name)))
+            and node.at(path).name not in self.values
+        ]
+
+    def _made(
+        self, tag: str, operation: SoapOperation, turn: int = 0, given: Mapping[str, Sequence[str]] = _NONE
+    ) -> tuple[Element, Node]:
         """Return the declaration of an element of an operation's messages, and a valid element.
 
         Raises:
@@ -101,17 +127,38 @@ class DescribedMessages:
         fault = ""
         for optional in (False, True):
             node = ordinary(declared, optional=optional)
+            invented = self.invented(declared, node)
             for path, _ in simple_leaves(declared, node):
-                given = self.values.get(node.at(path).name)
-                if given:
-                    node = with_text(node, path, str(given[turn % len(given)]))
+                name = node.at(path).name
+                values = self.values.get(name) or (given.get(name.lower()) if name in invented else None)
+                if values:
+                    node = with_text(node, path, str(values[turn % len(values)]))
             if lacking := unknown_in(declared, node):
                 fault = f"no document declares what {lacking} holds: give the folder of its schema by --schemas"
                 continue
             fault = self.found.types.invalid(parse(node.written()))
             if not fault:
                 return declared, node
-        raise NotPossibleError(f"no valid {local(tag)} can be made for {operation.name}: {fault}")
+        raise NotPossibleError(f"no valid message can be made for {operation.name}: {fault}")
+
+
+def values_in(element: etree._Element) -> dict[str, list[str]]:
+    """Return the texts in a response by what a request may call them: by element or attribute, and with its parent.
+
+    A `Preset` with the attribute `token` gives a `PresetToken`.
+    """
+    found: dict[str, list[str]] = {}
+    for one in element.iter(etree.Element):
+        own, parent = etree.QName(one).localname, one.getparent()
+        within = etree.QName(parent).localname if parent is not None else ""
+        named = [(within, own, (one.text or "").strip())] if not len(one) else []
+        named += [(own, etree.QName(str(key)).localname, str(text)) for key, text in one.attrib.items()]
+        for outer, name, text in named:
+            for key in (name, f"{outer}{name}", f"{outer.removesuffix('s')}{name}"):
+                values = found.setdefault(key.lower(), [])
+                if text and text not in values:
+                    values.append(text)
+    return {key: values for key, values in found.items() if values}
 
 
 def target_of(port: SoapPort) -> str:

@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.messages import declarations, simple_leaves, with_text
+from conformance.documents.multipart import root_of
 from conformance.documents.openapi import operations_of
 from conformance.documents.soap_services import SoapDescription, SoapOperation, SoapPort, base_of
 from conformance.documents.wsdl_pack import each, label_of, services_of
-from conformance.documents.xml import parse
+from conformance.documents.xml import NotXmlError, elements, parse
 from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_lexical import outside, unreadable
 from conformance.documents.xsd_shapes import Element
-from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
+from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of, values_in
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange, NoAnswerError, Unanswered
 from conformance.verdict.run import Run
+
+if TYPE_CHECKING:
+    from lxml import etree
 
 _STRANGE: Final = "urn:example:roaas"
 # Of one operation, at standard: invalid messages of each kind; and how often the usual one is sent.
@@ -30,12 +35,20 @@ _MOST: Final = 12
 _USUAL: Final = 6
 # One operation may take so long, s.
 _BUDGET_S: Final = 20.0
+_MANY: Final = 1000
+# So many values that the device gave are tried for one operation.
+_TRIED: Final = 3
+
+
+class NotSoapError(ValueError):
+    """Raised for content that is no message of the port's SOAP version; the message says why."""
 
 
 class Kind(StrEnum):
     """What a message shows."""
 
     USUAL = "usual"
+    TRIED = "tried"
     AGAIN = "again"
     INVALID = "invalid"
     UNREADABLE = "unreadable"
@@ -67,15 +80,67 @@ class SoapProbe:
     exchange: Exchange | None = None
     unanswered: Unanswered | None = None
 
+    def inside(self) -> list[etree._Element]:
+        """Return the children of the response's Body.
+
+        Raises:
+            NotSoapError: the response is no message of the port's SOAP version; the message says why.
+        """
+        if self.exchange is None:
+            return []
+        answer = self.exchange.response
+        try:
+            root = root_of(answer.header("content-type") or "", answer.body)
+        except (NotXmlError, ValueError) as error:
+            raise NotSoapError(f"content that cannot be read: {error}") from error
+        if root.tag != clark(self.envelope, "Envelope"):
+            raise NotSoapError(f"the root element {root.tag}")
+        body = [one for one in elements(root) if one.tag == clark(self.envelope, "Body")]
+        if len(body) != 1:
+            raise NotSoapError(f"an Envelope with {len(body)} Body elements")
+        return elements(body[0])
+
+    @property
+    def fault(self) -> etree._Element | None:
+        """The fault in the response, or None."""
+        try:
+            return next((one for one in self.inside() if one.tag == clark(self.envelope, "Fault")), None)
+        except NotSoapError:
+            return None
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the response is a success: 2xx without a fault."""
+        return self.exchange is not None and self.exchange.response.ok and self.fault is None
+
 
 @dataclass
 class _Caller:
-    """Sends messages and records them; ``left_out`` are operations with the reason why they are not called."""
+    """Sends messages and records them; ``left_out`` are operations with the reason why they are not called.
+
+    ``given`` are values that the device gave, by what they are called.
+    """
 
     api: RestInterface
     messages: DescribedMessages
     probes: list[SoapProbe] = field(default_factory=list)
     left_out: list[tuple[str, str]] = field(default_factory=list)
+    given: dict[str, list[str]] = field(default_factory=dict)
+
+    def asks(self, operation: SoapOperation) -> int:
+        """Return how many values the message of an operation has that only the device can know."""
+        try:
+            declared, node = self.messages.usual(operation)
+        except NotPossibleError:
+            return _MANY
+        return len(self.messages.invented(declared, node)) if declared and node else 0
+
+    def learn(self, probe: SoapProbe) -> None:
+        """Keep the values in a success; what is no message teaches nothing."""
+        with contextlib.suppress(NotSoapError):
+            for element in probe.inside():
+                for name, values in values_in(element).items():
+                    self.given.setdefault(name, []).extend(values)
 
     def send(self, port: SoapPort, operation: SoapOperation, kind: Kind, says: str, octets: bytes) -> SoapProbe:
         """Send octets to a port.
@@ -113,7 +178,8 @@ def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
         raise NotPossibleError("the device has no WSDL")
     found, caller = messages.found, _Caller(api, messages)
     described = {item.label: api.call_rules.decide(item) for item in operations_of(api.run.contract)}
-    for port, operation in each(found.ports):
+    # What one operation answers, another asks for: those that ask for nothing that must be known come first.
+    for port, operation in sorted(each(found.ports), key=lambda one: caller.asks(one[1])):
         rule = described[label_of(port, operation)]
         why = operation.remark or ("" if rule.may else str(rule))
         why = why or ("" if port.url.startswith(base_of(found)) else f"its port is at another server, {port.url}")
@@ -132,10 +198,12 @@ def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
 
 def _explore(caller: _Caller, port: SoapPort, operation: SoapOperation) -> None:
     """Send the messages of one operation."""
-    declared, node = caller.messages.usual(operation)
+    declared, node = _usual(caller, port, operation)
     effort = caller.api.run.effort
-    for _ in range(1 if effort.name == "quick" else _USUAL):
-        caller.send(port, operation, Kind.USUAL, "a valid message", caller.messages.message(port, operation, node))
+    for _ in range(0 if effort.name == "quick" else _USUAL - 1):
+        caller.send(
+            port, operation, caller.probes[-1].kind, "a valid message", caller.messages.message(port, operation, node)
+        )
     until = time.monotonic() + _BUDGET_S
     invalid = list(_invalid(caller.messages.found, declared, node)) if declared and node else []
     for says, wrong in effort.draw(invalid, _MOST, f"{caller.api.run.seed}/{label_of(port, operation)}"):
@@ -151,6 +219,30 @@ def _explore(caller: _Caller, port: SoapPort, operation: SoapOperation) -> None:
                 f"a valid message after {says}",
                 caller.messages.message(port, operation, node),
             )
+
+
+def _usual(caller: _Caller, port: SoapPort, operation: SoapOperation) -> tuple[Element | None, Node | None]:
+    """Send valid messages until one is accepted; return the declaration and the last one.
+
+    Where the device refuses a value that the suite invented, it is asked with values that it gave. That it refuses an
+    invented one is no fault: the message is recorded as tried.
+    """
+    messages, tried = caller.messages, list[Node | None]()
+    declared, node = messages.usual(operation)
+    invented = bool(declared and node and messages.invented(declared, node))
+    for turn in range(_TRIED + 1 if invented else 1):
+        if turn:
+            node = messages.usual(operation, turn - 1, caller.given)[1]
+        if node in tried:
+            continue
+        tried.append(node)
+        kind = Kind.TRIED if invented else Kind.USUAL
+        probe = caller.send(port, operation, kind, "a valid message", messages.message(port, operation, node))
+        if probe.succeeded:
+            caller.probes[-1] = replace(probe, kind=Kind.USUAL)
+            caller.learn(probe)
+            break
+    return declared, node
 
 
 def _invalid(found: SoapDescription, declared: Element, node: Node) -> Iterator[tuple[str, Node]]:

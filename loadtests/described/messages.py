@@ -41,12 +41,14 @@ def described_message(device: Device, messages: DescribedMessages, operation: Op
     reply = Reply(local(own.response or ""))
     good, bad = list[bytes](), list[bytes]()
     for node in list(dict.fromkeys(_bodies(messages, own)))[: None if operation.safe else _TRIED]:
-        message = messages.message(port, own, node)
         try:
+            message = messages.message(port, own, node)
             sent = device.api.client.send("POST", target_of(port), headers=fields_of(port, own), body=message)
             answer, request = sent.response, sent.request
             reply.require(answer.status, answer.header("location"), None, answer.body)
             good.append(hidden(bytes_of(request)))
+        except NotPossibleError as error:
+            raise SettingsError(str(error)) from None
         except NoAnswerError as none:
             bad.append(hidden(bytes_of(none.unanswered.request)))
             break  # each further call would wait for the same deadline

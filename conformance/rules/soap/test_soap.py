@@ -9,15 +9,15 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
-from conformance.documents.multipart import parts_of, root_of
+from conformance.documents.multipart import parts_of
 from conformance.documents.soap_services import ENVELOPE_12
 from conformance.documents.traceback import inside_shown
 from conformance.documents.wsdl_pack import services_of
-from conformance.documents.xml import NotXmlError, elements, text_of
-from conformance.documents.xml_names import clark, local
-from conformance.scenarios.rule import Case, Outcome, rule
-from conformance.scenarios.soap_survey import Kind, SoapProbe, soap_survey, wsdl_faults
-from conformance.transport.exchange import NoAnswer, Response
+from conformance.documents.xml import elements, text_of
+from conformance.documents.xml_names import local
+from conformance.scenarios.rule import Case, Note, Outcome, rule
+from conformance.scenarios.soap_survey import Kind, NotSoapError, SoapProbe, soap_survey, wsdl_faults
+from conformance.transport.exchange import NoAnswer
 from conformance.verdict.finding import Showing
 from conformance.verdict.run import Run
 
@@ -32,42 +32,10 @@ _CODES_12 = frozenset({"VersionMismatch", "MustUnderstand", "DataEncodingUnknown
 _OF_NO_VERSION = frozenset({Kind.VERSION, Kind.UNREADABLE, Kind.EMPTY})
 # Values in what is wrong, which are no other cause; names of elements and prefixes are.
 _VALUES = re.compile(r"'(?!\{)[^']*'|(?<=fault: ).*|\d+(?=, column|\)|$)", re.DOTALL)
+# How a device says that it lacks an operation (ONVIF Core, 5.11.2; WS-Addressing SOAP Binding, 6.4.2).
+_OPTIONAL = re.compile(r"not\s?(?:supported|implemented)", re.IGNORECASE)
+_VALID = frozenset({Kind.USUAL, Kind.TRIED})
 Trace = tuple[SoapProbe, ...]
-
-
-class _NotSoapError(ValueError):
-    """Raised for content that is no message of the port's SOAP version; the message says why."""
-
-
-def _body(answer: Response, envelope: str) -> list[etree._Element]:
-    """Return the children of a response's Body.
-
-    Raises:
-        _NotSoapError: there is none.
-    """
-    try:
-        root = root_of(answer.header("content-type") or "", answer.body)
-    except (NotXmlError, ValueError) as error:
-        raise _NotSoapError(f"content that cannot be read: {error}") from error
-    if root.tag != clark(envelope, "Envelope"):
-        raise _NotSoapError(f"the root element {root.tag}")
-    body = [one for one in elements(root) if one.tag == clark(envelope, "Body")]
-    if len(body) != 1:
-        raise _NotSoapError(f"an Envelope with {len(body)} Body elements")
-    return elements(body[0])
-
-
-def _fault(probe: SoapProbe) -> etree._Element | None:
-    """Return the fault in a response, or None."""
-    try:
-        inside = _body(probe.exchange.response, probe.envelope) if probe.exchange else []
-    except _NotSoapError:
-        return None
-    return next((one for one in inside if one.tag == clark(probe.envelope, "Fault")), None)
-
-
-def _succeeded(probe: SoapProbe) -> bool:
-    return probe.exchange is not None and probe.exchange.response.ok and _fault(probe) is None
 
 
 def _told(
@@ -79,14 +47,14 @@ def _told(
     another fault as well would show two things.
     """
     plain: dict[str, tuple[SoapProbe, str]] = {}
-    for probe in sorted(trace, key=lambda one: one.kind is not Kind.USUAL):
+    for probe in sorted(trace, key=lambda one: one.kind not in _VALID):
         found = wrong(probe)
         if found is None:
             continue
         cause = f"{_VALUES.sub('#', found)} {probe.kind if by_kind else ''}"
         shown = probe, found
         if found and not by_kind:
-            shown = plain.setdefault(cause, shown) if probe.kind is Kind.USUAL else plain.get(cause, shown)
+            shown = plain.setdefault(cause, shown) if probe.kind in _VALID else plain.get(cause, shown)
         name, own = shown[0].operation.rpartition("/")[2], probe.exchange or probe.unanswered
         yield Case(
             not found,
@@ -134,8 +102,8 @@ def message(trace: Trace) -> Iterator[Outcome]:
         if probe.response is None and not answer.body:
             return None
         try:
-            _body(answer, probe.envelope)
-        except _NotSoapError as error:
+            probe.inside()
+        except NotSoapError as error:
             return None if probe.kind in _OF_NO_VERSION else str(error)
         return ""
 
@@ -151,8 +119,8 @@ def media_type(trace: Trace) -> Iterator[Outcome]:
         if answer is None or not answer.body or probe.kind in _OF_NO_VERSION:
             return None
         try:
-            _body(answer, probe.envelope)
-        except _NotSoapError:
+            probe.inside()
+        except NotSoapError:
             return None
         wanted = "application/soap+xml" if probe.envelope == ENVELOPE_12 else "text/xml"
         given = answer.media_type
@@ -169,11 +137,11 @@ def response_valid(trace: Trace, run: Run) -> Iterator[Outcome]:
     found = services_of(run.contract)
 
     def wrong(probe: SoapProbe) -> str | None:
-        if found is None or not _succeeded(probe) or probe.exchange is None or probe.response is None:
+        if found is None or not probe.succeeded or probe.exchange is None or probe.response is None:
             return None
         try:
-            inside = _body(probe.exchange.response, probe.envelope)
-        except _NotSoapError:
+            inside = probe.inside()
+        except NotSoapError:
             return None
         if probe.response and found.types.shape(probe.response) is None:
             return None
@@ -191,7 +159,7 @@ def fault(trace: Trace) -> Iterator[Outcome]:
     """Judge whether a fault has what its SOAP version demands: a code that is a QName, and a text."""
 
     def wrong(probe: SoapProbe) -> str | None:
-        found = _fault(probe)
+        found = probe.fault
         if found is None or probe.kind in _OF_NO_VERSION:
             return None
         return _wrong_fault_12(found) if probe.envelope == ENVELOPE_12 else _wrong_fault_11(found)
@@ -231,7 +199,7 @@ def fault_status(trace: Trace) -> Iterator[Outcome]:
     """Judge whether a fault of SOAP 1.1 has status 500 (SOAP 1.1, 6.2), and one of SOAP 1.2 has 400 or 500."""
 
     def wrong(probe: SoapProbe) -> str | None:
-        if _fault(probe) is None or probe.exchange is None:
+        if probe.fault is None or probe.exchange is None:
             return None
         status = probe.exchange.response.status
         allowed = {_BAD, _FAILED} if probe.envelope == ENVELOPE_12 else {_FAILED}
@@ -241,14 +209,21 @@ def fault_status(trace: Trace) -> Iterator[Outcome]:
 
 
 @rule("soap/valid-accepted", on=_ON)
-def valid_accepted(trace: Trace) -> Iterator[Outcome]:
-    """Judge whether a message that the WSDL allows is accepted."""
-    usual = [one for one in trace if one.kind is Kind.USUAL]
-    return _told(usual, "success", lambda one: None if one.exchange is None else "" if _succeeded(one) else _came(one))
+def valid_accepted(trace: Trace, run: Run) -> Iterator[Outcome]:
+    """Judge whether a message that the WSDL allows is accepted; a device need not have all that a standard's has."""
+    found = services_of(run.contract)
+    lacking = {one for one in trace if found is not None and found.foreign and _OPTIONAL.search(_came(one))}
+    usual = [one for one in trace if one.kind is Kind.USUAL and one.exchange is not None and one not in lacking]
+    yield from _told(usual, "success", lambda one: "" if one.succeeded else _came(one))
+    accepted = {one.operation for one in usual}
+    for label in dict.fromkeys(one.operation for one in trace if one.kind in _VALID):
+        if label not in accepted:
+            name = label.rpartition("/")[2]
+            yield Note(f"{name} refused each message: the suite does not know its values. Name some in [values].")
 
 
 def _came(probe: SoapProbe) -> str:
-    found = _fault(probe)
+    found = probe.fault
     if found is None:
         return f"status {probe.exchange.response.status}" if probe.exchange else "no response"
     return f"a fault: {' '.join(' '.join(map(str, found.itertext())).split())[:200]}"
@@ -256,7 +231,7 @@ def _came(probe: SoapProbe) -> str:
 
 def _refused(trace: Trace, expected: str, *kinds: Kind) -> Iterator[Outcome]:
     def wrong(probe: SoapProbe) -> str | None:
-        return None if probe.exchange is None else "success" if _succeeded(probe) else ""
+        return None if probe.exchange is None else "success" if probe.succeeded else ""
 
     return _told((one for one in trace if one.kind in kinds), expected, wrong, by_kind=True)
 
@@ -299,7 +274,7 @@ def no_bare_error(trace: Trace) -> Iterator[Outcome]:
         status = probe.exchange.response.status if probe.exchange else 0
         if status < _FAILED or probe.kind in _OF_NO_VERSION:
             return None if status == 0 else ""
-        return "" if _fault(probe) is not None else f"status {status} without a fault"
+        return "" if probe.fault is not None else f"status {status} without a fault"
 
     return _told(trace, "a fault, if it fails", wrong)
 
@@ -307,12 +282,12 @@ def no_bare_error(trace: Trace) -> Iterator[Outcome]:
 @rule("soap/recovers", on=_ON)
 def recovers(trace: Trace) -> Iterator[Outcome]:
     """Judge whether a valid message is answered after wrong ones as it was before them."""
-    before = {one.operation: _succeeded(one) for one in trace if one.kind is Kind.USUAL}
+    before = {one.operation: one.succeeded for one in trace if one.kind is Kind.USUAL}
 
     def wrong(probe: SoapProbe) -> str | None:
         if not before.get(probe.operation) or probe.exchange is None:
             return None
-        return "" if _succeeded(probe) else _came(probe)
+        return "" if probe.succeeded else _came(probe)
 
     return _told((one for one in trace if one.kind is Kind.AGAIN), "success, as before", wrong)
 

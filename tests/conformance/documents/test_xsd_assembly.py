@@ -135,7 +135,7 @@ _UNKNOWN = {
     "head": '<xs:sequence><xs:element name="n" type="xs:int"/></xs:sequence>',
 }
 _RIGHT = {
-    "type": "<v><a>1</a></v><n>1</n>",
+    "type": '<v xsi:type="x:Other"><a>1</a></v><n>1</n>',
     "element": "<x:e><b/></x:e><n>1</n>",
     "base": "<x:any>1</x:any><n>1</n>",
     "group": "<n>1</n><x:a/>",

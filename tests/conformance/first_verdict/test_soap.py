@@ -1,0 +1,77 @@
+"""A camera over SOAP: a right one is not blamed, and what is wrong in one operation is found there."""
+
+import subprocess
+
+from camera import FILES, Camera
+from small_device import certified, small_device
+
+_OPERATIONS = {
+    "GetStatus", "GetPresets", "DescribePreset", "GetNodes", "Stop", "GetSettings", "GetGain", "GetEvents",
+    "GetSnapshot",
+}  # fmt: skip
+_BROKEN = {
+    "GetStatus": '<k:Position x="far" y="0"/><k:Mode>IDLE</k:Mode><k:UtcTime>2026-01-31T12:00:00Z</k:UtcTime>',
+    "GetPresets": "<k:Preset/>",
+    "GetNodes": '<z:GetNodesResponse xmlns:z="urn:other"/>',
+    "GetSettings": "fault",
+    "GetEvents": "",
+}
+
+
+def _failures(outcome, id_):
+    return outcome.requirement(id_)["failures"]
+
+
+def test_a_right_camera_is_not_blamed(tmp_path):
+    with small_device({}, Camera().routes) as url:
+        outcome = certified(f"{url}/a/camera.wsdl", tmp_path, "--call", "Stop")
+    assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
+    called = {one["operation"].rpartition("/")[2] for one in outcome.result["api"]["operations"] if one["requests"]}
+    assert called == _OPERATIONS
+
+
+def test_what_is_wrong_in_one_operation_is_found_there(tmp_path):
+    with small_device({}, Camera(_BROKEN).routes) as url:
+        outcome = certified(f"{url}/a/camera.wsdl", tmp_path)
+        assert outcome.exit_code == 1
+        assert outcome.blamed == {"soap/response-valid": "fail", "soap/valid-accepted": "warn"}
+        wrong = _failures(outcome, "soap/response-valid")
+        assert {one["subject"] for one in wrong} == {"GetStatus", "GetPresets", "GetNodes", "GetEvents"}
+        refused = _failures(outcome, "soap/valid-accepted")
+        assert [one["subject"] for one in refused] == ["GetSettings"]
+        # What the terminal shows does it again, in one line and in any shell.
+        shown = next(line for line in outcome.text.splitlines() if "replay: " in line and "/events" in line)
+        again = subprocess.run(["sh", "-c", shown.partition("replay: ")[2]], capture_output=True, check=True)
+        assert b"GetEventsResponse" in again.stdout, again
+
+
+def test_one_cause_is_one_finding_with_a_valid_message(tmp_path):
+    with small_device({}, Camera(media_type="text/plain").routes) as url:
+        outcome = certified(f"{url}/a/camera.wsdl", tmp_path)
+    assert set(outcome.blamed) == {"soap/media-type"}
+    (finding,) = _failures(outcome, "soap/media-type")
+    assert "a valid message of" in finding["message"]
+
+
+def test_a_standards_file_serves_without_the_schemas_of_others(tmp_path):
+    """The camera lacks an operation, and the file imports what is nowhere: both are notes."""
+    missing = '<xs:import namespace="urn:nowhere" schemaLocation="nowhere.xsd"/>'
+    wsdl = FILES["/a/camera.wsdl"].replace("<xs:redefine", f"{missing}<xs:redefine", 1)
+    wsdl = wsdl.replace('type="c:Shape" maxOccurs', 'xmlns:n="urn:nowhere" type="n:Shape" maxOccurs')
+    for path, text in {**FILES, "/a/camera.wsdl": wsdl}.items():
+        place = tmp_path / path[1:]
+        place.parent.mkdir(exist_ok=True)
+        place.write_text(text.replace("BASE", "http://www.example.org"), encoding="utf-8")
+    with small_device({}, Camera({"GetStatus": "fault: not supported"}).routes) as url:
+        outcome = certified(tmp_path / "a" / "camera.wsdl", tmp_path / "out", "--base-url", url)
+    assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
+    assert any("nowhere.xsd could not be read" in note for note in outcome.result["notes"])
+    assert "nowhere.xsd could not be read" in outcome.text
+
+
+def test_a_wsdl_of_which_nothing_is_called_is_inconclusive(tmp_path):
+    with small_device({}, Camera().routes) as url:
+        outcome = certified(f"{url}/a/camera.wsdl", tmp_path, "--never", "*")
+    assert (outcome.exit_code, outcome.result["verdict"]) == (4, "inconclusive")
+    assert "no operation could be called" in outcome.text
+    assert "GetStatus: --never excludes it" in outcome.requirement("soap/answered")["reason"]
