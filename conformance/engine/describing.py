@@ -9,6 +9,7 @@ from urllib.parse import urljoin, urlsplit
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.documents.description import Description, DescriptionError, is_url, read_description
+from conformance.documents.security import without_credentials
 from conformance.statement.endpoints import Endpoints
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError
@@ -137,7 +138,8 @@ def described_contract(
         raise DescriptionError(
             f"{source} names no server: say where the API is with --base-url, as in --base-url http://robot:8000"
         )
-    folder = write_described_pack(out / FOLDER, found.document, found.original, found.unresolved, moves=moves)
+    document = without_credentials(found.document, connection.credentials.places)
+    folder = write_described_pack(out / FOLDER, document, found.original, found.unresolved, moves=moves)
     Contract.load.cache_clear()
     remarks = () if base_url or endpoints.rest else found.remarks
     return Contract.load(folder), msgspec.structs.replace(endpoints, rest=base), remarks

@@ -8,6 +8,7 @@ from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
 from conformance.documents.openapi import operations_of
+from conformance.documents.security import demands
 from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.client import HttpClient
@@ -20,8 +21,7 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
     closed = [
         item
         for item in operations_of(api.run.contract)
-        # An alternative without a scheme means that credentials are optional (OpenAPI 3.1, 4.8.30).
-        if item.security and all(item.security) and allowed(api, item)
+        if demands(api.run.contract.openapi, item) and allowed(api, item)
     ]
     if not closed:
         raise NotPossibleError("no operation that may be called requires credentials by the description")

@@ -175,10 +175,10 @@ class HttpClient:
         shown = tuple((name, value) for name, value in fields if name != "Connection")
         sent, target, query = list(fields), path, ""
         if authorized:
-            credentials, names = self.connection.credentials, [name for name, _ in fields]
+            credentials = self.connection.credentials
             target, query = credentials.target(path), credentials.target(path, shown=True)[len(path) :]
-            sent += credentials.fields(method, self.prefix + target, names)
-            shown += tuple(credentials.fields(given=names, shown=True))
+            sent = credentials.added(fields, method, self.prefix + target)
+            shown = tuple(credentials.added(shown, shown=True))
         request = Request(method, self.url(path), shown, body, query=query)
         endpoint = request.endpoint
         if sum(time.monotonic() - at < _HANGS_WITHIN_S for at in self._hangs[endpoint]) >= _HANGS:
@@ -190,7 +190,7 @@ class HttpClient:
         try:
             response = self._exchange(method, target, sent, body, deadline, fresh=fresh)
             if authorized and response.status == _CHALLENGE and credentials.learn(response.headers):
-                sent = [*fields, *credentials.fields(method, self.prefix + target, names)]
+                sent = credentials.added(fields, method, self.prefix + target)
                 response = self._exchange(method, target, sent, body, deadline, fresh=fresh)
             self.connection.note(method)
         except _SilenceError as none:

@@ -6,7 +6,7 @@ the name of a shell variable (``$ROAAS_TOKEN``) where the secret was.
 
 import base64
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -24,6 +24,9 @@ _REQUEST_LINE: Final = re.compile(rb"(\S+) (\S+) HTTP/")
 _ANSWER: Final = re.compile(r"(Authorization: Digest )[^\r\n]*")
 _SHOWN_ANSWER: Final = re.compile(rb"Authorization: Digest \$ROAAS_DIGEST\r\n")
 _WRONG: Final = "roaas-not-this-one"
+# Headers whose value begins with the name of a scheme (RFC 9110 11.6.2, 11.7.2); a pair in a Cookie header.
+_AUTHORIZATION: Final = frozenset({"authorization", "proxy-authorization"})
+_COOKIE_VALUE: Final = re.compile(r"([^=;\s]+=)[^;]*")
 
 
 class Kind(StrEnum):
@@ -54,7 +57,7 @@ class Credential:
     @property
     def variable(self) -> str:
         """The shell variable that stands for the sent text, with its dollar sign; the text itself where it is wrong."""
-        if self.secret.startswith(_WRONG):
+        if _WRONG in self.secret:
             return self.sent
         own = {Kind.BEARER: "TOKEN", Kind.BASIC: "BASIC", Kind.DIGEST: "DIGEST"}.get(self.kind)
         return f"$ROAAS_{own or re.sub('[^A-Z0-9]', '_', f'{self.kind}_{self.name}'.upper())}"
@@ -84,9 +87,34 @@ class Credential:
 
     @property
     def wrong(self) -> "Credential":
-        """The same credential with a secret that no robot knows."""
-        pair = self.kind in {Kind.BASIC, Kind.DIGEST}
-        return Credential(self.kind, f"{_WRONG}:x" if pair else _WRONG, self.name)
+        """The same credential with a secret that no robot knows; the scheme of an Authorization header is kept."""
+        secret = f"{_WRONG}:x" if self.kind in {Kind.BASIC, Kind.DIGEST} else _WRONG
+        if self.kind is Kind.HEADER and self.name.lower() == "cookie":
+            secret = _COOKIE_VALUE.sub(rf"\1{_WRONG}", self.secret)
+        return Credential(self.kind, f"{self.scheme} {secret}".lstrip(), self.name)
+
+    @property
+    def scheme(self) -> str:
+        """The authentication scheme in the value of an Authorization header that was given whole; else empty."""
+        is_whole = self.kind is Kind.HEADER and self.name.lower() in _AUTHORIZATION
+        return self.secret.rpartition(" ")[0].partition(" ")[0] if is_whole else ""
+
+    @property
+    def secrets(self) -> tuple[str, ...]:
+        """The texts that must not be shown, the longest first."""
+        parts = [*self.secret.split(":", 1)[1:], self.secret.removeprefix(self.scheme).lstrip()]
+        if self.kind is Kind.HEADER and self.header.lower() == "cookie":
+            parts += [pair.partition("=")[2] for pair in self.secret.split("; ")]
+        return tuple(sorted({self.sent, self.secret, *parts}, key=len, reverse=True))
+
+    @property
+    def places(self) -> tuple[tuple[str, str], ...]:
+        """Where it goes, as a description names that: header, query or cookie, and its name there."""
+        if self.kind in {Kind.QUERY, Kind.COOKIE}:
+            return ((str(self.kind), self.name),)
+        if self.header.lower() == "cookie":
+            return tuple(("cookie", found[1].rstrip("=")) for found in _COOKIE_VALUE.finditer(self.secret))
+        return (("header", self.header.lower()),)
 
     @cached_property
     def digest(self) -> "DigestUser":
@@ -109,6 +137,19 @@ class Credentials:
 
     def __bool__(self) -> bool:
         return bool(self.items)
+
+    def added(
+        self, fields: Sequence[tuple[str, str]], method: str = "GET", target: str = "/", *, shown: bool = False
+    ) -> list[tuple[str, str]]:
+        """Return a request's headers with the credentials; cookies join those of the request (RFC 6265 5.4)."""
+        names = [name for name, _ in fields if name.lower() != "cookie"]
+        more = self.fields(method, target, names, shown=shown)
+        cookies = "; ".join(value for name, value in more if name.lower() == "cookie")
+        found = [
+            (name, f"{value}; {cookies}" if cookies and name.lower() == "cookie" else value) for name, value in fields
+        ]
+        joined = len(names) < len(fields)
+        return [*found, *(pair for pair in more if not (joined and pair[0].lower() == "cookie"))]
 
     def fields(
         self, method: str = "GET", target: str = "/", given: Iterable[str] = (), *, shown: bool = False
@@ -144,6 +185,11 @@ class Credentials:
         """Whether nothing can be sent with digest authentication yet, as the device has sent no challenge."""
         return any(item.kind is Kind.DIGEST and not item.digest.answer("GET", "/") for item in self.items)
 
+    @property
+    def repeats_target(self) -> bool:
+        """Whether a header has the request target once more (RFC 7616 3.4)."""
+        return any(item.kind is Kind.DIGEST for item in self.items)
+
     def target(self, target: str, *, shown: bool = False) -> str:
         """Return a request target with the credentials that go into the query."""
         queries = [item.value(item.variable if shown else item.sent) for item in self.items if not item.header]
@@ -154,7 +200,7 @@ class Credentials:
         if any(item.kind is Kind.DIGEST for item in self.items):
             text = _ANSWER.sub(r"\1$ROAAS_DIGEST", text)
         for item in self.items:
-            for secret in {item.sent, item.secret, *item.secret.split(":", 1)[1:]}:
+            for secret in item.secrets:
                 if len(secret) >= _SHORTEST:
                     text = text.replace(secret, item.variable)
         return text
@@ -183,6 +229,11 @@ class Credentials:
         if isinstance(value, dict):
             return {key: self.hidden_in(item) for key, item in value.items()}
         return [self.hidden_in(item) for item in value] if isinstance(value, list | tuple) else value
+
+    @property
+    def places(self) -> tuple[tuple[str, str], ...]:
+        """Where they go, as a description names that."""
+        return tuple(place for item in self.items for place in item.places)
 
     @property
     def wrong(self) -> "Credentials":

@@ -15,6 +15,7 @@ import requests
 import schemathesis
 from hypothesis.strategies import SearchStrategy
 from schemathesis import GenerationMode
+from schemathesis.config import SchemathesisConfig
 from schemathesis.core.result import Ok
 from schemathesis.core.transport import Response as ThesisResponse
 from schemathesis.generation.drivers import CoverageGenerator, ExamplesGenerator
@@ -94,7 +95,7 @@ def targets(contract: Contract) -> tuple[Target, ...]:
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        schema = schemathesis.openapi.from_dict(contract.openapi)
+        schema = _loaded(contract.openapi)
         found = []
         for result in schema.get_all_operations():
             operation: Any = result.ok() if isinstance(result, Ok) else None
@@ -104,12 +105,21 @@ def targets(contract: Contract) -> tuple[Target, ...]:
         return tuple(found)
 
 
+def _loaded(document: dict[str, Any]) -> Any:
+    """Return the Schemathesis schema of a document without its credentials: the client adds those of the run.
+
+    A case that left them out would be judged by a request that was sent with them.
+    """
+    config = SchemathesisConfig.from_dict({"generation": {"with-security-parameters": False}})
+    return schemathesis.openapi.from_dict(document, config=config)
+
+
 def state_machine(document: dict[str, Any]) -> Any:
     """Return the state machine of the contract's OpenAPI links, or None without links."""
     from schemathesis.core.errors import NoLinksFound  # noqa: PLC0415 - an internal name, used here alone
 
     try:
-        machine = schemathesis.openapi.from_dict(document).as_state_machine()
+        machine = _loaded(document).as_state_machine()
         machine()  # of some descriptions it is told only here that there are none
     except NoLinksFound:
         return None

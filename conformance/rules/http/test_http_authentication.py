@@ -12,6 +12,7 @@ from conformance.api.rest.calls import Call, example_call
 from conformance.api.rest.effects import differs_from, reader_of, takes_effect
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.openapi import operations_of
+from conformance.documents.security import is_http_authentication
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
@@ -31,11 +32,12 @@ def test_requests_without_a_token(api: RestInterface, rest: HttpClient, judge: J
             judge.unclaimed(id_, "the run has no token, and the robot requires none")
     for call in reads(api):
         usual = call.send(api).response.status
-        _judge(judge, rest.send("GET", call.path, authorized=False), usual)
+        asking = _asking(api, call)
+        _judge(judge, rest.send("GET", call.path, authorized=False), usual, asking)
         if has_token:
             stranger = replace(connection, token=None, credentials=connection.credentials.wrong)
             with closing(HttpClient(rest.base_url, stranger)) as unknown:
-                _judge(judge, unknown.send("GET", call.path), usual)
+                _judge(judge, unknown.send("GET", call.path), usual, asking)
 
 
 @pytest.mark.phase("input")
@@ -90,9 +92,24 @@ def _shown(api: RestInterface, call: Call) -> int:
     return reader.send(api).response.status if reader is not None else 0
 
 
-def _judge(judge: Judge, exchange: Exchange, usual: int) -> None:
+def _asking(api: RestInterface, call: Call) -> frozenset[int]:
+    """Return the statuses in place of which 401 should ask for the credentials of HTTP (RFC 9110 11.4).
+
+    A device that is known by its description may hide a resource (404, RFC 9110 15.5.4), may refuse as it declares, and
+    refuses other credentials than those of HTTP, such as an API key, by whatever status fits.
+    """
+    contract = api.run.contract
+    if not contract.described:
+        return _REFUSED
+    if not is_http_authentication(contract.openapi, call.operation):
+        return frozenset()
+    declared = {status for status in _REFUSED if str(status) in call.operation.responses}
+    return _REFUSED - declared - {HTTPStatus.NOT_FOUND}
+
+
+def _judge(judge: Judge, exchange: Exchange, usual: int, asking: frozenset[int]) -> None:
     status = exchange.response.status
     if status == HTTPStatus.UNAUTHORIZED:
         expect(judge, "http/authentication", exchange).header("WWW-Authenticate")
-    if status in _REFUSED and status != usual:
+    if (status == HTTPStatus.UNAUTHORIZED or status in asking) and status != usual:
         expect(judge, "http/authentication-asked", exchange).status(401, when="the token is missing or wrong")

@@ -149,6 +149,9 @@ def test_large_field(api: RestInterface, judge: Judge) -> None:
 @pytest.mark.requirement("http/target-length")
 def test_targets_of_8000_octets(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Send a target of 8,000 octets where the robot takes a short one: RECOMMENDED (RFC 9110 4.1)."""
+    if rest.connection.credentials.repeats_target:
+        judge.unclaimed("http/target-length", "a digest repeats the target in a header, whose size may have a limit")
+        return
     for call in [call for call in reads(api) if not call.operation.optional]:
         path = f"{call.path}{'&' if '?' in call.path else '?'}roaas="
         usual = usual_status(partial(rest.send, "GET", f"{path}a"))

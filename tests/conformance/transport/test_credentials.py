@@ -75,6 +75,35 @@ def test_a_request_can_be_sent_without_and_with_wrong_ones(heard):
     assert not any(secret in got[1] for secret in _SECRETS)
 
 
+@pytest.mark.parametrize(
+    ("name", "secret", "wrong", "places"),
+    [
+        ("Authorization", "ApiKey s3same-1", "ApiKey roaas-not-this-one", (("header", "authorization"),)),
+        ("Authorization", "s3same-1", "roaas-not-this-one", (("header", "authorization"),)),
+        ("X-Key", "s3same-1", "roaas-not-this-one", (("header", "x-key"),)),
+        (
+            "Cookie",
+            "id=s3same-1; theme=dark",
+            "id=roaas-not-this-one; theme=roaas-not-this-one",
+            (("cookie", "id"), ("cookie", "theme")),
+        ),
+    ],
+)
+def test_a_wrong_credential_keeps_its_scheme_and_its_names(name, secret, wrong, places):
+    credential = Credential(Kind.HEADER, secret, name)
+    assert (credential.wrong.secret, credential.wrong.variable, credential.places) == (wrong, wrong, places)
+    assert "s3same-1" not in Credentials((credential,)).hidden('{"you sent": "s3same-1"}')
+
+
+def test_cookies_of_credentials_join_those_of_the_request(heard):
+    url, got = heard
+    client = HttpClient(url, Connection(credentials=_ALL))
+    exchange = client.send("GET", "/", headers=[("Cookie", "own=1")])
+    assert "\r\nCookie: own=1; session=k3y-in-cookie; more=second-cookie\r\n" in got[0]
+    assert got[0].count("Cookie:") == 1
+    assert dict(exchange.request.headers)["Cookie"] == "own=1; session=$ROAAS_COOKIE_SESSION; more=$ROAAS_COOKIE_MORE"
+
+
 def test_raw_and_partial_requests_carry_them_and_do_not_show_them(heard):
     url, got = heard
     client = HttpClient(url, Connection(credentials=_ALL))

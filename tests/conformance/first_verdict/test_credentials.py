@@ -1,0 +1,96 @@
+"""A device that wants credentials is not blamed for that, and is not praised where it refused them all."""
+
+import pytest
+from guarded_device import SECRET, guarded
+from small_device import certified, constant, small_device
+
+
+@pytest.fixture(name="secret")
+def _secret(tmp_path):
+    """Return a function that writes a file with a credential, and returns its path."""
+
+    def written(text):
+        path = tmp_path / f"secret-{len(list(tmp_path.iterdir()))}"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return written
+
+
+# A parameter that a scheme names is the credential; X-Token is none, as no scheme names it.
+_DECLARED = [
+    {"name": "X-Api-Key", "in": "header", "required": True, "schema": {"type": "string"}},
+    {"name": "key", "in": "query", "schema": {"type": "string"}},
+    {"name": "X-Lease", "in": "header", "required": True, "schema": {"type": "string"}},
+    {"name": "X-Token", "in": "header", "schema": {"type": "string"}},
+]
+
+
+def test_credentials_of_each_kind_together_and_as_alternatives(secret, tmp_path):
+    description, routes = guarded(
+        [{"bearer": []}],
+        [{"key": []}],
+        [{"query": []}],
+        [{"cookie": []}],
+        [{"bearer": [], "key": [], "cookie": []}],
+        [{"own": []}, {"bearer": []}],
+        [{"oauth": ["read"]}],
+        [{"openid": []}],
+        [{"certificate": []}],
+        [{"key": []}, {}],
+        [],
+        shared=[{"bearer": []}],
+        parameters=_DECLARED,
+    )
+    headers = secret(f"X-Api-Key: {SECRET}\nCookie: session={SECRET}; theme=dark\nX-Lease: lease-4711")
+    with small_device(description, routes) as url:
+        done = certified(
+            url, tmp_path / "out", "--token-file", secret(SECRET), "--headers-file", headers,
+            "--api-key", "query key", "--api-key-file", secret(SECRET),
+        )  # fmt: skip
+    assert (done.blamed, done.exit_code) == ({}, 0), done.text
+    assert done.requirement("description/security")["verdict"] == "pass"
+    assert SECRET not in str(done.result)
+
+
+@pytest.mark.parametrize(
+    ("kind", "refusal", "option", "text"),
+    [
+        ("digest", 401, "--digest-file", f"user:{SECRET}"),
+        ("own", 403, "--headers-file", f"Authorization: ApiKey {SECRET}"),
+    ],
+)
+def test_credentials_of_each_kind_alone(kind, refusal, option, text, secret, tmp_path):
+    description, routes = guarded([{kind: []}], refusal=refusal)
+    description["components"]["securitySchemes"] = {kind: description["components"]["securitySchemes"][kind]}
+    with small_device(description, routes) as url:
+        done = certified(url, tmp_path / "out", option, secret(text))
+    assert (done.blamed, done.exit_code) == ({}, 0), done.text
+    assert SECRET not in str(done.result)
+
+
+def test_an_operation_that_takes_no_credentials_of_swagger_2_is_found_and_others_are_not(secret, tmp_path):
+    _, routes = guarded([{"basic": []}], [{"key": []}])
+    routes["/open"] = guarded([])[1]["/open"]
+    routes["/open"]["GET"] = constant({"on": True})["GET"]
+    answered = {"200": {"description": "ok", "schema": {"type": "object"}}, "401": {"description": "no"}}
+    description = {
+        "swagger": "2.0",
+        "info": {"title": "device", "version": "1"},
+        "produces": ["application/json"],
+        "securityDefinitions": {
+            "basic": {"type": "basic"},
+            "key": {"type": "apiKey", "in": "header", "name": "X-Api-Key"},
+        },
+        "paths": {
+            path: {"get": {"responses": answered, "security": [{path.strip("/").replace("open", "key"): []}]}}
+            for path in routes
+        },
+    }
+    with small_device(description, routes) as url:
+        done = certified(
+            url, tmp_path / "out", "--basic-file", secret(f"user:{SECRET}"), "--api-key-file", secret(SECRET)
+        )
+    assert (done.blamed, done.exit_code) == ({"description/security": "fail"}, 1), done.text
+    told = done.requirement("description/security")["failures"]
+    assert {failure["request"]["url"].rpartition("/")[2] for failure in told} == {"open"}
