@@ -53,6 +53,8 @@ def print_summary(outcome: Certification) -> None:
                 _print_cause(cause, requirement)
             else:
                 _print_line(cause, requirement)
+    if "web_server" in document:
+        click.echo(f"\nThe web server\n  {inert(document['web_server']['text'])}")
     if document["causes"]:
         id_ = document["causes"][0]["requirement"]
         click.echo(f"\nwhy a requirement matters and how to meet it: roaas explain ID, as in roaas explain {id_}")

@@ -79,6 +79,9 @@ class ConformanceClass:
         interfaces: the interfaces that it judges.
         one_is_enough: whether one of these interfaces suffices; otherwise all that the contract describes must respond.
         topic: of its requirements that name none.
+        within: the class that has its requirements in a contract that does not have this class; empty: none.
+        beside: whether a device that is judged by its own description has it beside its verdict: the class is judged
+            and shown, and decides nothing, unless a claim names it.
     """
 
     name: str
@@ -86,6 +89,8 @@ class ConformanceClass:
     interfaces: tuple[Interface, ...]
     one_is_enough: bool = False
     topic: Topic = Topic.SERVICE
+    within: str = ""
+    beside: bool = False
 
     def missing(self, there: Collection[Interface], described: Collection[Interface] = EVERY) -> tuple[Interface, ...]:
         """Return the interfaces that the class needs and the contract describes, but that have no address."""

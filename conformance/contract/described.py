@@ -19,7 +19,7 @@ TITLE: Final = "its own description"
 MOTION: Final = "motion"
 #: The class of a device that is known by its WSDL.
 SOAP: Final = "soap"
-_CLASSES: Final = ("description", "robustness", "http")
+_CLASSES: Final = ("description", "robustness", "http", "web-server")
 # The class `description` judges these of each operation, and tells what operations have in common once.
 _WITHOUT: Final = ("http/declared-status", "http/declared-body", "http/json-integers", "http/no-traceback")
 # Formats in which one value can be written.

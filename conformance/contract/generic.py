@@ -22,6 +22,8 @@ class ClassEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     one_is_enough: bool = False
     topic: Topic | None = None
     acts: bool = False
+    within: str = ""
+    beside: bool = False
 
 
 class _Classes(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -36,7 +38,13 @@ def generic_classes() -> dict[str, ConformanceClass]:
     entries = read_toml(GENERIC_RULES / "classes.toml", _Classes, ContractError).class_
     return {
         item.name: ConformanceClass(
-            item.name, item.title or "", item.interfaces or (), item.one_is_enough, item.topic or Topic.SERVICE
+            item.name,
+            item.title or "",
+            item.interfaces or (),
+            item.one_is_enough,
+            item.topic or Topic.SERVICE,
+            item.within,
+            item.beside,
         )
         for item in entries
     }

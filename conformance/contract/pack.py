@@ -153,7 +153,15 @@ class Contract:
             interfaces = entry.interfaces or (known.interfaces if known else ())
             enough = known.one_is_enough if known else entry.one_is_enough
             topic = entry.topic or (known.topic if known else Topic.SERVICE)
-            found[entry.name] = ConformanceClass(entry.name, entry.title or known.title, interfaces, enough, topic)  # type: ignore[union-attr] # checked above
+            beside = known is not None and known.beside and self.described
+            found[entry.name] = ConformanceClass(
+                entry.name,
+                entry.title or known.title,  # type: ignore[union-attr] # checked above
+                interfaces,
+                enough,
+                topic,
+                beside=beside,
+            )
         return found
 
     @property
@@ -163,7 +171,7 @@ class Contract:
 
     @cached_property
     def profiles(self) -> dict[str, tuple[str, ...]]:
-        """The classes that each profile claims; "full" claims all.
+        """The classes that each profile claims; "full" claims all that decide a verdict.
 
         Raises:
             ContractError: a profile names an unknown class.
@@ -174,7 +182,7 @@ class Contract:
                 raise ContractError(
                     f"{self.directory / MANIFEST}: profile {profile!r} names {name!r}, which is no class"
                 )
-        return {**named, FULL: tuple(self.classes)}
+        return {**named, FULL: tuple(name for name, item in self.classes.items() if not item.beside)}
 
     @property
     def interfaces(self) -> tuple[Interface, ...]:
@@ -250,9 +258,11 @@ class Contract:
 
     @cached_property
     def _whole_ledger(self) -> dict[str, Requirement]:
-        dropped = self.manifest.without if self.manifest else ()
+        dropped = frozenset(self.manifest.without if self.manifest else ())
         generic = {
-            id_: item for id_, item in generic_ledger().items() if item.binds(self.classes) and id_ not in dropped
+            id_: item
+            for id_, item in generic_ledger().items()
+            if self._classes_of(item) and dropped.isdisjoint({id_, *item.aliases})
         }
         own: dict[str, Requirement] = {}
         path = self.directory / LEDGER
@@ -269,9 +279,15 @@ class Contract:
             raise ContractError(f"{path}: {twice[0]} names two requirements")
         return {item.id: item for item in sorted(both, key=lambda item: list(self.classes).index(item.class_))}
 
+    def _classes_of(self, item: Requirement) -> tuple[str, ...]:
+        """Return the pack's classes that have a requirement: its own, or those within which they are."""
+        generic = generic_classes()
+        homes = (name if name in self.classes or name not in generic else generic[name].within for name in item.classes)
+        return tuple(dict.fromkeys(name for name in homes if name in self.classes))
+
     def _placed(self, item: Requirement) -> Requirement:
-        """Return a requirement in those of its classes that the pack has, with its topic."""
-        own, *also = (name for name in item.classes if name in self.classes)
+        """Return a requirement in those classes of the pack that have it, with its topic."""
+        own, *also = self._classes_of(item)
         return replace(item, class_=own, also=tuple(also), topic=item.topic or self.classes[own].topic)
 
     @cached_property

@@ -5,7 +5,7 @@
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import msgspec
@@ -39,16 +39,23 @@ class RequirementSet:
 
     Attributes:
         name: as in ``--requirements NAME``.
-        requirements: level and text digest, by id.
+        frozen_as: level and text digest, by the ids at the time of the freeze.
+        renamed: the present id by each older one.
     """
 
     name: str
-    requirements: Mapping[str, Frozen]
+    frozen_as: Mapping[str, Frozen]
+    renamed: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def requirements(self) -> dict[str, Frozen]:
+        """Return level and text digest by present id."""
+        return {self.renamed.get(id_, id_): item for id_, item in self.frozen_as.items()}
 
     @property
     def digest(self) -> str:
-        """The digest of all ids, levels and texts, as `sha256:…`."""
-        return _digest("".join(f"{id_} {item.level} {item.text}\n" for id_, item in sorted(self.requirements.items())))
+        """The digest of all ids, levels and texts as they were frozen, as `sha256:…`; a new name does not change it."""
+        return _digest("".join(f"{id_} {item.level} {item.text}\n" for id_, item in sorted(self.frozen_as.items())))
 
     @property
     def told(self) -> dict[str, str]:
@@ -76,7 +83,7 @@ def load_set(contract: Contract, name: str) -> RequirementSet:
         there = ", ".join(names(contract)) or "none"
         raise RequirementSetError(f"{contract.name} has no set of requirements {name!r}; there are {there}")
     path = set_folder(contract) / f"{name}.toml"
-    return RequirementSet(name, read_toml(path, _File, RequirementSetError).requirements)
+    return RequirementSet(name, read_toml(path, _File, RequirementSetError).requirements, contract.renamed)
 
 
 def current(contract: Contract, ledger: Mapping[str, Requirement]) -> RequirementSet:

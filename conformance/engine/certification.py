@@ -3,7 +3,7 @@
 import datetime as dt
 import gc
 import sys
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -26,7 +26,7 @@ from conformance.verdict.baseline import Expectation, accepted_until, apply_base
 from conformance.verdict.causes import Cause, by_cause
 from conformance.verdict.evidence import Evidence
 from conformance.verdict.run import Run
-from conformance.verdict.verdicts import Overall, Verdict, class_verdicts, overall, score, verdict_of
+from conformance.verdict.verdicts import ClassValue, Overall, Verdict, class_verdicts, overall, score, verdict_of
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def certify(
         seen = score(seen, run.scored, f"requirement set {run.requirement_set.name}")
     verdicts = apply_baseline(seen, baseline, dt.datetime.now(dt.UTC).date())
     # A baseline makes a run green, not a robot conformant: the classes fail all the same.
-    classes, accepted = class_verdicts(seen, run.claims), class_verdicts(verdicts, run.claims)
+    classes, accepted = (_deciding(one, run.claims, run.beside) for one in (seen, verdicts))
     failed = overall(classes) is Overall.NOT_CONFORMANT
     if not run.enough:
         remarks.append(f"Nothing can be said of a robot {run.less}: the verdict is inconclusive unless it failed.")
@@ -124,6 +124,13 @@ def certify(
     return Certification(code, document, path)
 
 
+def _deciding(
+    verdicts: Iterable[Verdict], claims: Iterable[str], beside: Container[str]
+) -> dict[str, tuple[ClassValue, str]]:
+    """Return verdict and reason of each class that decides the verdict."""
+    return {name: value for name, value in class_verdicts(verdicts, claims).items() if name not in beside}
+
+
 def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
     """Return the verdict of each requirement in the ledger's order, before a baseline is applied, and the causes."""
     judge = run.judge
@@ -131,7 +138,7 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
         evidence = judge.evidence[requirement.id]
         if run.aborted and not (evidence.cases or evidence.skips or evidence.errors):
             judge.stopped(requirement.id, run.aborted)
-    seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, run.scored)
+    seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, run.scored, run.beside)
     if run.contract.described:
         # What the motion map declares is claimed, and so is that the operations of a WSDL answer.
         _leave_out(

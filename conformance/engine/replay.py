@@ -9,8 +9,11 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.observers import Observer
+from conformance.contract.generic import generic_ledger
 from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
 from conformance.engine.connecting import connection_of
@@ -63,10 +66,12 @@ def findings(result: Mapping[str, Any], chosen: str | None) -> Iterator[tuple[st
 
     Args:
         result: the result.
-        chosen: only those of this requirement (id or alias), or the one with this number; None: all.
+        chosen: only those of this requirement (by any id that it had), or the one with this number; None: all.
     """
-    for item in result["requirements"]:
-        whole = chosen in {None, item["id"], *item.get("aliases", ())}
+    known = generic_ledger().get(chosen or "")
+    names = {chosen, *(known.aliases if known else ())}
+    for item in (*result["requirements"], *result.get("web_server", {}).get("requirements", ())):
+        whole = chosen is None or not names.isdisjoint({item["id"], *item.get("aliases", ())})
         for failure in item["failures"]:
             if whole or chosen == str(failure.get("number")):
                 yield item["id"], failure
@@ -139,10 +144,11 @@ def judged_by_checks(
     """
     contract = Contract.load(contract.directory, only=tuple(sorted(requirements)))
     classes = {name for item in contract.ledger.values() for name in item.classes}
+    claims = tuple(name for name in contract.classes if name in classes)
     run = Run(
-        statement=statement,
+        statement=msgspec.structs.replace(statement, claims=claims),
         contract=contract,
-        claims=tuple(name for name in contract.classes if name in classes),
+        claims=claims,
         allow_motion=allow_motion,
         seed=seed,
         effort=Effort(effort),

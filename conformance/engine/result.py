@@ -15,6 +15,7 @@ from conformance.contract.interfaces import Interface
 from conformance.engine.resending import written
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.engine.suite import contract_digests, installed, suite_digest, suite_version
+from conformance.engine.web_server import web_server
 from conformance.transport.exchange import Attempt, Unanswered
 from conformance.verdict.causes import Cause
 from conformance.verdict.finding import Finding
@@ -46,6 +47,10 @@ def result_document(
 ) -> dict[str, Any]:
     """Return the content of result.json for a run."""
     run, statement = robot.run, robot.run.statement
+    aside = [one for one in verdicts if one.requirement.class_ in run.beside]
+    verdicts = [one for one in verdicts if one not in aside]
+    ids = {one.requirement.id for one in verdicts}
+    causes = [cause for cause in causes if cause.finding.requirement in ids]
     value = overall(classes, enough=run.enough)
     return {
         "format": RESULT_FORMAT,
@@ -98,7 +103,14 @@ def result_document(
         "contract_sections": {anchor: section._asdict() for anchor, section in run.contract.cited_sections.items()},
         "notes": notes,
         **_api(robot, causes),
+        **_beside(robot, aside),
     }
+
+
+def _beside(robot: RobotUnderTest, aside: list[Verdict]) -> dict[str, Any]:
+    """Return what the web server does by itself, under its key; empty where the verdict has it, or none was judged."""
+    found = web_server(aside, robot.rest.server if robot.rest else "")
+    return {"web_server": {**found, "requirements": [_requirement(one) for one in aside]}} if found else {}
 
 
 def _shown(value: Any) -> Any:

@@ -50,6 +50,7 @@ def by_cause(
     ledger: Mapping[str, Requirement],
     claims: Container[str],
     scored: Container[str] | None = None,
+    beside: Container[str] = (),
 ) -> tuple[dict[str, Evidence], list[Cause]]:
     """Keep one finding for each cause, and number the findings in the order in which a vendor should look at them.
 
@@ -61,6 +62,7 @@ def by_cause(
         ledger: the requirements.
         claims: the classes that are judged; others have no findings.
         scored: ids of the requirements that count; None: all.
+        beside: judged classes that decide no verdict; their findings have the last numbers.
 
     Returns:
         The evidence with the remaining findings, and the causes in order.
@@ -68,11 +70,12 @@ def by_cause(
     judged = {id_: one for id_, one in ledger.items() if one.binds(claims)}
     places = {id_: place for place, id_ in enumerate(judged)}
 
-    def weight(finding: Finding) -> tuple[bool, int]:
+    def weight(finding: Finding) -> tuple[bool, bool, int]:
         requirement = judged[finding.requirement]
-        return scored is not None and requirement.id not in scored, _LEVELS.index(requirement.level)
+        uncounted = scored is not None and requirement.id not in scored
+        return requirement.class_ in beside, uncounted, _LEVELS.index(requirement.level)
 
-    def first(finding: Finding) -> tuple[tuple[bool, int], bool, bool, bool, int]:
+    def first(finding: Finding) -> tuple[tuple[bool, bool, int], bool, bool, bool, int]:
         forbids = finding.cause in judged[finding.requirement].forbids
         return weight(finding), not forbids, finding.unsent, finding.among > _FEW, finding.met
 
@@ -96,7 +99,8 @@ def by_cause(
     def place(finding: Finding) -> tuple[Any, ...]:
         topic = _TOPICS.index(judged[finding.requirement].topic or Topic.HURT)
         kind = _KINDS.index(finding.cause)
-        return topic, weight(finding), kind, -blocked[id(finding)], places[finding.requirement], finding.met
+        aside, *weighs = weight(finding)
+        return aside, topic, weighs, kind, -blocked[id(finding)], places[finding.requirement], finding.met
 
     remaining.sort(key=place)
     for number, finding in enumerate(remaining, 1):

@@ -87,6 +87,13 @@ class Run:
         return frozenset(item.id for item in ledger if not frozen.isdisjoint({item.id, *item.aliases}))
 
     @property
+    def beside(self) -> frozenset[str]:
+        """The judged classes that decide no verdict: those beside a description which no claim names."""
+        named = self.statement.claims or ()
+        classes = self.contract.classes
+        return frozenset(name for name in self.claims if classes[name].beside and name not in named)
+
+    @property
     def share(self) -> float:
         """The share of the cases that were tried, of those that a fast robot gets at this effort, 0 to 1."""
         return self.effort.speed.share * self.tally.share

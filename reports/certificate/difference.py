@@ -114,7 +114,7 @@ class Difference:
 def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> Difference:
     """Compare two valid `roaas-result/1` documents and return the changes."""
     before = dict(_by_present_id(old, new))
-    now = {item["id"]: item for item in new["requirements"]}
+    now = {item["id"]: item for item in (*new["requirements"], *_beside(new))}
     changes = [
         Change(id_, kind, before.get(id_), now.get(id_))
         for id_ in {**before, **now}
@@ -131,14 +131,21 @@ _WORST_FIRST = ("fail", "warn", "error", "skip", "pass", "not-claimed")
 
 def _by_present_id(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[tuple[str, Requirement]]:
     """Yield the old requirements by the ids that the new result has for them; of several with one id, the worst."""
-    renamed = {alias: item["id"] for item in new["requirements"] for alias in item.get("aliases", ())}
+    present = (*new["requirements"], *_beside(new))
+    renamed = {alias: item["id"] for item in present for alias in item.get("aliases", ())}
     by_id: dict[str, list[Requirement]] = {}
-    for item in old["requirements"]:
+    for item in (*old["requirements"], *_beside(old)):
         by_id.setdefault(renamed.get(item["id"], item["id"]), []).append(item)
     for id_, items in by_id.items():
         worst = min(items, key=lambda item: _WORST_FIRST.index(item["verdict"]))
         was = [item["id"] for item in items]
         yield id_, worst if was == [id_] else {**worst, "was": was}
+
+
+def _beside(result: Mapping[str, Any]) -> Iterator[Requirement]:
+    """Yield the requirements beside a verdict, for which a failure is a warning."""
+    for item in result.get("web_server", {}).get("requirements", ()):
+        yield {**item, "verdict": {"fail": "warn", "error": "skip"}.get(item["verdict"], item["verdict"])}
 
 
 def _kinds(old: Requirement | None, new: Requirement | None) -> Iterator[Kind]:

@@ -32,6 +32,7 @@ class RestInterface:
         stop_device: stops a device with a motion map; None: it has none, or was not moved.
         values: what the survey of a described API knows for parameters and bodies, or None.
         looked: the exchanges by which the run has connected, before anything observed them.
+        server: the Server field of the first response that had one; empty: none had.
         is_recorded: whether the present exchange is recorded by a scenario, whose rules judge it.
     """
 
@@ -47,6 +48,7 @@ class RestInterface:
     stop_device: Callable[[], Any] | None = None
     values: Any = None
     looked: list[Exchange] = field(default_factory=list)
+    server: str = ""
     is_recorded: bool = False
     device: Device = field(init=False)
 

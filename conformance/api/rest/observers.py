@@ -59,6 +59,7 @@ class Observer(Listener):
         context = self._seen(exchange.request)
         if context is None:
             return
+        api.server = api.server or answer.header("server") or ""
         self._judge_fields(exchange, answer, context)
         if answer.status in _CONDITIONAL and _is_conditional(exchange.request):
             return  # a server's own response (RFC 9110 13, 14), which no description declares; a part is no document

@@ -121,7 +121,7 @@ def _judge_too_large(api: RestInterface, judge: Judge, call: Call, fields: Heade
     expect(judge, "http/content-too-large-answered", attempt).that(answered, expected, cause=cause)
 
 
-@pytest.mark.requirement("http/chunked", "http/chunk-forms")
+@pytest.mark.requirement("http/chunked", "web-server/chunk-forms")
 def test_chunked_content(api: RestInterface, judge: Judge) -> None:
     """Send valid content in chunks: of one byte, of a few bytes, in one chunk, 64 KiB, with extensions and trailers.
 
@@ -140,7 +140,7 @@ def test_chunked_content(api: RestInterface, judge: Judge) -> None:
             _judge_chunked(api, judge, "http/chunked", call, raw.chunked(body, size), what)
         for what, extension, trailers in _CHUNK_FORMS:
             chunks = raw.chunked(call.body, 9, extension, trailers)
-            _judge_chunked(api, judge, "http/chunk-forms", call, chunks, f"chunks with {what}")
+            _judge_chunked(api, judge, "web-server/chunk-forms", call, chunks, f"chunks with {what}")
 
 
 def _judge_chunked(api: RestInterface, judge: Judge, requirement: str, call: Call, chunks: bytes, what: str) -> None:
@@ -149,10 +149,10 @@ def _judge_chunked(api: RestInterface, judge: Judge, requirement: str, call: Cal
     expect(judge, requirement, attempt).taken(f"the body comes as {what}", or_else=raw.refuses_chunks(attempt))
 
 
-@pytest.mark.requirement("http/expect-continue")
+@pytest.mark.requirement("web-server/expect-continue")
 def test_content_that_waits(api: RestInterface, judge: Judge) -> None:
     """Send Expect: 100-continue, and hold the content back until a response comes (RFC 9110 10.1.1)."""
-    for call in _valid(api, judge, ("http/expect-continue",)):
+    for call in _valid(api, judge, ("web-server/expect-continue",)):
         # HTTP/1.0 has no interim responses: its client sends the content without waiting for one.
         old = call.send(api).response.http_version == "HTTP/1.0"
         method, fields = call.operation.method, (f"Content-Type: {call.media_type}", "Expect: 100-continue")
@@ -161,7 +161,7 @@ def test_content_that_waits(api: RestInterface, judge: Judge) -> None:
         came = by_hand.talk(api, octets, answers=1, cuts=(len(head),), pause_s=0.0 if old else _WAITS_S)
         attempt, _ = raw.read_one(api.client, octets, came, method)
         taken = isinstance(attempt, Exchange) and is_taken(attempt)
-        expect(judge, "http/expect-continue", attempt).that(
+        expect(judge, "web-server/expect-continue", attempt).that(
             taken and (old or came.early),
             "status 100 or a final response before the content is sent, and then status 2xx",
             f"no response within {_WAITS_S:g} s before the content was sent" if taken else "",

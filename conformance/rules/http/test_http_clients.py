@@ -66,7 +66,7 @@ def _judge_served(judge: Judge, rounds_: Sequence[Sequence[Attempt]]) -> None:
     )
 
 
-@pytest.mark.requirement("http/pipelining")
+@pytest.mark.requirement("web-server/pipelining")
 def test_answers_come_in_order(api: RestInterface, rest: HttpClient, judge: Judge, asked: list[Question]) -> None:
     """Send several requests before the first response comes: responses keep the order (RFC 9112 9.3.2)."""
     for turn in rounds(_questions(api, asked), _IN_A_ROW, api.run.effort.cases(_IN_A_ROW)):
@@ -82,7 +82,7 @@ def test_answers_come_in_order(api: RestInterface, rest: HttpClient, judge: Judg
                     return
                 break
             mismatch = misplaced(api, question, attempt.response)
-            expect(judge, "http/pipelining", attempt).that(
+            expect(judge, "web-server/pipelining", attempt).that(
                 not mismatch, f"the response to GET {question.path} in its turn", mismatch, cause="another order"
             )
             came = raw.rest_of(came, behind)
@@ -92,7 +92,7 @@ def _judge_forgotten(api: RestInterface, judge: Judge, octets: bytes, attempt: U
     """Judge a connection that stays open without a response, by trying again: the first try may have been delayed."""
     again = by_hand.talk(api, octets, answers=_IN_A_ROW, refused=True)
     count = raw.answers_in(again.octets, _IN_A_ROW)
-    expect(judge, "http/pipelining", attempt).that(
+    expect(judge, "web-server/pipelining", attempt).that(
         again.closed or count == _IN_A_ROW,
         f"{_IN_A_ROW} responses to as many requests, or a closed connection",
         f"no more responses after {count} of {_IN_A_ROW}, and the connection stays open",

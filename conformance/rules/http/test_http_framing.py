@@ -16,6 +16,7 @@ pytestmark = pytest.mark.needs("rest")
 # How long a robot may take to refuse octets that are no request before it counts as waiting for more of them, s.
 _THINK_S = 3.0
 _IN_ALL = 56
+_LENGTHS = "web-server/content-length-conflict"
 _GARBAGE = (
     b"ROBOT\r\n\r\n",
     b"\x00\x01\x02\x03\xff\xfe\r\n\r\n",
@@ -75,17 +76,17 @@ def test_answers_stay_aligned(api: RestInterface, rest: HttpClient, judge: Judge
 
 
 @pytest.mark.phase("input")
-@pytest.mark.requirement("http/host-missing", "http/host-twice", "http/host-repeated", "http/content-length-conflict")
+@pytest.mark.requirement("web-server/host-missing", "web-server/host-twice", "web-server/host-repeated", _LENGTHS)
 def test_fields_that_have_to_be_refused(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Send requests without Host, with two, and with two lengths; the robot must reject them (RFC 9112 3.2, 6.3)."""
     path = _first(api).path
     host = f"Host: {rest.authority}"
     for id_, closing, octets in (
-        ("http/host-missing", False, raw.head(rest, "GET", path, host=False)),
-        ("http/host-repeated", False, raw.head(rest, "GET", path, host)),
-        ("http/host-twice", False, raw.head(rest, "GET", path, "Host: another.example")),
-        ("http/content-length-conflict", True, raw.head(rest, "GET", path, "Content-Length: 0", "Content-Length: 5")),
-        ("http/content-length-conflict", True, raw.head(rest, "GET", path, "Content-Length: 5", "Content-Length: 0")),
+        ("web-server/host-missing", False, raw.head(rest, "GET", path, host=False)),
+        ("web-server/host-repeated", False, raw.head(rest, "GET", path, host)),
+        ("web-server/host-twice", False, raw.head(rest, "GET", path, "Host: another.example")),
+        (_LENGTHS, True, raw.head(rest, "GET", path, "Content-Length: 0", "Content-Length: 5")),
+        (_LENGTHS, True, raw.head(rest, "GET", path, "Content-Length: 5", "Content-Length: 0")),
     ):
         judge.at_risk = (id_,)
         attempt, came = _ask_by_hand(api, octets)
@@ -96,13 +97,13 @@ def test_fields_that_have_to_be_refused(api: RestInterface, rest: HttpClient, ju
 
 
 @pytest.mark.phase("input")
-@pytest.mark.requirement("http/malformed-request")
+@pytest.mark.requirement("web-server/malformed-request")
 def test_octets_that_are_no_request(api: RestInterface, judge: Judge) -> None:
     """Send bytes that are not HTTP: the robot must respond 4xx or close, and still serve the next request."""
-    judge.at_risk = ("http/malformed-request",)
+    judge.at_risk = ("web-server/malformed-request",)
     for octets in _GARBAGE:
         attempt, _ = _ask_by_hand(api, octets)
-        expect(judge, "http/malformed-request", attempt).status("4xx", 505, closed=True)
+        expect(judge, "web-server/malformed-request", attempt).status("4xx", 505, closed=True)
     _first(api).send(api)
 
 

@@ -129,10 +129,10 @@ def test_long_targets(api: RestInterface, rest: HttpClient, judge: Judge) -> Non
         expect(judge, "http/uri-too-long", again).status(usual, when="the request follows one with a long target")
 
 
-@pytest.mark.requirement("http/header-too-large")
+@pytest.mark.requirement("web-server/header-too-large")
 def test_large_field(api: RestInterface, judge: Judge) -> None:
     """Send a field of 128 KiB: the robot refuses it, closes the connection or ignores it, and never fails with 5xx."""
-    judge.at_risk = ("http/header-too-large",)
+    judge.at_risk = ("web-server/header-too-large",)
     for call in [call for call in reads(api) if not call.operation.optional][:3]:
         usual = usual_status(partial(call.send, api))
         attempt: Attempt
@@ -143,10 +143,10 @@ def test_large_field(api: RestInterface, judge: Judge) -> None:
                 raise
             attempt = none.unanswered
         when = f"a field has {_LONG_FIELD:,} bytes"
-        expect(judge, "http/header-too-large", attempt).status(431, 400, 413, usual, when=when, closed=True)
+        expect(judge, "web-server/header-too-large", attempt).status(431, 400, 413, usual, when=when, closed=True)
 
 
-@pytest.mark.requirement("http/target-length")
+@pytest.mark.requirement("web-server/target-length")
 def test_targets_of_8000_octets(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Send a target of 8,000 octets where the robot takes a short one: RECOMMENDED (RFC 9110 4.1)."""
     if rest.connection.credentials.repeats_target:
@@ -157,10 +157,10 @@ def test_targets_of_8000_octets(api: RestInterface, rest: HttpClient, judge: Jud
         usual = usual_status(partial(rest.send, "GET", f"{path}a"))
         exchange = rest.send("GET", path + "a" * (_TARGET_TAKEN - len(rest.prefix) - len(path)))
         when = f"the target has {_TARGET_TAKEN:,} bytes, as with a short one"
-        expect(judge, "http/target-length", exchange).status(usual, when=when)
+        expect(judge, "web-server/target-length", exchange).status(usual, when=when)
 
 
-@pytest.mark.requirement("http/absolute-form")
+@pytest.mark.requirement("web-server/absolute-form")
 def test_absolute_form(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Send targets with scheme and authority (RFC 9112 3.2.2)."""
     for call in reads(api):
@@ -169,4 +169,4 @@ def test_absolute_form(api: RestInterface, rest: HttpClient, judge: Judge) -> No
         absolute = head.replace(b" ", f" {rest.scheme}://{rest.authority}".encode(), 1)
         attempt = by_hand.ask_octets(api, absolute)
         when = "the target has scheme and authority, as without them"
-        expect(judge, "http/absolute-form", attempt).status(usual, when=when, cause=attempt.came)
+        expect(judge, "web-server/absolute-form", attempt).status(usual, when=when, cause=attempt.came)

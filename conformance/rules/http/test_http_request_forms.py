@@ -66,12 +66,12 @@ def _telling_read(api: RestInterface) -> tuple[Call, str, tuple[int, str]] | Non
 
 
 @pytest.mark.phase("settling")
-@pytest.mark.requirement("http/field-forms", "http/field-lines")
+@pytest.mark.requirement("web-server/field-forms", "web-server/field-lines")
 def test_fields_in_any_form(api: RestInterface, judge: Judge) -> None:
     """Write Accept in other letters, with other white space, and in several lines."""
     found = _telling_read(api)
     if found is None:
-        for id_ in ("http/field-forms", "http/field-lines"):
+        for id_ in ("web-server/field-forms", "web-server/field-lines"):
             judge.unclaimed(id_, "the robot responds alike whatever Accept is")
         return
     call, media_type, wanted = found
@@ -79,11 +79,11 @@ def test_fields_in_any_form(api: RestInterface, judge: Judge) -> None:
         line = form.format(media_type)
         attempt = _asked(api, call.path, line)
         expected = f"{_named(wanted)} when the field is {line!r}, as with 'Accept: {media_type}'"
-        expect(judge, "http/field-forms", attempt).that(_kind(attempt) == wanted, expected, cause=form)
+        expect(judge, "web-server/field-forms", attempt).that(_kind(attempt) == wanted, expected, cause=form)
     for lines in _LINES:
         attempt = _asked(api, call.path, *(line.format(media_type) for line in lines))
         expected = f"{_named(wanted)} when Accept stands in {len(lines)} lines, one of them with {media_type}"
-        expect(judge, "http/field-lines", attempt).that(_kind(attempt) == wanted, expected)
+        expect(judge, "web-server/field-lines", attempt).that(_kind(attempt) == wanted, expected)
 
 
 @pytest.mark.phase("settling")
@@ -103,18 +103,18 @@ def test_requests_in_pieces(api: RestInterface, rest: HttpClient, judge: Judge) 
 
 
 @pytest.mark.phase("settling")
-@pytest.mark.requirement("http/close", "http/old-client")
+@pytest.mark.requirement("web-server/close", "web-server/old-client")
 def test_the_end_of_a_connection(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Send Connection: close, and requests of an HTTP/1.0 client, which does not know chunked encoding."""
-    judge.at_risk = ("http/close",)
-    for call in answered(api, "http/close", "http/old-client")[:1]:
+    judge.at_risk = ("web-server/close",)
+    for call in answered(api, "web-server/close", "web-server/old-client")[:1]:
         octets = raw.head(rest, "GET", call.path, "Connection: close")
         came = by_hand.talk(api, octets, timeout_s=_ENDS_S + 4 * api.run.effort.usual_ms / 1000)
         attempt, _ = raw.read_one(rest, octets, came, "GET")
         expected, found = "a closed connection after the response to Connection: close", "a connection that stays open"
-        expect(judge, "http/close", attempt).that(came.closed, expected, found)
+        expect(judge, "web-server/close", attempt).that(came.closed, expected, found)
         octets = octets.replace(b" HTTP/1.1\r\n", b" HTTP/1.0\r\n", 1)
         attempt = by_hand.ask_octets(api, octets)
         coded = isinstance(attempt, Exchange) and attempt.response.header("transfer-encoding")
         expected = "no Transfer-Encoding when the request is HTTP/1.0"
-        expect(judge, "http/old-client", attempt).that(not coded, expected, f"Transfer-Encoding: {coded}")
+        expect(judge, "web-server/old-client", attempt).that(not coded, expected, f"Transfer-Encoding: {coded}")

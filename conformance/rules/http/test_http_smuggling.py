@@ -19,10 +19,10 @@ from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
 _BOTH, _CLOSED, _LINES, _COLON = (
-    "http/length-and-chunks",
-    "http/length-and-chunks-closed",
-    "http/header-lines",
-    "http/space-before-colon",
+    "web-server/length-and-chunks",
+    "web-server/length-and-chunks-closed",
+    "web-server/header-lines",
+    "web-server/space-before-colon",
 )
 _CHUNKED, _CHUNKS = "Transfer-Encoding: chunked", raw.chunked(b"abcde", 5)
 # Shorter than the chunks, and than the next request: who believes it finds rubbish where a request should begin.

@@ -89,7 +89,7 @@ def _written(template: str, folder: Path, values: dict[str, str]) -> str:
 FRONTS = (
     Front("nginx", "behind nginx", _nginx),
     # It takes two equal Host lines for one, where RFC 9112 3.2 demands 400.
-    Front("haproxy", "behind haproxy", _haproxy, frozenset({"http/host-missing"})),
+    Front("haproxy", "behind haproxy", _haproxy, frozenset({"web-server/host-missing"})),
     Front("apache", "behind Apache httpd", _apache),
     Front("go-reverse-proxy", "behind Go's httputil.ReverseProxy", _go),
     Front("nginx-http10", "HTTP/1.0 behind nginx", _nginx),

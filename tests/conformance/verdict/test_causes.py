@@ -72,7 +72,7 @@ def test_a_must_keeps_the_finding_even_where_a_should_met_it_first():
 
 def test_a_request_by_hand_tests_its_own_rule_unless_an_ordinary_one_fails_as_well():
     by_hand = {"raw": b"GET /robot/sensors/ HTTP/1.1\r\n\r\n"}
-    missing, twice = "http/host-missing", "http/content-length-conflict"
+    missing, twice = "web-server/host-missing", "web-server/content-length-conflict"
     alone = _run((missing, _closed(**by_hand)), (twice, _closed(**by_hand)))
     assert {requirement for requirement, _, _ in _told(alone)[1]} == {missing, twice}
     with_ordinary = _run((missing, _closed(**by_hand)), (twice, _closed(**by_hand)), (_READ, _closed()))

@@ -201,7 +201,7 @@ _mutant("clients-one-buffer", "concurrent-answers", "Concurrent responses get th
 )
 _mutant(
     "http-pipelining-backwards",
-    "pipelining",
+    "web-server/pipelining",
     "Of two pipelined requests, the robot answers the second first.",
     backwards=True,
 )(lambda request, forward: forward(request))

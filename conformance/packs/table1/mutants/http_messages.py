@@ -92,7 +92,11 @@ def _hosts(taken: Callable[[list[bytes]], bool]) -> Callable[[Request, Forward],
     return change
 
 
-@_mutant("http-first-length", "content-length-conflict", "Of two Content-Length headers, the robot uses the first.")
+@_mutant(
+    "http-first-length",
+    "web-server/content-length-conflict",
+    "Of two Content-Length headers, the robot uses the first.",
+)
 def _first_length(request: Request, forward: Forward) -> Response:
     if (_count(request, "Content-Length") or 0) > 1:
         _, _, body = (request.raw or b"").partition(b"\r\n\r\n")
@@ -100,7 +104,7 @@ def _first_length(request: Request, forward: Forward) -> Response:
     return forward(request)
 
 
-@_mutant("http-garbage-fine", "malformed-request", "Bytes that are not HTTP get a response with status 200.")
+@_mutant("http-garbage-fine", "web-server/malformed-request", "Bytes that are not HTTP get a response with status 200.")
 def _garbage(request: Request, forward: Forward) -> Response:
     if request.side == "rest" and request.raw is not None:
         return plain(200, b"<html>hello</html>", "text/html", ("Date", "Thu, 01 Jan 2026 00:00:00 GMT"))(request)
@@ -171,7 +175,7 @@ _mutant("http-long-target-crash", "uri-too-long", "A long request target returns
 _mutant("http-long-target-fine", "declared-body", "A long request target returns 200 with an empty object.").instead(
     _long_target, plain(200, b"{}", JSON)
 )
-_mutant("http-large-field-crash", "header-too-large", "A header of 128 KiB returns 500.").instead(
+_mutant("http-large-field-crash", "web-server/header-too-large", "A header of 128 KiB returns 500.").instead(
     lambda request: _ANY(request) and any(len(value) > 60_000 for _, value in request.fields), problem(500, "oops")
 )
 _mutant("http-length-too-long", "framing", "Content-Length is 7 bytes longer than the body.").altered(
@@ -186,15 +190,15 @@ _mutant("http-broken-field", "framing", "A response contains a line that is not 
 _mutant("http-two-lengths", "framing", "A response has two different Content-Length headers.").altered(
     _POSE, _on_the_wire(lambda octets: octets.replace(b"\r\n\r\n", b"\r\nContent-Length: 3\r\n\r\n", 1))
 )
-_mutant("http-host-optional", "host-missing", "The robot accepts a request without Host.")(
+_mutant("http-host-optional", "web-server/host-missing", "The robot accepts a request without Host.")(
     _hosts(lambda hosts: not hosts)
 )
-_mutant("http-host-twice", "host-twice", "The robot accepts a request with two Host headers.")(
+_mutant("http-host-twice", "web-server/host-twice", "The robot accepts a request with two Host headers.")(
     _hosts(lambda hosts: len(hosts) > 1)
 )
-_mutant("http-host-repeated", "host-repeated", "The robot accepts a request with the same Host header twice.")(
-    _hosts(lambda hosts: len(hosts) > 1 and len(set(hosts)) == 1)
-)
+_mutant(
+    "http-host-repeated", "web-server/host-repeated", "The robot accepts a request with the same Host header twice."
+)(_hosts(lambda hosts: len(hosts) > 1 and len(set(hosts)) == 1))
 _mutant("http-problem-as-json", "problem-type", "Problem details have the media type application/json.").altered(
     _ANY, header("Content-Type", JSON), _errors
 )

@@ -39,7 +39,7 @@ def test_a_good_library_conforms(certified):
     assert "http/etag-format" in skipped
     ledger = Contract.load(CONTRACT).ledger
     assert all("seen" in ledger[id_].needs for id_ in skipped), skipped
-    assert set(wrong) - skipped <= {"http/space-before-colon"}, wrong
+    assert set(wrong) - skipped <= {"web-server/space-before-colon"}, wrong
     assert code == 0
     assert classes["http"] == classes["rest-formats"] == classes["strict-input"] == classes["describe"] == "pass"
     assert "rest-resources" not in classes or classes["rest-resources"] == "not-claimed"

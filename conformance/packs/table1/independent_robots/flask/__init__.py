@@ -2,8 +2,8 @@
 
 Flask redirects paths without their final slash or with two slashes in a row; gunicorn, with its defaults, rejects
 malformed requests with its own error pages. gunicorn accepts request lines of 4,094 bytes, and treats a chunked request
-whose client vanished as complete: `http/target-length` and `safety/client-vanished`, both SHOULD, warn of that, and the
-robot conforms all the same.
+whose client vanished as complete: `web-server/target-length` and `safety/client-vanished`, both SHOULD, warn of that.
+The robot conforms all the same.
 """
 
 import subprocess

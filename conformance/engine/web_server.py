@@ -1,0 +1,81 @@
+"""What a run says of the web server before a device's application: judged, told once, and beside the verdict."""
+
+from collections.abc import Collection, Iterator, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from conformance.contract.ledger import Requirement
+from conformance.contract.toml_file import Text, TomlFileError, read_toml
+from conformance.verdict.verdicts import Value, Verdict
+
+_KNOWN = Path(__file__).with_name("web_servers.toml")
+_SERVER_SHOWN = 80
+
+
+class _Remedy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One way to meet rules that a server does not meet by itself.
+
+    Attributes:
+        words: such as "behind nginx"; a text follows that says what is met.
+        meets: ids of the rules that are met then.
+        servers: how the Server field begins, in lower case; empty: any server.
+    """
+
+    words: Text
+    meets: tuple[Text, ...]
+    servers: tuple[Text, ...] = ()
+
+
+class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    smuggling: tuple[Text, ...]
+    remedy: tuple[_Remedy, ...]
+
+
+@cache
+def _known() -> _File:
+    return read_toml(_KNOWN, _File, TomlFileError)
+
+
+def web_server(verdicts: Sequence[Verdict], server: str) -> dict[str, Any]:
+    """Return server, text and smuggling for result.json; empty if no rule was judged.
+
+    Args:
+        verdicts: on the rules of the class.
+        server: the value of the Server field; empty: the server sends none.
+    """
+    judged = [one for one in verdicts if one.evidence.cases]
+    if not judged:
+        return {}
+    failed = {one.requirement.id: one.requirement for one in judged if one.value in {Value.FAIL, Value.WARN}}
+    tricked = [id_ for id_ in failed if id_ in _known().smuggling]
+    text = " ".join(_sentences(failed.values(), len(judged), tricked, server))
+    return {"server": server or None, "text": text, "smuggling": tricked}
+
+
+def _sentences(failed: Collection[Requirement], judged: int, tricked: list[str], server: str) -> Iterator[str]:
+    name = f"{server[:_SERVER_SHOWN]} by its Server field" if server else "which sends no Server field"
+    if not failed:
+        yield f"Its web server, {name}, meets each of the {judged} rules judged."
+        return
+    count = f"{len(failed)} of {judged} rules"
+    named = ", ".join(f"{one.id} ({one.level}, {one.source})" for one in failed)
+    yield f"Its web server, {name}, does not meet {count}: {named}."
+    if tricked:
+        yield (
+            f"This weighs most behind a proxy or a firewall: {', '.join(tricked)}. Where two servers read such a "
+            "request differently, a client can hide a second request in it (request smuggling)."
+        )
+    yield from _remedies([one.id for one in failed], server)
+    yield "This is the server's doing, not the API's, and does not change the verdict; --class web-server judges by it."
+
+
+def _remedies(failed: Sequence[str], server: str) -> Iterator[str]:
+    """Yield for each known remedy of this server what it mends."""
+    for remedy in _known().remedy:
+        mended = [id_ for id_ in failed if id_ in remedy.meets]
+        if mended and (not remedy.servers or server.lower().startswith(remedy.servers)):
+            met = "every rule is met" if len(mended) == len(failed) else f"these are met: {', '.join(mended)}"
+            yield f"{remedy.words[0].upper()}{remedy.words[1:]}, {met}."
