@@ -77,6 +77,12 @@ _FILE = click.Path(exists=True, dir_okay=False)
 @click.option(
     "--request-rate", type=click.FloatRange(min=1), metavar="R", help="At most R requests per second, 1 or more."
 )
+@click.option(
+    "--restart-command",
+    metavar="CMD",
+    default="",
+    help="Command that restarts a device that stopped responding, so that the run can go on.",
+)
 @click.option("--ca-file", type=_FILE, help="Certificate authorities (PEM) to trust for HTTPS instead of the system's.")
 @click.option(
     "--ros-domain-id",
@@ -229,6 +235,7 @@ def _certify(
         raise StatementError(str(error)) from error
     run = _run(chosen, options, contract)
     run.requirement_set, run.given = requirements, given
+    run.restart_command = options["restart_command"]
     run.prepare = door.prepare if door else None  # there is none where the command runs without roaas.py
     notes = (*options.get("remarks", ()), *_notes(run))
     command = command_without_folders(sys.argv[1:], ("--call", "--never"))

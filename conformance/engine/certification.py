@@ -84,6 +84,8 @@ def certify(
                 run.interrupted |= _run_checks(robot, Progress(robot, progress, bar=bar), remarks, recordings)
                 if not (run.interrupted or run.aborted):
                     look_again(run, robot.connection, robot.rest)
+                    # The last request may have been the one too many.
+                    robot.alive()
             else:
                 run.aborted = "the robot could not be reached: " + "; ".join(
                     f"{name}: {why}" for name, why in run.unreachable.items()

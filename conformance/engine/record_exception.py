@@ -46,14 +46,25 @@ def record_exception(
 def _no_answer(
     run: Run, alive: Callable[[], bool], known: list[str], open_ids: list[str], error: NoAnswerError
 ) -> None:
-    if alive():
+    losses = run.losses
+    goes_on = alive()
+    if run.losses > losses or (run.aborted and run.judge.ended_by):
+        # The loss is a finding of its own.
+        for id_ in open_ids:
+            run.judge.stopped(id_, run.aborted)
+    elif goes_on:
         for id_ in dict.fromkeys(run.contract.renamed.get(id_, id_) for id_ in open_ids):
             run.judge.check(id_, False, error.unanswered, "a response")  # noqa: FBT003 - the condition of check()
         for finding in run.judge.met:
             # One that was there before may be of a check that judged this requirement by itself.
             if finding.exchange is error.unanswered and finding.seen == 1:
                 finding.among = len(open_ids)
-        return
+    else:
+        _gone(run, known, open_ids, error)
+
+
+def _gone(run: Run, known: list[str], open_ids: list[str], error: NoAnswerError) -> None:
+    """Record that the robot is gone, where the contract has no requirement on that itself."""
     request = error.unanswered.request
     risked = [id_ for id_ in known if id_ in run.judge.at_risk]
     for id_ in risked:

@@ -3,9 +3,10 @@
 import statistics
 import threading
 import time
+from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TextIO
 
@@ -17,9 +18,10 @@ from conformance.api.rest.operation_log import OperationLog
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
 from conformance.contract.interfaces import Interface
+from conformance.engine.lost_device import LostDevice
 from conformance.engine.resending import Recorder
 from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import NoAnswer, NoAnswerError
+from conformance.transport.exchange import NoAnswer, NoAnswerError, Request
 from conformance.verdict.run import Run
 
 # How long a robot that stopped answering is given to come back before the rest of the run is called off, s.
@@ -93,7 +95,7 @@ class RobotUnderTest:
         self.connection.listeners.insert(0, Recorder(self.run.judge))
         if self.run.contract.described:
             # A contract names its streams; of any other API only a response shows that it does not end.
-            self.connection.endless = True
+            self.connection.endless = self.connection.resends = True
         self._connect_rest()
         self._connect_soap()
 
@@ -190,24 +192,59 @@ class RobotUnderTest:
         return any(self.has(name) and name not in self.run.unreachable for name in Interface)
 
     def alive(self) -> bool:
-        """Return whether the robot still responds on any interface that responded at the start."""
-        grace_s = _GRACE_S + _GRACE_ANSWERS * self.connection.pace.usual_s
-        until = time.monotonic() + grace_s
-        clients = self._answering()
-        while True:
-            for client, path in clients:
-                # Several targets, so that an endpoint known to hang is no reason to call the robot dead.
-                for method, target in (("GET", path), ("OPTIONS", path), ("GET", "/")):
-                    try:
-                        client.send(method, target, fresh=True, timeout_s=min(grace_s, self.connection.timeout_s))
-                    except NoAnswerError as none:
-                        if none.kind is NoAnswer.REFUSED:
-                            break
-                        continue
-                    return True
-            if time.monotonic() > until:
-                return False
-            time.sleep(0.1)
+        """Return whether the run can go on: the device responds, or does so again after it was lost."""
+        if self.run.aborted:
+            return False
+        if self._responds(self._grace_s):
+            return True
+        lost = LostDevice(self.run, self.connection, self._responds, self._operation_of, self._tell)
+        goes_on = lost.handle(tuple(self.connection.recent))
+        self.connection.recent.clear()
+        for client, _ in self._answering():
+            client.close()
+            client.forget_hangs()
+        return goes_on
+
+    @property
+    def _grace_s(self) -> float:
+        return _GRACE_S + _GRACE_ANSWERS * self.connection.pace.usual_s
+
+    def _responds(self, within_s: float) -> bool:
+        """Return whether the robot responds, on any interface that responded at the start, within so many seconds."""
+        until = time.monotonic() + within_s
+        # Nothing is judged by these requests, and none of them made the robot stop.
+        silent = replace(self.connection, listeners=[], recent=deque(), sent=0)
+        clients = [(HttpClient(client.base_url, silent), path) for client, path in self._answering()]
+        try:
+            while not (responds := any(self._answers(client, path) for client, path in clients)):
+                if time.monotonic() > until:
+                    break
+                time.sleep(0.3)
+        finally:
+            self.connection.sent += silent.sent
+        return responds
+
+    def _answers(self, client: HttpClient, path: str) -> bool:
+        client.forget_hangs()
+        # Several targets, so that an endpoint known to hang is no reason to call the robot dead.
+        for method, target in (("GET", path), ("OPTIONS", path), ("GET", "/")):
+            try:
+                client.send(method, target, fresh=True, timeout_s=min(self._grace_s, self.connection.timeout_s))
+            except NoAnswerError as none:
+                if none.kind is NoAnswer.REFUSED:
+                    return False
+                continue
+            return True
+        return False
+
+    def _operation_of(self, request: Request) -> str:
+        """Return the label of the described operation that a request is for, or an empty text."""
+        from conformance.api.rest.request_context import RequestContext  # noqa: PLC0415 - as above
+
+        if self.rest is None or not self.run.contract.described:
+            return ""
+        context = RequestContext.of(self.run.contract, self.rest.client.base_url, request)
+        return context.operation.label if context and context.operation else ""
 
     def _answering(self) -> list[tuple[HttpClient, str]]:
         """Return a client and a path for each interface that responded at the start."""

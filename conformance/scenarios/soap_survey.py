@@ -125,6 +125,7 @@ class _Caller:
     messages: DescribedMessages
     probes: list[SoapProbe] = field(default_factory=list)
     left_out: list[tuple[str, str]] = field(default_factory=list)
+    lost: set[str] = field(default_factory=set)
     given: dict[str, list[str]] = field(default_factory=dict)
 
     def asks(self, operation: SoapOperation) -> int:
@@ -150,13 +151,20 @@ class _Caller:
         """
         path, fields = target_of(port), fields_of(port, operation)
         probe = SoapProbe(label_of(port, operation), kind, says, port.envelope, operation.response)
+        losses = self.api.run.losses
         try:
             probe = replace(probe, exchange=self.api.client.send("POST", path, headers=fields, body=octets))
         except NoAnswerError as none:
-            self.probes.append(replace(probe, unanswered=none.unanswered))
-            if not self.api.alive():
+            goes_on = self.api.alive()
+            probe = replace(probe, unanswered=none.unanswered)
+            if self.api.run.losses == losses:
+                self.probes.append(probe)
+            else:
+                # The loss is a finding of its own, and what was lost once is not risked again.
+                self.lost.add(probe.operation)
+            if not goes_on:
                 raise PartialTraceError(tuple(self.probes)) from none
-            return self.probes[-1]
+            return probe
         self.probes.append(probe)
         return probe
 
@@ -207,10 +215,10 @@ def _explore(caller: _Caller, port: SoapPort, operation: SoapOperation) -> None:
     until = time.monotonic() + _BUDGET_S
     invalid = list(_invalid(caller.messages.found, declared, node)) if declared and node else []
     for says, wrong in effort.draw(invalid, _MOST, f"{caller.api.run.seed}/{label_of(port, operation)}"):
-        if time.monotonic() < until:
+        if time.monotonic() < until and label_of(port, operation) not in caller.lost:
             caller.send(port, operation, Kind.INVALID, says, caller.messages.message(port, operation, wrong))
     for kind, says, octets in _odd(caller, port, operation, node):
-        if time.monotonic() < until:
+        if time.monotonic() < until and label_of(port, operation) not in caller.lost:
             caller.send(port, operation, kind, says, octets)
             caller.send(
                 port,

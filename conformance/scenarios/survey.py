@@ -185,7 +185,7 @@ class Surveyor:
             PartialTraceError: the device does not respond any more.
         """
         request = request or written(operation, variation.inputs)
-        probe = self._described(operation, variation, request)
+        probe, losses = self._described(operation, variation, request), self.api.run.losses
         try:
             # A device may treat the first request on a connection in another way than those after it.
             fresh = variation.kind is Kind.USUAL or len(self.probes) % _FRESH == 0
@@ -194,10 +194,17 @@ class Surveyor:
             if none.kind in {NoAnswer.TIMEOUT, NoAnswer.CIRCUIT_OPEN}:
                 self.given_up.add(operation.label)
                 self.api.streams.add(operation.label)
-            self.record(replace(probe, unanswered=none.unanswered))
-            if not self.api.alive():
+            probe = replace(probe, unanswered=none.unanswered)
+            goes_on = self.api.alive()
+            if self.api.run.losses == losses:
+                self.record(probe)
+            else:
+                # The loss is a finding of its own, and what was lost once is not risked again.
+                self.given_up.add(operation.label)
+                self.api.streams.add(operation.label)
+            if not goes_on:
                 raise PartialTraceError(Survey(tuple(self.probes))) from none
-            return self.probes[-1]
+            return probe
         self.record(replace(probe, exchange=exchange))
         if exchange.response.cut:
             # An endless response says nothing new the second time, and costs its time each time.
@@ -379,7 +386,14 @@ def _repeated(surveyor: Surveyor, operations: list[Operation]) -> Survey:
             try:
                 last = request.send(surveyor.api)
             except NoAnswerError as none:
-                surveyor.record(Probe(label, Kind.AGAIN, "", "", None, none.unanswered))
+                losses = surveyor.api.run.losses
+                goes_on = surveyor.api.alive()
+                if surveyor.api.run.losses == losses:
+                    surveyor.record(Probe(label, Kind.AGAIN, "", "", None, none.unanswered))
+                if not goes_on:
+                    raise PartialTraceError(
+                        Survey(tuple(surveyor.probes), tuple(times), last, surveyor.elsewhere)
+                    ) from none
                 break
             times.append(last.response.elapsed_ms)
     return Survey(tuple(surveyor.probes), tuple(times), last, surveyor.elsewhere)

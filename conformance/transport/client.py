@@ -3,11 +3,12 @@
 import math
 import ssl
 import time
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from urllib.parse import urlsplit
+from typing import Final
+from urllib.parse import quote, urlsplit
 
 import h11
 
@@ -23,6 +24,7 @@ from conformance.transport.exchange import (
     NotPermittedError,
     Request,
     Response,
+    Sending,
     Unanswered,
 )
 from conformance.transport.pace import Pace, time_to_arrive
@@ -37,6 +39,10 @@ _HANGS_WITHIN_S = 60.0
 _CHALLENGE = 401
 # A request that met the end of a kept connection is sent so often in all.
 _ATTEMPTS = 2
+# The last requests that are kept, and what may stand in a request target without being percent-encoded (RFC 3986 2.1).
+_RECENT: Final = 60
+_CRASHED: Final = "the server closed the connection without a response, and accepts no other connection"
+_SENDABLE: Final = "".join(map(chr, range(0x21, 0x7F)))
 
 
 @dataclass
@@ -57,6 +63,8 @@ class Connection:
         acted_at: when a request with an unsafe method was last sent or answered, s of the monotonic clock.
         pace: how fast the robot responds.
         endless: whether a body that does not end is a response, of which only the beginning is read.
+        resends: whether any request is sent again that met the end of a kept connection, also one that may act twice.
+        recent: the last requests, in the order in which they were answered or given up.
         permit: is called with method and absolute URL before each request; returns an empty text if the request may be
             sent, else why not. By default everything may be sent.
     """
@@ -71,6 +79,8 @@ class Connection:
     acted_at: float = -math.inf
     pace: Pace = field(default_factory=Pace)
     endless: bool = False
+    resends: bool = False
+    recent: deque[Sending] = field(default_factory=lambda: deque(maxlen=_RECENT))
     permit: Permit = lambda _method, _url: ""
     credentials: Credentials = field(default_factory=Credentials)
     certificate: tuple[Path, Path | None] | None = None
@@ -160,7 +170,7 @@ class HttpClient:
 
         Args:
             method: any token.
-            path: request target below the base URL, sent byte for byte as given.
+            path: request target below the base URL, sent as given; what may not stand in one is percent-encoded.
             headers: headers after Host. ``Accept: */*`` is added by default; ("Accept", "") leaves it out.
             body: request body; Content-Length is added for it, and for every PUT, POST and PATCH.
             fresh: use a new connection and close it afterwards, so that the request is never sent twice.
@@ -169,8 +179,9 @@ class HttpClient:
 
         Raises:
             NoAnswerError: no HTTP response was received.
-            NotPermittedError: the request may not be sent in this run.
+            NotPermittedError: the request may not be sent in this run, or HTTP has no way to write it.
         """
+        path = quote(path, safe=_SENDABLE, errors="surrogateescape")
         fields = self._fields(method, tuple(headers), body, close=fresh)
         shown = tuple((name, value) for name, value in fields if name != "Connection")
         sent, target, query = list(fields), path, ""
@@ -199,17 +210,19 @@ class HttpClient:
                 self._hangs[endpoint].append(time.monotonic())
                 self.connection.pace.took(time.monotonic() - started, len(body))
             unanswered = Unanswered(request, str(none), none.kind)
+            self.connection.recent.append(Sending(request, none.kind))
             for listener in self.connection.listeners:
                 listener.unanswered(unanswered)
             raise NoAnswerError(unanswered) from none
         self.connection.pace.took(response.elapsed_ms / 1000, len(body) + len(response.body))
         exchange = Exchange(request, response)
+        self.connection.recent.append(Sending(request, None))
         for listener in self.connection.listeners:
             listener.answered(exchange)
         return exchange
 
     def forget_hangs(self) -> None:
-        """Send again to operations that did not respond, as if they had not been tried."""
+        """Send again to operations that did not respond."""
         self._hangs.clear()
 
     def _fields(self, method: str, headers: Headers, body: bytes, *, close: bool) -> Headers:
@@ -231,7 +244,10 @@ class HttpClient:
     ) -> Response:
         target = (self.prefix + path).encode("utf-8", "surrogateescape") or b"/"
         headers = [(name.encode("latin-1"), value.encode("utf-8")) for name, value in fields]
-        request = h11.Request(method=method, target=target, headers=headers)
+        try:
+            request = h11.Request(method=method, target=target, headers=headers)
+        except h11.LocalProtocolError as error:
+            raise NotPermittedError(f"{method} {path[:200]} cannot be sent: {error}") from error
         before = ""
         for attempt in range(1, _ATTEMPTS + 1):
             self.connection.take_slot((method, self.url(path)))
@@ -242,9 +258,11 @@ class HttpClient:
                 return connection.exchange(request, body, deadline, endless=self.connection.endless)
             except Exception as error:
                 none = _no_answer(error, seconds + time_to_arrive(len(body)))
+                if attempt > 1 and none.kind is NoAnswer.REFUSED:
+                    raise _SilenceError(_CRASHED, NoAnswer.CLOSED) from error
                 if none.kind is not NoAnswer.CLOSED:
                     raise none from error
-                if attempt == 1 and connection.ended_before(method):
+                if attempt == 1 and connection.ended_before(method, anything=self.connection.resends):
                     # The server may have closed it at any time (RFC 9112 9.3.1).
                     self.connection.resent += 1
                     before = f"; the request before it on the first connection was answered {connection.last_status}"

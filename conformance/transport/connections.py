@@ -134,13 +134,14 @@ class HttpConnection:
         self.last_status = response.status
         return response
 
-    def ended_before(self, method: str) -> bool:
+    def ended_before(self, method: str, *, anything: bool = False) -> bool:
         """Return whether the server closed the kept connection before this request, which may then be sent again.
 
-        For a method that is not idempotent, the network must show that no server read the request (RFC 9110 9.2.2).
+        For a method that is not idempotent, the network must show that no server read the request (RFC 9110 9.2.2),
+        unless ``anything`` may be sent again.
         """
         kept = self.last_status > 0 and not self._begun
-        return kept and (method in IDEMPOTENT_METHODS or self._was_reset)
+        return kept and (anything or method in IDEMPOTENT_METHODS or self._was_reset)
 
     def _send(self, link: socket.socket, request: h11.Request, content: bytes, deadline: Deadline) -> None:
         """Send head and body, in one segment if they are short."""

@@ -7,6 +7,7 @@ import shlex
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
+from typing import NamedTuple
 
 from conformance.transport.credentials import quoted
 
@@ -231,6 +232,13 @@ class Unanswered:
     def came(self) -> str:
         """A short description of what happened instead of a response, for findings."""
         return self.problem
+
+
+class Sending(NamedTuple):
+    """A request that was sent, and why it got no response; None: it got one."""
+
+    request: Request
+    kind: NoAnswer | None
 
 
 # What became of a request: what a finding can be shown by.

@@ -6,7 +6,7 @@ import struct
 from typing import Final, Self
 
 from conformance.transport.client import Headers, HttpClient
-from conformance.transport.exchange import NoAnswer, NoAnswerError, Request, Unanswered
+from conformance.transport.exchange import NoAnswer, NoAnswerError, Request, Sending, Unanswered
 
 # l_onoff 1, l_linger 0: close() sends RST instead of FIN.
 _RESET: Final = struct.pack("ii", 1, 0)
@@ -59,6 +59,7 @@ class PartialRequest:
             if client.scheme == "https":
                 self._socket = client.connection.tls().wrap_socket(self._socket, server_hostname=client.host)
             self._socket.sendall(octets)
+            client.connection.recent.append(Sending(self.request, None))
         except OSError as error:
             unanswered = Unanswered(self.request, f"no connection: {error}", NoAnswer.REFUSED)
             raise NoAnswerError(unanswered) from error

@@ -16,7 +16,16 @@ import h11
 
 from conformance.transport.client import HttpClient
 from conformance.transport.connections import open_link
-from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Request, Response, Unanswered
+from conformance.transport.exchange import (
+    Attempt,
+    Exchange,
+    NoAnswer,
+    NoAnswerError,
+    Request,
+    Response,
+    Sending,
+    Unanswered,
+)
 from conformance.transport.pace import time_for
 
 # What a recipient may forgive in a header section, and a server must not send (RFC 9112 2.2, 5.2).
@@ -116,6 +125,7 @@ def talk(
         left = max(_TO_CONNECT_S, deadline - time.monotonic())
         link = open_link(client.host, client.port, client.tls, left)
     except OSError as error:
+        client.connection.recent.append(Sending(request, NoAnswer.REFUSED))
         raise NoAnswerError(Unanswered(request, f"no connection: {error}", NoAnswer.REFUSED)) from error
     received = bytearray()
     closed = False
@@ -138,6 +148,8 @@ def talk(
             if answers and answers_in(bytes(received), answers) == answers:
                 break
     client.connection.note(request.method)
+    silence = NoAnswer.CLOSED if closed else NoAnswer.TIMEOUT
+    client.connection.recent.append(Sending(request, None if received else silence))
     return RawAnswer(bytes(received), closed, sent_all, (time.perf_counter() - started) * 1000, early)
 
 

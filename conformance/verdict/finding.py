@@ -139,8 +139,8 @@ class Finding:
 
     @property
     def brief(self) -> str:
-        """Return subject and observation, for a reference to the finding."""
-        return f"{self.subject}: {_clause(self.observed)}"
+        """Return subject and observation in one sentence, for a reference to the finding."""
+        return f"{self.subject}: {_clause(self.observed.split('. ', 1)[0])}"
 
 
 def counted(number: int, what: str) -> str:

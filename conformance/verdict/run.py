@@ -55,6 +55,8 @@ class Run:
         judge: the evidence.
         aborted: why the run was aborted, or empty.
         interrupted: whether the user interrupted the run.
+        losses: how often the device stopped responding.
+        restart_command: command that restarts a device that stopped responding, or empty.
         unreachable: why an interface was not reachable at the start.
         tally: the generated cases of all explorations, and those that time did not allow.
         prepare: loads what is needed after the run; called while a check waits for the robot.
@@ -71,6 +73,8 @@ class Run:
     judge: Judge = field(init=False)
     aborted: str = ""
     interrupted: bool = False
+    losses: int = 0
+    restart_command: str = ""
     unreachable: dict[Interface, str] = field(default_factory=dict)
     tally: Tally = field(default_factory=Tally)
     prepare: Callable[[], object] | None = None

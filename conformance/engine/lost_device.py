@@ -1,0 +1,249 @@
+"""A device that stopped responding during the run: wait for it, restart it, and find the request that did it."""
+
+import shlex
+import subprocess
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from conformance.contract.classes import CauseKind
+from conformance.engine.resending import send_again
+from conformance.engine.smaller_requests import smaller
+from conformance.transport.client import Connection
+from conformance.transport.exchange import (
+    SAFE_METHODS,
+    Attempt,
+    NoAnswer,
+    NotPermittedError,
+    Request,
+    Sending,
+    Unanswered,
+)
+from conformance.verdict.finding import Sent, Showing
+from conformance.verdict.run import Run
+
+_CRASH: Final = "robustness/no-crash"
+_HANG: Final = "robustness/no-hang"
+# How long a lost device is waited for: one that a supervisor restarts, and one that the user's command restarts, s.
+_RETURN_S: Final = 20.0
+_RESTART_S: Final = 60.0
+# How many requests look for the smallest one, and for how long, s; and how many requests before it are sent with it.
+_SENDS: Final = 30
+_LOOKING_S: Final = 120.0
+_BEFORE: Final = (1, 3, 7)
+# A device that has answered its last request may need a moment to die of it, s.
+_DYING_S: Final = 0.3
+# A device that is lost more often than this is not waited for again.
+_MOST_LOSSES: Final = 5
+# Requests before the last one that the finding names.
+_NAMED: Final = 5
+
+
+@dataclass(frozen=True)
+class _Found:
+    """The requests that make the device stop responding, as few and small as they were found.
+
+    Attributes:
+        requests: the last one does it.
+        sure: whether they did it again when they were sent once more.
+        alone: whether the last request before the loss did it again without those before it.
+    """
+
+    requests: tuple[Request, ...]
+    sure: bool = False
+    alone: bool = False
+
+
+class LostDevice:
+    """What is done when a device does not respond any more.
+
+    Args:
+        run: the data of the run.
+        connection: the settings of the run's clients.
+        responds: returns whether the device responds within so many seconds.
+        operation_of: returns the label of the operation that a request is for, or an empty text.
+        tell: reports progress.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        connection: Connection,
+        responds: Callable[[float], bool],
+        operation_of: Callable[[Request], str],
+        tell: Callable[[str], None],
+    ) -> None:
+        self._run, self._connection, self._responds = run, connection, responds
+        self._operation_of, self._tell = operation_of, tell
+        self._sends, self._until, self._is_back = 0, 0.0, True
+
+    def handle(self, recent: Sequence[Sending]) -> bool:
+        """Record a finding with the request after which the device was lost; return whether the run can go on.
+
+        Args:
+            recent: the last requests, newest last.
+        """
+        run = self._run
+        sent, kind = _suspects(recent)
+        requirement = self._requirement(kind) if sent else ""
+        if sent:
+            self._tell(f"the device stopped responding after {_named(sent[-1])}; waiting for it to come back")
+        self._is_back = self._comes_back()
+        if not requirement:
+            return self._is_back
+        run.losses += 1
+        found = self._found(sent)
+        self._record(requirement, kind, sent, found)
+        if self._is_back and run.losses < _MOST_LOSSES:
+            self._tell("the device responds again; the run goes on")
+            return True
+        again = f", the {run.losses}th time" if self._is_back else ""
+        run.aborted = f"the device stopped responding after {_named(found.requests[-1])}{again}"
+        return False
+
+    def _requirement(self, kind: NoAnswer | None) -> str:
+        """Return the requirement that the loss breaks; empty if the contract or the running check names none."""
+        run, ledger = self._run, self._run.contract.ledger
+        id_ = _HANG if kind is NoAnswer.TIMEOUT else _CRASH
+        if id_ in ledger:
+            if run.claims and not ledger[id_].binds(run.claims):
+                # Whatever the user chose: nothing can be judged of a device that is lost.
+                ledger[id_] = replace(ledger[id_], also=(*ledger[id_].also, run.claims[0]))
+            return id_
+        if run.judge.at_risk:
+            return ""
+        cause = CauseKind.HANG if kind is NoAnswer.TIMEOUT else CauseKind.NO_RESPONSE
+        return next((item.id for item in ledger.values() if cause in item.forbids and item.binds(run.claims)), "")
+
+    def _comes_back(self) -> bool:
+        """Restart the device by the user's command, if there is one; return whether it responds again."""
+        command = self._run.restart_command
+        if not command:
+            return self._responds(_RETURN_S)
+        quiet = subprocess.DEVNULL
+        try:
+            # The user's own command, which may become the device's process.
+            subprocess.Popen(  # noqa: S603 - as above
+                shlex.split(command), stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True
+            )
+        except (OSError, ValueError) as error:
+            self._tell(f"--restart-command could not be started: {error}")
+            return self._responds(_RETURN_S)
+        # A device that hangs still listens until the command ends it.
+        time.sleep(_DYING_S)
+        return self._responds(_RESTART_S)
+
+    def _found(self, sent: Sequence[Request]) -> _Found:
+        """Return the smallest sequence of requests after which the device is lost again."""
+        last = sent[-1]
+        self._sends, self._until = _SENDS, time.monotonic() + _LOOKING_S
+        if not all(map(self._may_repeat, sent[-1:])) or not self._is_back:
+            return _Found((last,))
+        if self._does(last):
+            return _Found((self._smallest(last),), sure=True, alone=True)
+        for count in _BEFORE:
+            before = [request for request in sent[-count - 1 : -1] if self._may_repeat(request)]
+            if len(before) == count and self._does(*before, last):
+                pairs = ((one, last) for one in reversed(before) if count > 1)
+                pair = next((pair for pair in pairs if self._does(*pair)), None)
+                return _Found(pair or (*before, last), sure=True)
+        return _Found((last,))
+
+    def _smallest(self, request: Request) -> Request:
+        """Return the smallest request that still does what this one does."""
+        tried: set[Request] = set()
+        while True:
+            for one in smaller(request):
+                if one not in tried and self._does(one):
+                    request = one
+                    break
+                tried.add(one)
+            else:
+                return request
+
+    def _may_repeat(self, request: Request) -> bool:
+        """Return whether a request may be sent again: one that moves a device may move it elsewhere now."""
+        harmless = self._run.contract.described and self._run.statement.motion_map is None
+        return request.method in SAFE_METHODS or (harmless and request.raw is None)
+
+    def _does(self, *requests: Request) -> bool:
+        """Send requests, and return whether the device is lost after them; wait until it is back."""
+        if not self._is_back or len(requests) > self._sends or time.monotonic() > self._until:
+            return False
+        self._sends -= len(requests)
+        silent = replace(self._connection, listeners=[], recent=deque(), sent=0)
+        came: Attempt | None = None
+        try:
+            for request in requests:
+                came = send_again(request, silent)
+        except NotPermittedError:
+            return False
+        finally:
+            self._connection.sent += silent.sent
+        closed = isinstance(came, Unanswered) and came.kind in {NoAnswer.CLOSED, NoAnswer.REFUSED}
+        if not closed:
+            time.sleep(_DYING_S)
+        if not closed and self._responds(0.0):
+            return False
+        self._is_back = self._comes_back()
+        return True
+
+    def _record(self, requirement: str, kind: NoAnswer | None, sent: Sequence[Request], found: _Found) -> None:
+        """Record the finding, because of which what cannot be judged any more is not tested."""
+        judge, last = self._run.judge, found.requests[-1]
+        problem = {
+            NoAnswer.TIMEOUT: f"no response within {self._connection.timeout_s:g} s",
+            None: "no connection after the response to this request",
+        }.get(kind, "the server closed the connection without a response")
+        operation = self._operation_of(last)
+        judge.check(
+            requirement,
+            False,  # noqa: FBT003 - the condition of check()
+            Unanswered(last, problem, kind or NoAnswer.CLOSED),
+            "a response, and a device that responds afterwards",
+            found=f"{problem}, and no response to any request since. {self._told(sent, found)}",
+            cause=f"{operation or last.endpoint} {'hang' if kind is NoAnswer.TIMEOUT else 'closed'}",
+            subject=operation,
+            operations=[Showing(operation, 1, last)] if operation else [],
+        )
+        finding = judge.met[-1]
+        if found.sure:
+            finding.sequence = tuple(Sent(0.0, request) for request in found.requests)
+        judge.ended_by = finding
+
+    def _told(self, sent: Sequence[Request], found: _Found) -> str:
+        """Return what is known of the requests that did it, in sentences."""
+        before = [_named(request) for request in reversed(sent[:-1])][:_NAMED]
+        newest = f" The requests before it, newest first: {', '.join(before)}" if before else ""
+        if found.alone:
+            return "The same request, sent alone after the device had come back, did it again"
+        if found.sure:
+            named = ", ".join(map(_named, found.requests[:-1]))
+            return f"It does so after {named}, and did it again when these requests were repeated"
+        if not self._is_back:
+            waited = _RESTART_S if self._run.restart_command else _RETURN_S
+            return f"The device did not come back within {waited:g} s, so nothing more was sent.{newest}"
+        return f"The device came back, and did not do it again for the same request.{newest}"
+
+
+def _suspects(recent: Sequence[Sending]) -> tuple[list[Request], NoAnswer | None]:
+    """Return the requests up to the one after which the device was lost, and why that one got no response.
+
+    That is the first of the unanswered ones at the end; if all of them were refused, the answered one before them.
+    """
+    first = len(recent)
+    while first and recent[first - 1].kind is not None:
+        first -= 1
+    unanswered = [
+        index for index in range(first, len(recent)) if recent[index].kind in {NoAnswer.CLOSED, NoAnswer.TIMEOUT}
+    ]
+    end = unanswered[0] if unanswered else first - 1
+    if end < 0:
+        return [], None
+    return [one.request for one in recent[: end + 1]], recent[end].kind
+
+
+def _named(request: Request) -> str:
+    return f"`{request.method} {request.target[:120]}`"
