@@ -136,8 +136,8 @@ class FrontDoor:
             click.echo(f"no history: {error}", err=True)
 
     @staticmethod
-    def description_changes(old: str, new: str) -> list[tuple[bool, str, str]]:
-        """Return what changed between two descriptions: whether it breaks clients, the operation, and what it is."""
+    def description_changes(old: str, new: str) -> list[tuple[bool | None, str, str]]:
+        """Return what changed: whether it breaks clients (None if that is not known), the operation, and what it is."""
         comparing = import_module("conformance.engine.comparing")
         refused = import_module("conformance.documents.description").DescriptionError
         unreachable = import_module("conformance.engine.describing").UnreachableError

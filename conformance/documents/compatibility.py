@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 from urllib.parse import urlsplit
 
 from conformance.documents.json_schema import Schema
-from conformance.documents.openapi import Operation, read_operations
-from conformance.documents.parameters import Parameter
+from conformance.documents.openapi import METHODS
+from conformance.documents.operation_compatibility import Described, Documents, Found, operation_changes
 from conformance.documents.resources import PARAMETER
-from conformance.documents.schema_compatibility import schema_changes
+from conformance.documents.security_compatibility import security_changes
 
-_KINDS: Final = {"query": "query parameter", "header": "header", "cookie": "cookie", "path": "path parameter"}
+_VARIABLE: Final = re.compile(r"\{([^{}]+)\}")
+# An operation below one of its servers, by what a client sends.
+_Key = tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -21,158 +24,99 @@ class Change:
     """A change of a description.
 
     Attributes:
-        breaking: whether a client of the older description may fail.
+        breaking: whether a client of the older description may fail; None if it is not known.
         operation: method and path, or the whole if empty.
         text: what changed.
     """
 
-    breaking: bool
+    breaking: bool | None
     operation: str
     text: str
 
 
 def changes(old: Schema, new: Schema) -> list[Change]:
-    """Return what changed between two OpenAPI 3 documents, those that break clients first.
+    """Return what changed between two OpenAPI 3 documents: what breaks clients, what may, and the rest.
 
     Raises:
         UnresolvedError, AttributeError, TypeError, KeyError: a document is malformed.
     """
-    before, after = _by_request(old), _by_request(new)
-    gone = [item.label for key, item in before.items() if key not in after]
-    added = [item.label for key, item in after.items() if key not in before]
-    found = [Change(breaking=True, operation=label, text="the operation is gone") for label in gone]
-    found += [Change(breaking=False, operation=label, text="the operation is new") for label in added]
+    both = Documents(old, new)
+    found = list(_of_operations(both, *(_operations(document, "paths") for document in (old, new))))
+    webhooks = [_operations(document, "webhooks") for document in (old, new)]
+    found += _of_operations(both, *webhooks, by_client=False)
+    order = {True: 0, None: 1, False: 2}
+    return sorted(dict.fromkeys(found), key=lambda change: order[change.breaking])
+
+
+def _of_operations(
+    both: Documents, before: dict[_Key, Described], after: dict[_Key, Described], *, by_client: bool = True
+) -> Iterator[Change]:
+    what = "operation" if by_client else "message"
     for key, item in before.items():
-        if key in after:
-            found += [Change(breaking, item.label, text) for breaking, text in _of_operation(item, after[key])]
-    return sorted(dict.fromkeys(found), key=lambda change: not change.breaking)
-
-
-def _by_request(document: Schema) -> dict[tuple[str, str], Operation]:
-    """Return the operations by method and path below the server, in which the names of parameters do not count."""
-    servers = document.get("servers")
-    base = urlsplit(str(servers[0].get("url", ""))).path.rstrip("/") if servers else ""
-    return {
-        (item.method, base + PARAMETER.sub("{}", item.template)): item
-        for item in read_operations(document, closed=True)
-    }
-
-
-def _of_operation(old: Operation, new: Operation) -> Iterator[tuple[bool, str]]:
-    yield from _security(old, new)
-    yield from _parameters(old, new)
-    yield from _body(old, new)
-    yield from _responses(old, new)
-
-
-def _security(old: Operation, new: Operation) -> Iterator[tuple[bool, str]]:
-    before, after = (item.security or ((),) for item in (old, new))
-    if {frozenset(one) for one in before} == {frozenset(one) for one in after}:
-        return
-    # Who has what sufficed before must be let in.
-    breaking = any(not any(set(needed) <= set(had) for needed in after) for had in before)
-    yield breaking, f"needs {_schemes(after)}, before {_schemes(before)}"
-
-
-def _schemes(alternatives: tuple[tuple[str, ...], ...]) -> str:
-    return " or ".join(" with ".join(one) or "no credentials" for one in alternatives)
-
-
-def _parameters(old: Operation, new: Operation) -> Iterator[tuple[bool, str]]:
-    before, after = _by_name(old), _by_name(new)
-    for key, one in after.items():
-        if key not in before:
-            word = "new, and required" if one.required else "new"
-            yield one.required, f"{_called(one)} is {word}"
-    for key, one in before.items():
+        if key not in after:
+            yield Change(breaking=True, operation=_label(key, item), text=f"the {what} is gone")
+    known = {id(item.operation) for key, item in after.items() if key in before}
+    for key, item in after.items():
+        if id(item.operation) not in known:
+            yield Change(breaking=False, operation=_label(key, item), text=f"the {what} is new")
+    compared = set()
+    for key, item in before.items():
         other = after.get(key)
-        if other is None:
-            yield True, f"{_called(one)} is gone"
-            continue
-        if one.required != other.required:
-            yield other.required, f"{_called(one)} is {'required' if other.required else 'optional'} now"
-        if (one.style, one.explode) != (other.style, other.explode):
-            yield True, f"{_called(one)} is written in another way (style or explode)"
-        for breaking, text in schema_changes(one.schema, other.schema, request=True):
-            yield breaking, f"{_called(one)}{text}"
+        if other is not None and (id(item.operation), id(other.operation)) not in compared:
+            compared.add((id(item.operation), id(other.operation)))
+            for breaks, text in _of_operation(both, item, other, by_client=by_client):
+                yield Change(breaks, _label(key, item), text)
 
 
-def _by_name(operation: Operation) -> dict[tuple[str, str], Parameter]:
-    """Return the parameters: those of the path by their place in it, those of the header in any case."""
-    places = {name: str(number) for number, name in enumerate(PARAMETER.findall(operation.template))}
-    found = {}
-    for one in operation.parameters:
-        name = places.get(one.name, one.name) if one.where == "path" else one.name
-        found[one.where, name.lower() if one.where == "header" else name] = one
+def _label(key: _Key, item: Described) -> str:
+    return f"{key[0]} {item.path}"
+
+
+def _of_operation(both: Documents, old: Described, new: Described, *, by_client: bool) -> Iterator[Found]:
+    if by_client:
+        yield from security_changes((both.old, old.operation), (both.new, new.operation))
+    yield from operation_changes(both, old, new, by_client=by_client)
+    # What the API calls in the other direction.
+    callbacks = _callbacks(old), _callbacks(new)
+    for change in _of_operations(both, *callbacks, by_client=not by_client):
+        yield change.breaking, f"callback {change.operation}: {change.text}"
+
+
+def _operations(document: Schema, section: str) -> dict[_Key, Described]:
+    """Return the operations by method and path below each server, in which the names of parameters do not count."""
+    whole = Described(document, "", {}, {})
+    found: dict[_Key, Described] = {}
+    for path, given in (document.get(section) or {}).items():
+        if not isinstance(given, dict):
+            raise TypeError(f"the path {path} has no object")
+        item = whole.followed(given)
+        for method, operation in _methods(item):
+            servers = operation.get("servers") or item.get("servers") or document.get("servers")
+            bases = [_base(server) for server in servers or [Schema()]] if section == "paths" else [""]
+            for base in bases:
+                found[method, base + PARAMETER.sub("{}", path)] = Described(document, path, item, operation)
     return found
 
 
-def _called(parameter: Parameter) -> str:
-    return f"{_KINDS.get(parameter.where, parameter.where)} {parameter.name}"
+def _callbacks(described: Described) -> dict[_Key, Described]:
+    return {
+        (method, str(expression)): Described(described.document, str(expression), item, operation)
+        for callback in described.operation.get("callbacks", {}).values()
+        for expression, given in described.followed(callback).items()
+        if not str(expression).startswith("x-")
+        for item in (described.followed(given),)
+        for method, operation in _methods(item)
+    }
 
 
-def _body(old: Operation, new: Operation) -> Iterator[tuple[bool, str]]:
-    if old.bodies and not new.bodies:
-        yield True, "takes no body any more"
-        return
-    if not old.bodies:
-        if new.bodies:
-            yield new.body_required, f"takes a body{', which is required' if new.body_required else ''}"
-        return
-    if old.body_required != new.body_required:
-        yield new.body_required, f"the body is {'required' if new.body_required else 'optional'} now"
-    before, after = ({name: body.schema for name, body in item.bodies.items()} for item in (old, new))
-    yield from _contents("the body", before, after, request=True)
+def _methods(item: Schema) -> Iterator[tuple[str, Any]]:
+    """Yield the operations of a path item by method; the last two are OpenAPI 3.2's."""
+    yield from ((method.upper(), item[method]) for method in (*METHODS, "query") if method in item)
+    yield from item.get("additionalOperations", {}).items()
 
 
-def _responses(old: Operation, new: Operation) -> Iterator[tuple[bool, str]]:
-    for status, content in old.responses.items():
-        key = status if status in new.responses else _covering(status, new)
-        if key is None:
-            yield True, f"status {status} is gone"
-            continue
-        yield from _contents(f"response {status}", content, new.responses[key], request=False)
-        yield from _headers(status, old.headers.get(status, {}), new.headers.get(key, {}))
-    for status in new.responses:
-        if status not in old.responses:
-            yield False, f"status {status} is new"
-
-
-def _covering(status: str, operation: Operation) -> str | None:
-    return operation.response_key(int(status)) if status.isdigit() else None
-
-
-def _headers(
-    status: str, old: dict[str, tuple[bool, Schema]], new: dict[str, tuple[bool, Schema]]
-) -> Iterator[tuple[bool, str]]:
-    for name, (required, schema) in old.items():
-        if name not in new:
-            yield True, f"response {status}, header {name} is gone"
-            continue
-        if required and not new[name][0]:
-            yield True, f"response {status}, header {name} is optional now"
-        for breaking, text in schema_changes(schema, new[name][1], request=False):
-            yield breaking, f"response {status}, header {name}{text}"
-    for name in new:
-        if name not in old:
-            yield False, f"response {status}, header {name} is new"
-
-
-def _contents(
-    what: str, old: dict[str, Schema], new: dict[str, Schema], *, request: bool
-) -> Iterator[tuple[bool, str]]:
-    """Yield what changed in the media types of a body, and in the schema of each."""
-    told: set[tuple[bool, str]] = set()
-    for name, schema in old.items():
-        other = new.get(name, next((new[one] for one in (f"{name.partition('/')[0]}/*", "*/*") if one in new), None))
-        if other is None:
-            yield True, f"{what} is no longer {name}"
-            continue
-        for breaking, text in schema_changes(schema, other, request=request):
-            if (breaking, text) not in told:
-                told.add((breaking, text))
-                yield breaking, f"{what}{text}"
-    for name in new:
-        if name not in old and (old or not request):
-            # A response that had no content may have one: a client that expects none need not look at it.
-            yield False, f"{what} may be {name}"
+def _base(server: Schema) -> str:
+    """Return the path of a server's URL, with the defaults of its variables."""
+    variables = server.get("variables", {})
+    url = _VARIABLE.sub(lambda found: str(variables.get(found[1], {}).get("default", "")), str(server.get("url", "")))
+    return urlsplit(url).path.rstrip("/")

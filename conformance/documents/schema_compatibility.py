@@ -1,196 +1,298 @@
-"""Compare two schemas of the same place: what breaks who sends or reads by the older one."""
+"""Compare two schemas of the same place: what breaks who sends or reads by the older one.
+
+Which values are valid decides whether a change breaks (schema_containment). What changed is found word by word.
+"""
 
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from conformance.documents.json_schema import Schema, types_of
+from conformance.documents.json_schema import Schema
+from conformance.documents.schema_containment import Placed, apart, introduced, is_covered, witness
+from conformance.documents.schema_merging import alternatives, are_related, common_types, kind_in, types_in
+from conformance.documents.schema_sides import OPAQUE, UNSENT, Side, is_same
+from conformance.documents.schema_wording import below, change_text, cut, differing, name_of, type_text
 
-_DEPTH: Final = 12
-_MOST_ALTERNATIVES: Final = 40
-# Each keyword that bounds a value, with 1 for a lower bound and -1 for an upper one, and the bound without it.
-_BOUNDS: Final = {
-    "minimum": (1, -math.inf), "exclusiveMinimum": (1, -math.inf), "minLength": (1, 0), "minItems": (1, 0),
-    "minProperties": (1, 0), "maximum": (-1, math.inf), "exclusiveMaximum": (-1, math.inf), "maxLength": (-1, math.inf),
-    "maxItems": (-1, math.inf), "maxProperties": (-1, math.inf),
-}  # fmt: skip
-# Keywords that allow less where they are there, and something else where they have another value.
-_LIMITS: Final = ("pattern", "format", "multipleOf")
-_WIDER_FORMATS: Final = {("int32", "int64"), ("float", "double")}
-_WITHOUT: Final = "none"
-# Whether it breaks a client, and what changed: where, and how.
-_Found = tuple[bool, str]
+# Words that are compared together, because one changes what the others mean.
+_GROUPS: Final = (
+    ("enum", "const"), ("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum"), ("multipleOf",),
+    ("minLength",), ("maxLength",), ("pattern",), ("format",), ("minItems",), ("maxItems",), ("uniqueItems",),
+    ("contains", "minContains", "maxContains"), ("minProperties",), ("maxProperties",), ("dependentRequired",),
+    ("dependentSchemas",), ("propertyNames",), ("not",), ("if", "then", "else"),
+)  # fmt: skip
+_MEMBERS: Final = ("properties", "patternProperties", "additionalProperties")
+# Words that say nothing without those of other places.
+_WIDE: Final = ("unevaluatedProperties", "unevaluatedItems")
 
 
-def schema_changes(old: Any, new: Any, *, request: bool, depth: int = 0) -> Iterator[_Found]:
-    """Yield what changed, and whether it breaks a client, as text that follows the name of the place.
+@dataclass(frozen=True)
+class Finding:
+    """What changed in a schema.
+
+    Attributes:
+        breaks: whether it breaks a client; None if it is not known.
+        text: what changed, following the name of the place.
+        always: whether it is so whatever values are valid.
+    """
+
+    breaks: bool | None
+    text: str
+    always: bool = False
+
+
+def schema_changes(old: tuple[Any, Side], new: tuple[Any, Side], *, request: bool) -> list[Finding]:
+    """Return what changed, and whether it breaks a client.
 
     A client of the older schema fails if what it sends is no longer taken, or if it reads what it did not expect.
 
     Args:
-        old: schema without references, Draft 2020-12.
+        old: prepared schema with its side.
         new: likewise.
         request: whether clients send the value; otherwise they read it.
-        depth: how deep the schema is within that of the body.
     """
-    if old == new or depth > _DEPTH:
-        return
-    before, after = _alternatives(old), _alternatives(new)
-    if len(before) == len(after) == 1:
-        yield from _alike(before[0], after[0], request=request, depth=depth)
-        return
-    # Each alternative that was sent must still be taken; each that is read now must have been known.
-    asked, given = (before, after) if request else (after, before)
-    for one in asked:
-        like = [other for other in given if _kind(one) == _kind(other)]
-        like = [other for other in like if other.get("title", "") == one.get("title")] or like
-        pairs = [(one, other) if request else (other, one) for other in like]
-        found = [list(_alike(*pair, request=request, depth=depth)) for pair in pairs]
-        if any(not any(breaking for breaking, _ in changes) for changes in found):
-            continue
-        if len(found) == 1:
-            yield from (change for change in found[0] if change[0])
+    return _Comparison(old[1], new[1], request).findings(old[0], new[0])
+
+
+@dataclass
+class _Comparison:
+    """Compares schemas of two sides; a pair that contains itself is assumed to be right until it is not."""
+
+    old: Side
+    new: Side
+    request: bool
+    found: dict[str, list[Finding]] = field(default_factory=dict)
+    open: dict[str, bool] = field(default_factory=dict)
+
+    def findings(self, old: Any, new: Any) -> list[Finding]:
+        before, after = self.old.target(old), self.new.target(new)
+        key = json.dumps([before, after], sort_keys=True, default=str)
+        if key in self.open:
+            self.open[key] = True
+            return []
+        if key not in self.found:
+            self.open[key] = False
+            known = set(self.found)
+            result = self._compared(before, after)
+            if self.open.pop(key) and any(one.breaks is not False for one in result):
+                # What was found on the assumption that this pair is right does not hold.
+                for other in self.found.keys() - known:
+                    del self.found[other]
+            self.found[key] = result
+        return self.found[key]
+
+    def _is_covered(self, old: Any, new: Any, within: tuple[Any, Any] | None = None) -> bool:
+        return is_covered(*self._placed(old, new), self._barred(*within or (old, new)))
+
+    def _witness(self, old: Any, new: Any, within: tuple[Any, Any] | None = None) -> str | None:
+        return witness(*self._placed(old, new), self._barred(*within or (old, new)))
+
+    def _barred(self, old: Any, new: Any) -> frozenset[str] | None:
+        return introduced(*self._placed(old, new)) if self.request else None
+
+    def _placed(self, old: Any, new: Any) -> tuple[Placed, Placed]:
+        one, other = self._ordered((old, self.old), (new, self.new))
+        return one, other
+
+    def _ordered(self, old: Any, new: Any) -> tuple[Any, Any]:
+        """Return the schema of what is sent, and that of what the receiver takes."""
+        return (old, new) if self.request else (new, old)
+
+    def _compared(self, old: Any, new: Any) -> list[Finding]:
+        if is_same(old, new, self.old, self.new, set()):
+            return []
+        before, after = alternatives(old, self.old), alternatives(new, self.new)
+        if len(before) == len(after) == 1:
+            found = list(self._by_word(before[0], after[0]))
         else:
-            yield True, f" may {'no longer' if request else 'now'} be {_name(one)}"
-    for one in given:
-        if not any(_kind(one) == _kind(other) for other in asked):
-            yield False, f" may {'now' if request else 'no longer'} be {_name(one)}"
+            found = list(self._by_alternative(old, new, before, after))
+        found = list(dict.fromkeys(found))
+        if any(one.breaks is not False for one in found) and self._is_covered(old, new):
+            # What breaks in one word is made good by another.
+            kept = [
+                replace(one, breaks=one.breaks and one.always) for one in found if one.breaks is not None or one.always
+            ]
+            return [one if one.always else replace(one, breaks=False) for one in kept]
+        if any(one.breaks for one in found) or all(one.breaks is False or one.always for one in found):
+            return found
+        example = self._witness(old, new)
+        if example is None:
+            return found
+        known = [one for one in found if one.breaks is False or one.always]
+        return [Finding(breaks=True, text=f": {self._now()} {cut(example)}"), *known]
 
+    def _now(self) -> str:
+        return "no longer takes, for example," if self.request else "may now be, for example,"
 
-def _alternatives(schema: Any, depth: int = 0) -> list[Schema]:
-    """Return the alternatives of a schema: of anyOf and oneOf and of several types, with what holds for all of them."""
-    if not isinstance(schema, dict):
-        return [{} if schema is not False else {"enum": []}]
-    base = {key: value for key, value in schema.items() if key not in {"anyOf", "oneOf", "allOf"}}
-    found = [base]
-    for part in schema.get("allOf", ()):
-        found = [_merged(one, other) for one in found for other in _alternatives(part, depth + 1)]
-    for key in ("anyOf", "oneOf"):
-        parts = schema.get(key)
-        if parts and depth <= _DEPTH:
-            inner = [other for part in parts for other in _alternatives(part, depth + 1)]
-            found = [_merged(one, other) for one in found for other in inner][:_MOST_ALTERNATIVES]
-    return [{**one, "type": kind} if kind else one for one in found for kind in types_of(one) or ("",)]
+    def _by_alternative(self, old: Any, new: Any, before: list[Any], after: list[Any]) -> Iterator[Finding]:
+        """Yield changes where a value may have several shapes: each that is sent must be one that is taken."""
+        sent, taken = self._ordered(before, after)
+        whole, side = self._ordered(old, new)[1], self._ordered(self.old, self.new)[1]
+        sender = self._ordered(old, new)[0]
+        sure = (
+            not _has(whole, "oneOf")
+            or (not self.request and _has(sender, "oneOf"))
+            or _are_apart([(other, side) for other in taken])
+        )
+        for one in sent:
+            if len(sent) > 1:
+                yield from self._gone(one, taken)
+            # What is sent in this shape, against all that is taken.
+            if self._is_covered(*self._ordered(one, whole)):
+                continue
+            like = [other for other in taken if kind_in(one) == kind_in(other) or "" in (kind_in(one), kind_in(other))]
+            found = [self.findings(*self._ordered(one, other)) for other in like]
+            if sure and any(all(change.breaks is False for change in changes) for changes in found):
+                continue
+            example = self._witness(*self._ordered(one, whole))
+            if example is None:
+                yield Finding(None, f": not compared: {differing(old, new) or 'alternatives'}")
+            elif len(found) == 1 and any(change.breaks for change in found[0]):
+                yield from (change for change in found[0] if change.breaks)
+            else:
+                yield Finding(
+                    breaks=True, text=f" may {'no longer' if self.request else 'now'} be {name_of(one, example)}"
+                )
+        for one in taken:
+            if not any(kind_in(one) == kind_in(other) for other in sent):
+                yield Finding(breaks=False, text=f" may {'now' if self.request else 'no longer'} be {name_of(one)}")
 
+    def _gone(self, one: Any, taken: list[Any]) -> Iterator[Finding]:
+        """Yield the members that are gone from the one shape that has values of a shape that is sent."""
+        same = [other for other in taken if not apart(*self._placed(*self._ordered(one, other)))]
+        if len(same) == 1:
+            yield from (change for change in self.findings(*self._ordered(one, same[0])) if change.always)
 
-def _merged(one: Schema, other: Schema) -> Schema:
-    """Return a schema that demands what both do."""
-    found = {**one, **other}
-    if "properties" in one and "properties" in other:
-        found["properties"] = {**one["properties"], **other["properties"]}
-    if "required" in one and "required" in other:
-        found["required"] = [*one["required"], *other["required"]]
-    return found
+    def _by_word(self, old: Any, new: Any) -> Iterator[Finding]:
+        """Yield the changes between two schemas without alternatives."""
+        if isinstance(old, bool) or isinstance(new, bool):
+            old, new = ({} if one is True else {"enum": []} if one is False else one for one in (old, new))
+        kinds = types_in(old), types_in(new)
+        if kinds[0] != kinds[1]:
+            one, other = ({"type": list(kind)} if kind else True for kind in kinds)
+            fine = self._is_covered(one, other)
+            yield Finding(breaks=not fine, text=f": type {type_text(kinds[0])} → {type_text(kinds[1])}")
+            if kinds[0] and kinds[1] and not are_related(*kinds):
+                return
+        for words in _GROUPS:
+            yield from self._group(old, new, words)
+        yield from self._members(old, new)
+        yield from self._items(old, new)
+        yield from self._parts(old, new)
+        for word in ("anyOf", "oneOf", "$ref", *_WIDE):
+            if not is_same(old.get(word), new.get(word), self.old, self.new, set()):
+                yield Finding(None, f": not compared: {word}")
+        for word in OPAQUE:
+            if old.get(word) != new.get(word):
+                yield Finding(None, f": not compared: {word}", always=True)
 
+    def _parts(self, old: Schema, new: Schema) -> Iterator[Finding]:
+        """Yield the changes of what allOf demands, where it could not be written as one schema."""
+        parts = old.get("allOf", []), new.get("allOf", [])
+        if len(parts[0]) == len(parts[1]):
+            for pair in zip(*parts, strict=True):
+                yield from self.findings(*pair)
+        else:
+            yield Finding(None, ": not compared: allOf")
 
-def _kind(schema: Schema) -> str:
-    kind = str(schema.get("type", ""))
-    return "number" if kind == "integer" else kind
-
-
-def _name(schema: Schema) -> str:
-    if "const" in schema or "enum" in schema:
-        return _shown(schema.get("enum", [schema.get("const")]))
-    return str(schema.get("title") or schema.get("type") or "anything")
-
-
-def _alike(old: Schema, new: Schema, *, request: bool, depth: int) -> Iterator[_Found]:
-    """Yield the changes between two schemas without alternatives."""
-    before, after = old.get("type", ""), new.get("type", "")
-    if before != after and (before or after):
-        wider = not after or (before, after) == ("integer", "number")
-        tighter = not before or (after, before) == ("integer", "number")
-        yield not (wider if request else tighter), f": type {before or 'any'} → {after or 'any'}"
-        if not (wider or tighter):
+    def _group(self, old: Schema, new: Schema, words: tuple[str, ...]) -> Iterator[Finding]:
+        before, after = ({word: one[word] for word in words if word in one} for one in (old, new))
+        if is_same(before, after, self.old, self.new, set()):
             return
-    yield from _values(old, new, request=request)
-    yield from _limits(old, new, request=request)
-    yield from _members(old, new, request=request, depth=depth)
-    if "items" in old or "items" in new:
-        for breaking, text in schema_changes(
-            old.get("items", {}), new.get("items", {}), request=request, depth=depth + 1
-        ):
-            yield breaking, f"[]{text}"
+        one, other = (
+            {**({"type": given["type"]} if "type" in given else {}), **part}
+            for given, part in ((old, before), (new, after))
+        )
+        if one.get("type") != other.get("type"):
+            # The type is a change of its own.
+            one, other = ({**shell, "type": common_types(old, new)} for shell in (one, other))
+        within = old, new
+        if self._is_covered(one, other, within):
+            breaks: bool | None = False
+            if self._is_covered(other, one, within):
+                return
+        elif self._witness(one, other, within) is not None or words == ("format",):
+            breaks = True
+        else:
+            breaks = None
+        for word in words:
+            if old.get(word) != new.get(word):
+                unknown = f": not compared: {word}"
+                yield Finding(breaks, unknown if breaks is None else change_text(word, old, new, request=self.request))
+                if word in {"enum", "const"}:
+                    return
+
+    def _members(self, old: Schema, new: Schema) -> Iterator[Finding]:
+        """Yield changes of an object's members."""
+        before, after = (
+            {name: part for name, part in one.get("properties", {}).items() if part != UNSENT} for one in (old, new)
+        )
+        needed, needs = (frozenset(one.get("required", ())) for one in (old, new))
+        for name in sorted(needed ^ needs):
+            introduced = name not in before and name in after
+            word = "new, and required" if introduced else "required now" if name in needs else "optional now"
+            yield Finding(breaks=(name in needs) == self.request, text=f", member {name} is {word}")
+        for name, schema in after.items():
+            if name not in before:
+                if name not in needs - needed:
+                    yield Finding(breaks=False, text=f", member {name} is new")
+                yield from self._against_others(old, name, schema, old_has=False)
+        for name, schema in before.items():
+            if name in after:
+                yield from (replace(one, text=below(name, one.text)) for one in self.findings(schema, after[name]))
+            elif schema is not False:
+                yield Finding(breaks=True, text=f", member {name} is gone", always=True)
+                yield from self._against_others(new, name, schema, old_has=True)
+        yield from self._other_members(old, new)
+
+    def _against_others(self, other: Schema, name: str, schema: Any, *, old_has: bool) -> Iterator[Finding]:
+        """Yield changes of a member that one schema describes, and the other among those that have no name."""
+        if any(word in other for word in ("patternProperties", *_WIDE)):
+            yield Finding(None, f", member {name}: not compared: patternProperties")
+        rest = True if name in other.get("properties", ()) else other.get("additionalProperties", True)
+        sends = old_has == self.request
+        if rest is True or (rest is False and not (sends and self.request)):
+            # A client sends no member that is not described, and takes those that it does not know.
+            return
+        pair = (schema, rest) if old_has else (rest, schema)
+        yield from (replace(one, text=below(name, one.text)) for one in self.findings(*pair))
+
+    def _other_members(self, old: Schema, new: Schema) -> Iterator[Finding]:
+        """Yield changes of the members that have no name of their own."""
+        patterns = [one.get("patternProperties", {}) for one in (old, new)]
+        if patterns[0].keys() == patterns[1].keys():
+            for pattern, schema in patterns[0].items():
+                found = self.findings(schema, patterns[1][pattern])
+                yield from (replace(one, text=below(pattern, one.text)) for one in found)
+        else:
+            one, other = ({word: given[word] for word in _MEMBERS if word in given} for given in (old, new))
+            if not self._is_covered(one, other, (old, new)):
+                shown = self._witness(one, other, (old, new)) is not None
+                text = ": other members by patternProperties" if shown else ": not compared: patternProperties"
+                yield Finding(breaks=shown or None, text=text)
+        rest, others = (one.get("additionalProperties", True) for one in (old, new))
+        if (rest is False) != (others is False):
+            closes = others is False
+            word = "refused" if closes else "allowed"
+            yield Finding(breaks=self.request and closes, text=f": members that are not described are {word} now")
+        elif not is_same(rest, others, self.old, self.new, set()):
+            yield from (replace(one, text=below("*", one.text)) for one in self.findings(rest, others))
+
+    def _items(self, old: Schema, new: Schema) -> Iterator[Finding]:
+        """Yield changes of the items: each of the first ones with its own schema, then the others."""
+        first = [one.get("prefixItems", []) for one in (old, new)]
+        rest = [one.get("items", True) for one in (old, new)]
+        for number in range(max(map(len, first))):
+            pair = [some[number] if number < len(some) else other for some, other in zip(first, rest, strict=True)]
+            yield from (replace(one, text=f"[{number}]{one.text}") for one in self.findings(*pair))
+        yield from (replace(one, text=f"[]{one.text}") for one in self.findings(*rest))
 
 
-def _values(old: Schema, new: Schema, *, request: bool) -> Iterator[_Found]:
-    """Yield changes of enum and const."""
-    before, after = (
-        one.get("enum", [one["const"]] if "const" in one else None) for one in (old, new)
-    )  # fmt: skip
-    if before is None or after is None:
-        if before is not after:
-            yield (before is None) == request, f": values {_shown(before)} → {_shown(after)}"
-        return
-    for word, breaking, these, those in (("no longer", request, before, after), ("now", not request, after, before)):
-        other = [one for one in these if one not in those]
-        if other:
-            yield breaking, f" may {word} be {_shown(other)}"
+def _are_apart(schemas: list[Placed]) -> bool:
+    return all(apart(one, other) for number, one in enumerate(schemas) for other in schemas[:number])
 
 
-def _limits(old: Schema, new: Schema, *, request: bool) -> Iterator[_Found]:
-    """Yield changes of bounds; who reads a value is not harmed by other bounds."""
-    for key, (sign, default) in _BOUNDS.items():
-        before, after = old.get(key, default), new.get(key, default)
-        if before != after and not isinstance(before, bool) and not isinstance(after, bool):
-            yield request and sign * after > sign * before, f": {key} {_bound(before)} → {_bound(after)}"
-    for key in _LIMITS:
-        before, after = old.get(key), new.get(key)
-        if before != after:
-            tighter = after is not None and (before, after) not in _WIDER_FORMATS
-            yield request and tighter, f": {key} {_shown(before)} → {_shown(after)}"
-    if bool(old.get("uniqueItems")) != bool(new.get("uniqueItems")):
-        yield request and bool(new.get("uniqueItems")), f": items must {'' if new.get('uniqueItems') else 'not '}differ"
-
-
-def _bound(value: float) -> str:
-    return _WITHOUT if math.isinf(value) else f"{value:g}"
-
-
-def _members(old: Schema, new: Schema, *, request: bool, depth: int) -> Iterator[_Found]:
-    """Yield changes of an object's members."""
-    before, after = (_sent(one, request=request) for one in (old, new))
-    needed, needs = (set(one.get("required", ())) for one in (old, new))
-    for name in after:
-        if name not in before:
-            required = request and name in needs
-            yield required, f", member {name} is new{', and required' if required else ''}"
-    for name, schema in before.items():
-        if name not in after:
-            yield True, f", member {name} is gone"
-            continue
-        if (name in needed) != (name in needs):
-            yield (name in needs) == request, f", member {name} is {'required' if name in needs else 'optional'} now"
-        for breaking, text in schema_changes(schema, after[name], request=request, depth=depth + 1):
-            yield breaking, _below(name, text)
-    closed, closes = (one.get("additionalProperties") is False for one in (old, new))
-    if closed != closes:
-        yield request and closes, f": members that are not described are {'refused' if closes else 'allowed'} now"
-    rest, others = (one.get("additionalProperties") for one in (old, new))
-    if isinstance(rest, dict) and isinstance(others, dict):
-        for breaking, text in schema_changes(rest, others, request=request, depth=depth + 1):
-            yield breaking, _below("*", text)
-
-
-def _sent(schema: Schema, *, request: bool) -> Schema:
-    """Return the members that are sent in this direction (OpenAPI 3.0, 4.7.24.2)."""
-    other = "readOnly" if request else "writeOnly"
-    properties = schema.get("properties", {})
-    return {name: one for name, one in properties.items() if not (isinstance(one, dict) and one.get(other) is True)}
-
-
-def _below(name: str, text: str) -> str:
-    """Return what changed in a member: its name before that of its own member."""
-    if text.startswith(", member "):
-        return f", member {name}.{text.removeprefix(', member ')}"
-    return f", member {name}{text}"
-
-
-def _shown(value: Any) -> str:
-    if value is None:
-        return _WITHOUT
-    values = value if isinstance(value, list) else [value]
-    return ", ".join(one if isinstance(one, str) else json.dumps(one) for one in values) or _WITHOUT
+def _has(schema: Any, word: str) -> bool:
+    return isinstance(schema, dict) and word in schema

@@ -15,8 +15,14 @@ def compared(old: str, new: str) -> list[Change]:
         UnreachableError: a server does not respond.
     """
     connection = Connection()
-    documents = [fetch_description(source, (), connection).document for source in (old, new)]
+    descriptions = [fetch_description(source, (), connection) for source in (old, new)]
+    # What a reference leads to may have changed, even if the reference did not.
+    unread = [
+        Change(None, source, f"not compared: {reference}")
+        for source, description in zip((old, new), descriptions, strict=True)
+        for reference in description.unresolved
+    ]
     try:
-        return changes(*documents)
+        return [*changes(*(one.document for one in descriptions)), *unread]
     except (UnresolvedError, AttributeError, TypeError, KeyError) as error:
         raise DescriptionError(f"{old} and {new} cannot be compared, one is malformed: {error!r}") from error

@@ -17,33 +17,51 @@ class DescriptionChanges:
 
     Attributes:
         breaking: what breaks clients of the older one: the change, with the operations that have it.
-        other: what does not, likewise.
+        unknown: what could not be compared, likewise.
+        other: what does not break clients, likewise.
     """
 
     breaking: dict[str, list[str]]
+    unknown: dict[str, list[str]]
     other: dict[str, list[str]]
 
     @property
     def headline(self) -> str:
         """Return in a sentence how much breaks."""
-        number, rest = len(self.breaking), len(self.other)
-        breaks = f"{number or 'No'} {'change breaks' if number < 2 else 'changes break'} existing clients"  # noqa: PLR2004 - plural
-        return f"{breaks}; {rest} other {'change' if rest == 1 else 'changes'}." if rest else f"{breaks}."
+        number, unknown, rest = len(self.breaking), len(self.unknown), len(self.other)
+        parts = [f"{number or 'No'} {'change breaks' if number < 2 else 'changes break'} existing clients"]  # noqa: PLR2004 - plural
+        if unknown:
+            # Where something may break, nothing is said of "no change".
+            parts = [
+                *(parts if number else ()),
+                f"of {_changes(unknown)} it is not known whether existing clients break",
+            ]
+        parts += [_changes(rest).replace(" ", " other ")] if rest else []
+        text = "; ".join(parts)
+        return f"{text[0].upper()}{text[1:]}."
 
     @property
     def groups(self) -> Iterator[tuple[str, dict[str, list[str]]]]:
-        """Yield the two groups with their headings, if there is something in them."""
-        for heading, found in (("Breaks existing clients", self.breaking), ("Other changes", self.other)):
+        """Yield the groups with their headings, if there is something in them."""
+        for heading, found in (
+            ("Breaks existing clients", self.breaking),
+            ("Not known whether it breaks existing clients", self.unknown),
+            ("Other changes", self.other),
+        ):
             if found:
                 yield heading, found
 
 
-def description_changes(found: Iterable[tuple[bool, str, str]]) -> DescriptionChanges:
+def _changes(number: int) -> str:
+    return "1 change" if number == 1 else f"{number} changes"
+
+
+def description_changes(found: Iterable[tuple[bool | None, str, str]]) -> DescriptionChanges:
     """Return changes by what they are; each is whether it breaks clients, the operation, and a text."""
-    groups: dict[bool, dict[str, list[str]]] = {True: {}, False: {}}
+    groups: dict[bool | None, dict[str, list[str]]] = {True: {}, None: {}, False: {}}
     for breaking, operation, text in found:
         groups[breaking].setdefault(text, []).append(operation)
-    return DescriptionChanges(groups[True], groups[False])
+    return DescriptionChanges(groups[True], groups[None], groups[False])
 
 
 def changes_text(found: DescriptionChanges) -> str:

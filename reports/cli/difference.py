@@ -12,7 +12,7 @@ from reports.cli.options import FOLDER, FrontDoor
 from reports.pages.page import write_pages
 from reports.reading import RESULT_NAME, read_result
 
-EXIT_REGRESSIONS = 1
+EXIT_REGRESSIONS, EXIT_NOT_KNOWN = 1, 4
 # Where a run leaves the description that it judged a device by.
 _DESCRIPTION = Path("description") / "openapi.json"
 
@@ -29,9 +29,10 @@ def diff(door: FrontDoor, old: str, new: str, out: Path | None) -> None:
     that passed before and could not be judged now. A description is the URL or file of an OpenAPI or Swagger document.
     Of two devices that were judged by their own descriptions, the descriptions are compared as well.
 
-    Exit code: 0 no regression, and nothing that breaks existing clients; 1 otherwise; 2 something cannot be read.
+    Exit code: 0 no regression, and nothing that breaks existing clients; 1 something does; 2 something cannot be read;
+    4 nothing is known to, but a change could not be compared.
     """
-    worse, pages = False, {}
+    worse, unknown, pages = False, False, {}
     if not (_is_description(old) or _is_description(new)):
         paths = [path / RESULT_NAME if path.is_dir() else path for path in map(Path, (old, new))]
         names = str(paths[0]), str(paths[1])
@@ -43,13 +44,14 @@ def diff(door: FrontDoor, old: str, new: str, out: Path | None) -> None:
     if described[0] and described[1]:
         changed = description_changes(door.description_changes(*described))
         worse |= bool(changed.breaking)
+        unknown = bool(changed.unknown)
         click.echo(f"\nThe descriptions: {changes_text(changed)}" if pages else changes_text(changed))
         pages |= changes_pages(changed, (old, new), "description-diff" if pages else "diff")
     elif not pages:
         raise click.UsageError(f"{new if described[0] else old} is neither a description nor a result with one")
     for path in write_pages(out, pages) if out is not None else ():
         click.echo(path, err=True)
-    raise SystemExit(EXIT_REGRESSIONS if worse else 0)
+    raise SystemExit(EXIT_REGRESSIONS if worse else EXIT_NOT_KNOWN if unknown else 0)
 
 
 def _is_description(source: str) -> bool:

@@ -24,8 +24,8 @@ class FrontDoor(Protocol):
     def known(self, pack: str | None) -> dict[str, object]:
         """Return the installed suite's digests and profiles for a contract pack, with the fields of `policy.Known`."""
 
-    def description_changes(self, old: str, new: str) -> list[tuple[bool, str, str]]:
-        """Return what changed between two descriptions: whether it breaks clients, the operation, and what it is."""
+    def description_changes(self, old: str, new: str) -> list[tuple[bool | None, str, str]]:
+        """Return what changed: whether it breaks clients (None if that is not known), the operation, and what it is."""
 
 
 def policy_of(door: FrontDoor, path: Path | None, pack: str | None) -> tuple[Policy, Known]:

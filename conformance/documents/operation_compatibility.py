@@ -1,0 +1,284 @@
+"""Compare two operations: parameters, body, statuses, headers and media types."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from conformance.documents.json_schema import Schema, kinds_of, modern, pointed
+from conformance.documents.parameters import Parameter, by_media_type, read_encoding, read_parameter
+from conformance.documents.resources import PARAMETER
+from conformance.documents.schema_compatibility import schema_changes
+from conformance.documents.schema_sides import Side
+
+#: Whether it breaks a client, None if that is not known; and what changed.
+Found = tuple[bool | None, str]
+_KINDS: Final = {"query": "query parameter", "header": "header", "cookie": "cookie", "path": "path parameter"}
+# Other keywords describe these (OpenAPI 3.1, 4.8.12.2).
+_IGNORED: Final = frozenset({"accept", "content-type", "authorization"})
+# Styles in which a single value has something before it.
+_MARKED: Final = frozenset({"matrix", "label"})
+
+
+@dataclass
+class Documents:
+    """Two documents, and the schemas in them by direction."""
+
+    old: Schema
+    new: Schema
+    sides: dict[tuple[bool, bool], tuple[Side, Side]] = field(default_factory=dict)
+
+    def schema_changes(self, old: Any, new: Any, *, request: bool, media_type: str = "") -> Iterator[Found]:
+        """Yield the changes between a schema of the old document and one of the new."""
+        key = request, "xml" in media_type
+        if key not in self.sides:
+            self.sides[key] = (
+                Side("old", self.old, request=request, media_type=media_type),
+                Side("new", self.new, request=request, media_type=media_type),
+            )
+        one, other = self.sides[key]
+        for change in schema_changes((one.schema(old), one), (other.schema(new), other), request=request):
+            yield change.breaks, change.text
+
+
+@dataclass(frozen=True)
+class Described:
+    """An operation as a description has it.
+
+    Attributes:
+        document: that it is in.
+        path: its template.
+        item: the path item, without a reference.
+        operation: of it.
+    """
+
+    document: Schema
+    path: str
+    item: Schema
+    operation: Schema
+
+    def followed(self, value: Any) -> Any:
+        """Return what a value is, or refers to."""
+        for _ in range(8):
+            if not (isinstance(value, dict) and isinstance(value.get("$ref"), str)):
+                break
+            value = pointed(self.document, value["$ref"])
+        return value if isinstance(value, dict) else {}
+
+    def parameters(self) -> dict[tuple[str, str], tuple[Parameter, Any]]:
+        """Return the parameters with their schemas; those of the path by their place, headers in lower case."""
+        names = PARAMETER.findall(self.path)
+        found: dict[tuple[str, str], tuple[Parameter, Any]] = {}
+        for one in [*self.item.get("parameters", ()), *self.operation.get("parameters", ())]:
+            given = self.followed(one)
+            parameter = read_parameter({**given, "schema": {}})
+            name, where = parameter.name, parameter.where
+            if (where == "header" and name.lower() in _IGNORED) or (where == "path" and name not in names):
+                continue
+            content: Any = next(iter(given.get("content", {}).values()), {})
+            key = str(names.index(name)) if where == "path" else name.lower() if where == "header" else name
+            found[where, key] = parameter, given.get("schema", content.get("schema", {}))
+        return found
+
+
+def operation_changes(both: Documents, old: Described, new: Described, *, by_client: bool = True) -> Iterator[Found]:
+    """Yield what changed between two operations, and whether it breaks a client.
+
+    Args:
+        both: the two documents.
+        old: the older operation.
+        new: the newer one.
+        by_client: whether clients send the request; otherwise the API sends it, as in a webhook.
+    """
+    comparison = _Comparison(both, old, new, by_client)
+    yield from comparison.parameters()
+    yield from comparison.body()
+    yield from comparison.responses()
+
+
+@dataclass
+class _Comparison:
+    both: Documents
+    old: Described
+    new: Described
+    by_client: bool
+
+    def parameters(self) -> Iterator[Found]:
+        before, after = self.old.parameters(), self.new.parameters()
+        for key, (one, _) in after.items():
+            if key not in before and one.where == "path":
+                # It was always there: only its description is new.
+                yield False, f"{_called(one)} is described now"
+            elif key not in before:
+                needed = one.required and self.by_client
+                yield needed, f"{_called(one)} is new{', and required' if one.required else ''}"
+        for key, (one, schema) in before.items():
+            if key not in after:
+                path = one.where == "path"
+                yield not path, f"{_called(one)} is {'no longer described' if path else 'gone'}"
+                continue
+            other, its_schema = after[key]
+            if one.required != other.required:
+                word = "required" if other.required else "optional"
+                yield other.required == self.by_client, f"{_called(one)} is {word} now"
+            yield from self._written(one, other, schema, its_schema)
+            for breaks, text in self.both.schema_changes(schema, its_schema, request=self.by_client):
+                yield breaks, f"{_called(one)}{text}"
+
+    def _written(self, one: Parameter, other: Parameter, schema: Any, its_schema: Any) -> Iterator[Found]:
+        """Yield changes of how a parameter is written. A single value is written alike in most styles."""
+        kinds = _kinds(schema, self.old) | _kinds(its_schema, self.new)
+        composed = not kinds or bool(kinds & {"array", "object"})
+        ways = [
+            (each.style, each.explode, each.media_type)
+            if composed
+            else (each.style if each.style in _MARKED else "", False, each.media_type)
+            for each in (one, other)
+        ]
+        if ways[0] != ways[1]:
+            yield True, f"{_called(one)} is written in another way (style, explode or content)"
+        for word, had, has in (
+            ("reserved characters", one.reserved, other.reserved),
+            ("no value", one.empty, other.empty),
+        ):
+            if had != has:
+                yield has != self.by_client, f"{_called(one)} may {'now' if has else 'no longer'} have {word}"
+
+    def body(self) -> Iterator[Found]:
+        before, after = (one.followed(one.operation.get("requestBody")) for one in (self.old, self.new))
+        old, new = by_media_type(before), by_media_type(after)
+        word = "takes" if self.by_client else "has"
+        needed, needs = (bool(one.get("required", False)) for one in (before, after))
+        if old and not new:
+            yield True, f"{word} no body any more"
+            return
+        if not old:
+            if new:
+                yield needs and self.by_client, f"{word} a body{', which is required' if needs else ''}"
+            return
+        if needed != needs:
+            yield needs == self.by_client, f"the body is {'required' if needs else 'optional'} now"
+        yield from self._contents("the body", old, new, request=self.by_client)
+
+    def responses(self) -> Iterator[Found]:
+        before, after = (
+            {str(key).upper().replace("DEFAULT", "default"): one.followed(value) for key, value in given.items()}
+            for one in (self.old, self.new)
+            for given in (one.operation.get("responses") or {},)
+        )
+        pairs: dict[tuple[str, str], None] = {}
+        for status in before:
+            keys = [status] if status in after else _narrower(status, before, after) or _wider(status, after)
+            if not keys:
+                # A client that knows of an error need not get it.
+                succeeds = status.startswith("2") or not any(key.startswith("2") for key in before)
+                yield succeeds, f"status {status} is gone"
+            pairs |= dict.fromkeys((status, key) for key in keys)
+        for status in after:
+            if status not in before:
+                yield False, f"status {status} is new"
+                pairs |= dict.fromkeys((key, status) for key in _wider(status, before))
+        for status, key in pairs:
+            contents = by_media_type(before[status]), by_media_type(after[key])
+            yield from self._contents(f"response {status}", *contents, request=not self.by_client)
+            yield from self._headers(f"response {status}", before[status], after[key])
+
+    def _headers(self, what: str, before: Schema, after: Schema) -> Iterator[Found]:
+        old, new = (
+            {
+                name.lower(): described.followed(header)
+                for name, header in response.get("headers", {}).items()
+                if name.lower() != "content-type"
+            }
+            for described, response in ((self.old, before), (self.new, after))
+        )
+        for name, header in old.items():
+            if name not in new:
+                yield True, f"{what}, header {name} is gone"
+                continue
+            if bool(header.get("required")) != bool(new[name].get("required")):
+                is_needed = bool(new[name].get("required"))
+                yield (
+                    is_needed != self.by_client,
+                    f"{what}, header {name} is {'required' if is_needed else 'optional'} now",
+                )
+            schemas = [_schema_of(one) for one in (header, new[name])]
+            for breaks, text in self.both.schema_changes(*schemas, request=not self.by_client):
+                yield breaks, f"{what}, header {name}{text}"
+        for name in new:
+            if name not in old:
+                needed = not self.by_client and bool(new[name].get("required"))
+                yield needed, f"{what}, header {name} is new"
+
+    def _contents(self, what: str, old: Schema, new: Schema, *, request: bool) -> Iterator[Found]:
+        """Yield what changed in the media types of a body, and in the schema of each."""
+        found: dict[Found, None] = {}
+        for name, content in old.items():
+            # A client that sends what is described must be understood; one that reads takes less than a whole range.
+            others = [one for one in new if _is_in(name, one)][:1] or [one for one in new if _is_in(one, name)]
+            if not others or (request and not _is_in(name, others[0])):
+                yield True, f"{what} is no longer {name}"
+            for other in others:
+                for breaks, text in self._content(content, new[other], name, request=request):
+                    found[breaks, f"{what}{text}"] = None
+        yield from found
+        for name in new:
+            if name not in old and (old or not request):
+                # A response that had no content may have one: a client that expects none need not look at it.
+                yield False, f"{what} may be {name}"
+
+    def _content(self, old: Schema, new: Schema, media_type: str, *, request: bool) -> Iterator[Found]:
+        schemas = [_of_text(_schema_of(one), media_type) for one in (old, new)]
+        yield from self.both.schema_changes(*schemas, request=request, media_type=media_type)
+        if _is_form(media_type) and read_encoding(old) != read_encoding(new):
+            yield None, ": not compared: encoding"
+
+
+def _narrower(status: str, before: Schema, after: Schema) -> list[str]:
+    """Return the new statuses of a range or of ``default`` that is gone."""
+    found = [key for key in after if key not in before and status in _covering(key)]
+    return [] if status.isdigit() else found
+
+
+def _wider(status: str, known: Schema) -> list[str]:
+    """Return the range or ``default`` that covers a status, the nearer one."""
+    return [key for key in _covering(status) if key in known][:1]
+
+
+def _covering(status: str) -> tuple[str, ...]:
+    if status == "default":
+        return ()
+    return (f"{status[0]}XX", "default") if status.isdigit() else ("default",)
+
+
+def _is_in(media_type: str, range_: str) -> bool:
+    return range_ in {media_type, "*/*", f"{media_type.partition('/')[0]}/*"}
+
+
+def _is_form(media_type: str) -> bool:
+    return media_type.startswith("multipart/") or media_type == "application/x-www-form-urlencoded"
+
+
+def _schema_of(given: Schema) -> Any:
+    if "itemSchema" in given:
+        return {"type": "array", "items": given["itemSchema"]}
+    content: Any = next(iter(given.get("content", {}).values()), {})
+    return given.get("schema", content.get("schema", {}))
+
+
+def _of_text(schema: Any, media_type: str) -> Any:
+    """Return the schema of a body; one that is neither JSON, XML nor a form is a text, whether that is said or not."""
+    structured = "json" in media_type or "xml" in media_type or "*" in media_type or _is_form(media_type)
+    if structured or not isinstance(schema, dict) or schema.keys() - {"format", "contentMediaType", "contentEncoding"}:
+        return schema
+    return {**schema, "type": "string"}
+
+
+def _kinds(schema: Any, described: Described) -> frozenset[str]:
+    found = modern(described.followed(schema) if isinstance(schema, dict) else {})
+    return kinds_of(found)
+
+
+def _called(parameter: Parameter) -> str:
+    return f"{_KINDS.get(parameter.where, parameter.where)} {parameter.name}"
