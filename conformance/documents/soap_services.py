@@ -136,8 +136,7 @@ def read_services(
     faults, notes = gaps(found, types, location, named)
     faults += reader.faults
     name = found.definitions[0].get("name") or ports[0].service
-    if foreign:
-        faults, notes = [], [*notes, *faults]
+    faults, notes = ([], [*notes, *faults]) if foreign else (faults, notes)
     return SoapDescription(name, ports, types, tuple(dict.fromkeys(faults)), tuple(dict.fromkeys(notes)), foreign)
 
 

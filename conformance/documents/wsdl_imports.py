@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from html import unescape
 from pathlib import Path, PurePosixPath
 from typing import Final
 from urllib.parse import urlsplit
@@ -100,7 +101,7 @@ def _root_of(wsdl: bytes) -> etree._Element:
         return root
     if head.startswith((b"<!doctype html", b"<html")):
         title = _TITLE.search(wsdl)
-        said = " ".join(title[1].decode("utf-8", "replace").split())[:_SHOWN] if title else ""
+        said = " ".join(unescape(title[1].decode("utf-8", "replace")).split())[:_SHOWN] if title else ""
         problem = f"an HTML page, such as a login or an error{f', with the title {said!r}' if said else ''}: {problem}"
     if root is not None and root.tag == "{http://www.w3.org/ns/wsdl}description":
         problem = "a WSDL 2.0, which the suite does not read: it reads WSDL 1.1"

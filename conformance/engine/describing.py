@@ -203,7 +203,14 @@ def soap_contract(
     try:
         address = base_url if base_url and urlsplit(base_url).path.strip("/") else ""
         documents[source] = load(source)
-        found = read_services(documents[source], source, fetch, address, locate, foreign=foreign)
+        try:
+            found = read_services(documents[source], source, fetch, address, locate, foreign=foreign)
+        except WsdlError:
+            if not base_url or address:
+                raise
+            # It may say nothing of where the service is.
+            address = f"{base_url.rstrip('/')}/"
+            found = read_services(documents[source], source, fetch, address, locate, foreign=foreign)
     except WsdlError as error:
         raise DescriptionError(str(error)) from error
     except ValueError as error:

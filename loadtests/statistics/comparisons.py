@@ -119,10 +119,10 @@ def _against_itself(name: SeriesName) -> tuple[Side, Side]:
 
 
 def aa_controls(measured: Measured) -> list[AaControl]:
-    """Return the `noise_floor` of latency.json: the A/A control of each interface."""
-    client = measured.plan.clients[0]
+    """Return the `noise_floor` of latency.json: the A/A control of each interface; none without a client."""
     return [
         AaControl(**named(name), **compared(measured, *_against_itself(name), quantile))
+        for client in measured.plan.clients[:1]
         for interface in measured.plan.interfaces
         for number in measured.plan.offered(interface, client)
         for name in [(measured.plan.operations[number], interface, client)]

@@ -1,9 +1,17 @@
 """A camera over SOAP: a right one is not blamed, and what is wrong in one operation is found there."""
 
+import re
 import subprocess
 
+import pytest
+from aiohttp import web
 from camera import FILES, Camera
 from small_device import certified, small_device
+
+from conformance.documents.description import DescriptionError
+from conformance.engine.describing import soap_contract
+from conformance.statement.endpoints import Endpoints
+from conformance.transport.client import Connection
 
 _OPERATIONS = {
     "GetStatus", "GetPresets", "DescribePreset", "GetNodes", "Stop", "GetSettings", "GetGain", "GetEvents",
@@ -75,3 +83,40 @@ def test_a_wsdl_of_which_nothing_is_called_is_inconclusive(tmp_path):
     assert (outcome.exit_code, outcome.result["verdict"]) == (4, "inconclusive")
     assert "no operation could be called" in outcome.text
     assert "GetStatus: --never excludes it" in outcome.requirement("soap/answered")["reason"]
+
+
+_WSDL = FILES["/a/camera.wsdl"]
+_NO_WSDL = {
+    "page": (
+        "text/html",
+        "<!DOCTYPE html><html><title>Sign in</title><body><br></body></html>",
+        "HTML page.*'Sign in'",
+    ),
+    "data": ("application/json", '{"openapi": "3.0.3"}', "JSON: an OpenAPI description goes with --openapi"),
+    "nothing": ("text/xml", "", "an empty document"),
+    "half": ("text/xml", _WSDL[: len(_WSDL) // 2], "not well-formed XML"),
+    "other": ("text/xml", "<a/>", "the root element a instead of wsdl:definitions"),
+    "two": ("text/xml", '<description xmlns="http://www.w3.org/ns/wsdl"/>', "WSDL 2.0"),
+    "unplaced": ("text/xml", _WSDL.replace("BASE", ""), "--base-url"),
+}
+
+
+def test_an_address_without_a_wsdl_is_named_with_what_is_there(tmp_path):
+    def giving(media_type, text):
+        async def handle(_):
+            return web.Response(text=text, content_type=media_type)
+
+        return {"GET": handle}
+
+    routes = {f"/{name}": giving(media_type, text) for name, (media_type, text, _) in _NO_WSDL.items()}
+    with small_device({}, routes) as url:
+        said = {name: _refusal(f"{url}/{name}?wsdl", tmp_path) for name in (*_NO_WSDL, "gone")}
+    for name, (_, _, why) in _NO_WSDL.items():
+        assert re.search(why, said[name]), said[name]
+    assert "the server responded 404" in said["gone"]
+
+
+def _refusal(source, folder):
+    with pytest.raises(DescriptionError) as raised:
+        soap_contract(source, None, Endpoints(), Connection(), folder)
+    return str(raised.value)
