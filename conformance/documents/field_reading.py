@@ -90,7 +90,7 @@ def _query_verdict(
         missing = (INVALID, f"no parameter {item.name}", True) if item.required and not _may_be_nothing(item) else None
         return {item.name}, missing or (VALID, "", False)
     said = judged(item, texts, decoded_query)
-    return {item.name}, (said, f"{texts[0][:40]!r} at {item.name}", False)
+    return {item.name}, (said, f"{texts[0][:40]!r} at query {item.name}", False)
 
 
 def _may_be_nothing(item: Parameter) -> bool:
@@ -113,9 +113,9 @@ def _member_names(item: Parameter, others: Sequence[Parameter], pairs: Sequence[
 def _members_verdict(item: Parameter, members: Sequence[tuple[str, str]]) -> tuple[str, str, bool]:
     if not members:
         sure = item.required and judged_value(item.schema, Reading({})) == INVALID
-        return (
-            (INVALID, f"no member of {item.name}", True) if sure else (UNCLEAR if item.required else VALID, "", False)
-        )
+        if sure:
+            return INVALID, f"no parameter {item.name}", True
+        return UNCLEAR if item.required else VALID, "", False
     names = [name for name, _ in members]
     own = flat(item.schema).get("properties", {}).keys()
     foreign = bool(own) and own.isdisjoint(names) and item.style == "form"
@@ -125,7 +125,7 @@ def _members_verdict(item: Parameter, members: Sequence[tuple[str, str]]) -> tup
         value = {name: decoded_query(text) for name, text in members}
     except ValueError:
         return UNCLEAR, "", False
-    return judged_value(item.schema, Reading(value)), f"{value!r:.60} at {item.name}", False
+    return judged_value(item.schema, Reading(value)), f"{str(value)[:60]!r} at query {item.name}", False
 
 
 def urlencoded_verdict(body: bytes, form: Body) -> Said:
@@ -210,10 +210,12 @@ def _form_verdict(
     for name, texts in fields.items():
         part = properties.get(name, more)
         if part is False:
-            said.append((INVALID, f"the field {name}, which the schema excludes"))
+            said.append((INVALID, f"{name} is excluded by the schema"))
         elif part is True or not part.get("readOnly"):
             schema_of_it = {} if part is True else part
-            said.append((judge(name, schema_of_it, form.encoding.get(name), texts), f"the value of the field {name}"))
+            said.append(
+                (judge(name, schema_of_it, form.encoding.get(name), texts), f"{name} is not as its schema has it")
+            )
         if not name.isprintable() or not name:
             said.append((UNCLEAR, ""))
     return next((one for wanted in (UNCLEAR, INVALID) for one in said if one[0] == wanted), (VALID, ""))

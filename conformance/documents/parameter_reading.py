@@ -124,8 +124,8 @@ def _of_content(parameter: Parameter, texts: Sequence[str], decode: Callable[[st
 
 def _of_scalar(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], str]) -> str:
     text = _unprefixed(parameter, texts[0], decode) if len(texts) == 1 else None
-    if text is None or (text == "" and parameter.empty):
-        return UNCLEAR
+    if text is None or (text == "" and (parameter.empty or not parameter.required)):
+        return UNCLEAR  # to some readers, an optional parameter without a value is not there
     return judged_text(parameter.schema, decode(text))
 
 

@@ -105,7 +105,11 @@ def _of_path(operation: Operation, path: str) -> list[_Said]:
         return [(UNCLEAR, "", "")]
     texts = dict(zip(names, match.groups(), strict=True))
     return [
-        (judged(item, [texts[item.name]], decoded_path), "path-parameter", f"{texts[item.name][:40]!r} at {item.name}")
+        (
+            judged(item, [texts[item.name]], decoded_path),
+            "path-parameter",
+            f"{texts[item.name][:40]!r} at path {item.name}",
+        )
         for item in operation.parameter("path")
         if item.name in texts
     ]

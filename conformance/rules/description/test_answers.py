@@ -24,10 +24,8 @@ from conformance.verdict.run import Run
 # Such responses have no content (RFC 9110 15.3.5, 15.3.6, 15.4.5).
 _BODILESS = frozenset({204, 205, 304})
 _ON = (survey, generated_requests, others)
-# HTTP lets any server send these, whatever the operation: conditions, ranges, rates, sizes, credentials, upgrades.
-_ANY_TIME = frozenset(
-    {100, 101, 206, 304, 401, 403, 407, 408, 411, 412, 413, 414, 416, 417, 421, 425, 426, 428, 429, 431}
-)
+# HTTP lets any server or gateway send these, whatever the operation: conditions, ranges, rates, sizes, upgrades.
+_ANY_TIME = frozenset({100, 101, 206, 304, 401, 407, 408, 411, 412, 413, 414, 416, 417, 421, 425, 426, 429, 431})
 # ... and these, unless the request was the operation's usual one.
 _OF_REQUEST = frozenset({405, 406, 415, 501})
 # By these a device says that it does not know what a request refers to.
@@ -36,7 +34,7 @@ _NO_SUCH_THING = frozenset({400, 404, 409, 422})
 _ASKED_FOR = frozenset({206, 304})
 _ASKING = frozenset({"range", "if-range", "if-match", "if-none-match", "if-modified-since", "if-unmodified-since"})
 _FORMAT = re.compile(r'"format": "([^"]+)"')
-_BAD_REQUEST, _NO_CONTENT = 400, 204
+_BAD_REQUEST, _FORBIDDEN, _NOT_FOUND = 400, 403, 404
 _PLAIN = frozenset({Kind.USUAL, Kind.AGAIN, Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL})
 
 
@@ -55,14 +53,20 @@ def _by_server(probe: Probe) -> bool:
     """Return whether a web server may have refused a strange request before the application saw it."""
     answer = probe.exchange.response if probe.exchange else None
     strange = probe.kind in {Kind.ODD, Kind.GENERATED, Kind.OTHER}
-    return answer is not None and strange and answer.status == _BAD_REQUEST and not is_json(answer.media_type)
+    refuses = answer is not None and answer.status in {_BAD_REQUEST, _FORBIDDEN} and not is_json(answer.media_type)
+    return strange and refuses
 
 
 def _in_question(probe: Probe, status: int) -> bool:
-    """Return whether the description has to declare a status; HTTP has no part and no 304 that nobody asked for."""
+    """Return whether the description has to declare a status, because the application decided it.
+
+    HTTP has no part and no 304 that nobody asked for. A router may not find an odd path by itself.
+    """
     if status in _ASKED_FOR:
         names = {name.lower() for name, _ in probe.exchange.request.headers} if probe.exchange else _ASKING
         return not names & _ASKING
+    if status == _NOT_FOUND and probe.kind is Kind.ODD and probe.place.startswith("path "):
+        return False
     if probe.invents and status in _NO_SUCH_THING:
         return False
     if status == _BAD_REQUEST and (probe.kind is Kind.MALFORMED or _is_unreadable(probe)):

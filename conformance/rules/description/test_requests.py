@@ -16,6 +16,7 @@ from conformance.verdict.run import Run
 
 _REFUSED = frozenset({400, 415, 422})
 _WRONG = frozenset({Kind.INVALID, Kind.MALFORMED})
+_SAID_OF_IT = re.compile(r": | is | has | should ")
 _CONVERTED = re.compile(r"(?: is (.+), not of type (.+)|: (True|False) is not valid under any .+)$", re.DOTALL)
 
 
@@ -50,10 +51,22 @@ def invalid_refused(trace: Survey) -> Iterable[Outcome]:
         elif converted and converted[2] and not probe.says:
             cause = f"{given} {converted[2]}"
         else:
-            cause = f"{probe.operation} {probe.place} {'' if probe.says else without_numbers(why)}"
+            cause = f"{probe.operation} {without_numbers(probe.place) if probe.says else _place_in(why)}"
         return Fault(cause, f"status {probe.status}" + (f", although {why}" if why else ""))
 
     yield from told_once(sure, "status 4xx for a request that the description forbids", fault)
+
+
+def _place_in(why: str) -> str:
+    """Return the place that is wrong in a request, as the survey names places, with each number as #."""
+    if why.startswith(("'", '"')) and " at " in why:
+        return why.rpartition(" at ")[2]
+    if why.startswith(("no parameter ", "no header ", "no cookie ")):
+        return why.removeprefix("no ").replace("parameter ", "query ", 1)
+    subject = _SAID_OF_IT.split(why, maxsplit=1)[0].removeprefix("no field ")
+    if subject in {"the value", "not JSON"}:
+        return "body"
+    return "body /" + without_numbers(subject.replace("[", "/").replace("]", "").replace(".", "/"))
 
 
 def _json_type(text: str) -> str:

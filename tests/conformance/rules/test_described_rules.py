@@ -96,6 +96,9 @@ _RIGHT = [
     _probe(401, b"", x_n=""),
     _probe(429, b"", x_n=""),
     _page(400, kind=Kind.ODD),
+    _page(403, kind=Kind.GENERATED),
+    _page(404, kind=Kind.ODD, place="path id", operation=_PLAIN),
+    _probe(422, {"detail": ""}, kind=Kind.GENERATED, invents=True, **_PROBLEM),
     _page(414, kind=Kind.ODD),
     _page(405, kind=Kind.ODD),
     _probe(201, b"", operation=_OTHER, sent=b'{"n": 1}'),
@@ -139,6 +142,11 @@ def test_a_right_device_is_not_blamed(rule, run):
     ("rule", "probes"),
     [
         (answers.status_declared, [_probe(409)]),
+        (answers.status_declared, [_probe(403)]),
+        (answers.status_declared, [_probe(403, kind=Kind.GENERATED)]),
+        (answers.status_declared, [_probe(423)]),
+        (answers.status_declared, [_probe(428)]),
+        (answers.status_declared, [_probe(422, kind=Kind.GENERATED)]),
         (answers.status_declared, [_probe(503, kind=Kind.ODD)]),
         (answers.status_declared, [_probe(400, kind=Kind.ODD)]),
         (answers.status_declared, [_page(400, kind=Kind.INVALID)]),
@@ -218,6 +226,17 @@ def test_types_that_a_framework_converts_are_told_once(run):
     ]
     found = _failed(requests.invalid_refused, Survey(tuple(probes)), run)
     assert sorted(one.cause for one in found) == ["a boolean converted", "number ['string', 'null']", "string integer"]
+
+
+def test_what_an_operation_does_not_check_in_one_place_is_told_once(run):
+    places = {
+        "query n": ["no parameter n", "'x' at query n", "'-1' at query n", "'a is b' at query n"],
+        "body": ["not JSON: a", "the value: 1 is not valid under any of the given schemas", "the value has 0 items"],
+        "body /p/xs/#": ["p.xs[0] has 3 items", "p.xs[1]: 'a' is not one of ['b']", "p.xs[0] should be non-empty"],
+    }
+    probes = [_probe(kind=Kind.GENERATED, validity="invalid", why=why) for given in places.values() for why in given]
+    found = _failed(requests.invalid_refused, Survey(tuple(probes)), run)
+    assert [one.cause for one in found] == [f"{_LABEL} {place}" for place in places]
 
 
 @pytest.mark.parametrize(
