@@ -33,7 +33,7 @@ def print_summary(outcome: Certification) -> None:
         click.echo(f"error: {inert(next(reasons, 'the robot could not be reached'))}", err=True)
         click.echo(f"result: {outcome.path}")
         return
-    click.echo()
+    click.echo(f"{inert(document['refused'])}\n" if "refused" in document else "")
     for name, value in document["classes"].items():
         reason = document["class_reasons"].get(name, "")
         view = " (black box)" if document["class_views"].get(name) == "black box" else ""

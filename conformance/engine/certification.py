@@ -26,7 +26,16 @@ from conformance.verdict.baseline import Expectation, accepted_until, apply_base
 from conformance.verdict.causes import Cause, by_cause
 from conformance.verdict.evidence import Evidence
 from conformance.verdict.run import Run
-from conformance.verdict.verdicts import ClassValue, Overall, Verdict, class_verdicts, overall, score, verdict_of
+from conformance.verdict.verdicts import (
+    ClassValue,
+    Overall,
+    Verdict,
+    class_verdicts,
+    overall,
+    score,
+    verdict_of,
+    withheld,
+)
 
 
 @dataclass(frozen=True)
@@ -95,13 +104,17 @@ def certify(
     if run.interrupted:
         run.aborted = "the run was interrupted"
         remarks.append("The run was interrupted; what follows is what was judged until then.")
+    run.refused = robot.refusals.text
+    if run.refused:
+        remarks.insert(0, run.refused)
+        robot.refusals.withdraw()
     remarks += run.remarks
     seen, causes = draw_verdicts(run)
     if run.requirement_set is not None and run.scored is not None:
         seen = score(seen, run.scored, f"requirement set {run.requirement_set.name}")
     verdicts = apply_baseline(seen, baseline, dt.datetime.now(dt.UTC).date())
     # A baseline makes a run green, not a robot conformant: the classes fail all the same.
-    classes, accepted = (_deciding(one, run.claims, run.beside) for one in (seen, verdicts))
+    classes, accepted = (withheld(_deciding(one, run.claims, run.beside), run.refused) for one in (seen, verdicts))
     failed = overall(classes) is Overall.NOT_CONFORMANT
     if not run.enough:
         remarks.append(f"Nothing can be said of a robot {run.less}: the verdict is inconclusive unless it failed.")

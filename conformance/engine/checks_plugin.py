@@ -225,6 +225,7 @@ class ChecksPlugin:
         if self._connected is not None and self._connected.rest is not None:
             from conformance.api.rest.stops import send_stops  # noqa: PLC0415 - see pytest_collect_file()
 
+            self._connected.run.judge.begin("")  # what is sent from here on belongs to no check
             self._connected.device.leave_at_rest(self._connected.rest)
             send_stops(self._connected.rest)
 

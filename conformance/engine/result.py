@@ -57,6 +57,7 @@ def result_document(
         "verdict": value,
         "verdict_line": verdict_line(run, value, verdicts),
         **({"accepted_until": accepted_until} if accepted_until else {}),
+        **({"refused": run.refused} if run.refused else {}),
         "interrupted": interrupted,
         "suite": {"version": suite_version(), "contract": run.contract.label, "digest": suite_digest(run.contract)},
         "pack": {"name": run.contract.name, "version": run.contract.version, "title": run.contract.title},

@@ -19,6 +19,7 @@ from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
 from conformance.contract.interfaces import Interface
 from conformance.engine.lost_device import LostDevice
+from conformance.engine.refused import RefusalListener
 from conformance.engine.resending import Recorder
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError, Request
@@ -46,6 +47,7 @@ class RobotUnderTest:
         rest: client of its REST interface, or None; ``connect`` sets it.
         log: what was sent to each operation of an API that is judged by its own description, else None.
         permission: what may be sent; every request passes it.
+        refusals: whether the device accepts the run's credentials.
     """
 
     run: Run
@@ -53,11 +55,13 @@ class RobotUnderTest:
     rest: RestInterface | None = None
     log: OperationLog | None = None
     permission: Permission = field(init=False)
+    refusals: RefusalListener = field(init=False)
     _services: SoapServices | None = None
     _progress: TextIO | None = None
 
     def __post_init__(self) -> None:
         self.permission = Permission(self.run)
+        self.refusals = RefusalListener(self.run, bool(self.connection.credentials), lambda: self.rest)
         self.connection.permit = self.permission.refusal
 
     @property
@@ -93,6 +97,7 @@ class RobotUnderTest:
         """
         self._progress = progress
         self.connection.listeners.insert(0, Recorder(self.run.judge))
+        self.connection.listeners.insert(0, self.refusals)
         if self.run.contract.described:
             # A contract names its streams; of any other API only a response shows that it does not end.
             self.connection.endless = self.connection.resends = True

@@ -190,6 +190,8 @@ class Surveyor:
             # A device may treat the first request on a connection in another way than those after it.
             fresh = variation.kind is Kind.USUAL or len(self.probes) % _FRESH == 0
             exchange = self._recorded(request, fresh=fresh)
+        except NotPossibleError as refused:
+            raise PartialTraceError(Survey(tuple(self.probes))) from refused
         except NoAnswerError as none:
             if none.kind in {NoAnswer.TIMEOUT, NoAnswer.CIRCUIT_OPEN}:
                 self.given_up.add(operation.label)

@@ -57,6 +57,7 @@ class Run:
         interrupted: whether the user interrupted the run.
         losses: how often the device stopped responding.
         restart_command: command that restarts a device that stopped responding, or empty.
+        refused: how the device refused the run's credentials, so that nothing, or not all, was judged; or empty.
         unreachable: why an interface was not reachable at the start.
         tally: the generated cases of all explorations, and those that time did not allow.
         prepare: loads what is needed after the run; called while a check waits for the robot.
@@ -75,6 +76,7 @@ class Run:
     interrupted: bool = False
     losses: int = 0
     restart_command: str = ""
+    refused: str = ""
     unreachable: dict[Interface, str] = field(default_factory=dict)
     tally: Tally = field(default_factory=Tally)
     prepare: Callable[[], object] | None = None

@@ -147,6 +147,12 @@ def class_verdicts(verdicts: Iterable[Verdict], claims: Iterable[str]) -> dict[s
     return {name: _class_verdict(items, name in claims) for name, items in by_class.items()}
 
 
+def withheld(classes: Mapping[str, tuple[ClassValue, str]], reason: str) -> dict[str, tuple[ClassValue, str]]:
+    """Return class verdicts in which no class passes, for this reason; an empty reason changes nothing."""
+    passes = {ClassValue.PASS, ClassValue.INCONCLUSIVE} if reason else set()
+    return {name: (ClassValue.INCONCLUSIVE, reason) if one[0] in passes else one for name, one in classes.items()}
+
+
 def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, str]:  # noqa: FBT001 - private
     verdicts = [item for item in verdicts if item.scored]
     if not claimed or not verdicts:

@@ -149,7 +149,8 @@ def as_request(case: Any) -> GeneratedRequest | None:
     body = request.body or b""
     if not isinstance(body, str | bytes):
         return None
-    content_type = str(request.headers.get("Content-Type") or "")
+    # For an operation without a body, a case may name a media type of its own, even one that lacks its boundary.
+    content_type = str(request.headers.get("Content-Type") or "") if body or case.operation.body else ""
     target = (url.path or "/") + (f"?{url.query}" if url.query else "")
     method = str(request.method)
     if not (content_type.isprintable() and content_type.isascii() and target.isascii() and method.isascii()):

@@ -2,7 +2,8 @@
 
 import base64
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import count
 from typing import Any
 
 from aiohttp import web
@@ -78,31 +79,37 @@ def path_of(alternatives: list[dict[str, Any]]) -> str:
 
 
 def guarded(
-    *security: list[dict[str, Any]], refusal: int = 401, shared: list[dict[str, Any]] | None = None, **members: Any
+    *security: list[dict[str, Any]],
+    refusal: int = 401,
+    lasts: int | None = None,
+    shared: list[dict[str, Any]] | None = None,
+    **members: Any,
 ) -> tuple[dict[str, Any], dict[str, dict[str, Handle]]]:
     """Return the description and the handlers of a device with one reading for each security requirement.
 
     Args:
         security: as an operation has it: alternatives, each with the schemes that it takes together.
         refusal: status of a request whose credentials are missing or wrong.
+        lasts: number of requests after which the credentials have expired; None: never.
         shared: the requirement of the whole description, which the first path uses.
         members: further members of each operation.
     """
-    paths, routes = {}, {}
+    paths, routes, answered = {}, {}, count()
     for number, alternatives in enumerate(security):
         item = reading(_STATE, **members, security=alternatives)
         item["get"]["responses"][str(refusal)] = REFUSED
         if number == 0 and shared is not None:
             del item["get"]["security"]
         paths[path_of(alternatives)] = item
-        routes[path_of(alternatives)] = {"GET": _handle(alternatives, refusal)}
+        routes[path_of(alternatives)] = {"GET": _handle(alternatives, refusal, answered, lasts)}
     more = {} if shared is None else {"security": shared}
     return described(paths, "3.1.0", components={"securitySchemes": SCHEMES}, **more), routes
 
 
-def _handle(alternatives: list[dict[str, Any]], refusal: int) -> Handle:
+def _handle(alternatives: list[dict[str, Any]], refusal: int, answered: Iterator[int], lasts: int | None) -> Handle:
     async def handle(request: web.Request) -> web.Response:
-        if any(all(_CHECKS[name](request) for name in one) for one in alternatives):
+        is_known = any(all(_CHECKS[name](request) for name in one) for one in alternatives)
+        if is_known and (lasts is None or next(answered) < lasts):
             return web.json_response({"on": True})
         challenge = next((_CHALLENGES[name] for one in alternatives for name in one if name in _CHALLENGES), "Bearer")
         return error(refusal, "who are you?", **({"WWW-Authenticate": challenge} if refusal == 401 else {}))

@@ -1,5 +1,7 @@
 """A device that wants credentials is not blamed for that, and is not praised where it refused them all."""
 
+import re
+
 import pytest
 from guarded_device import SECRET, guarded
 from small_device import certified, constant, small_device
@@ -94,3 +96,32 @@ def test_an_operation_that_takes_no_credentials_of_swagger_2_is_found_and_others
     assert (done.blamed, done.exit_code) == ({"description/security": "fail"}, 1), done.text
     told = done.requirement("description/security")["failures"]
     assert {failure["request"]["url"].rpartition("/")[2] for failure in told} == {"open"}
+
+
+@pytest.mark.parametrize(
+    ("given", "refusal", "lasts", "said"),
+    [
+        (
+            "wrong-one",
+            401,
+            None,
+            r"All \d+ requests were answered 401 \(WWW-Authenticate: Bearer\): nothing was judged",
+        ),
+        ("wrong-one", 403, None, r"All \d+ requests were answered 403: nothing was judged"),
+        (SECRET, 401, 30, r"The device accepted the credentials of \d+ requests and then answered 401 .* not judged"),
+        ("", 401, None, r"All \d+ requests were answered 401 .* Give the device's credentials: --token-file"),
+    ],
+)
+def test_what_a_device_refused_altogether_is_said_first_and_is_not_green(given, refusal, lasts, said, secret, tmp_path):
+    description, routes = guarded(
+        [{"bearer": []}], [{"bearer": [], "key": []}, {"bearer": []}], refusal=refusal, lasts=lasts
+    )
+    with small_device(description, routes) as url:
+        done = certified(url, tmp_path / "out", *(("--token-file", secret(given)) if given else ()), "--class", "http")
+    assert re.match(said, done.text), done.text
+    assert (done.exit_code, done.result["verdict"]) == (4, "inconclusive"), done.text
+    assert not {"fail", "warn"} & set(done.blamed.values())
+    assert not {"pass", "fail"} & set(done.result["classes"].values())
+    assert "<error" in (tmp_path / "out" / "junit.xml").read_text()
+    for page in ("certificate.html", "certificate.md"):
+        assert done.result["refused"][:30] in (tmp_path / "out" / page).read_text()

@@ -1,0 +1,158 @@
+"""Notice that the device refuses the run's credentials: from the start, or from some moment on."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+from conformance.api.rest.interface import RestInterface
+from conformance.documents.openapi import operations_of
+from conformance.documents.resources import matching
+from conformance.documents.wsdl_pack import services_of
+from conformance.scenarios.scenario import NotPossibleError
+from conformance.transport.credentials import is_shown
+from conformance.transport.exchange import Exchange, Listener, NoAnswerError, Request
+from conformance.verdict.finding import Finding
+from conformance.verdict.run import Run
+
+#: By these a device refuses a request because of who sends it, or because another client has it (RFC 9110 15.5,
+#: RFC 4918 11.3, RFC 6585 3).
+REFUSALS: Final = frozenset({401, 403, 407, 423, 428})
+# What a SOAP fault says of the same (WS-Security 12, ONVIF Core 5.11.2.2).
+_FAULT: Final = re.compile(rb"FailedAuthentication|FailedCheck|InvalidSecurityToken|NotAuthorized")
+_EXPIRED: Final = frozenset({401, 403, 407})
+_ERRORS: Final = 400
+_SERVER_ERRORS: Final = 500
+_SHOWN_CHALLENGE: Final = 200
+
+
+def is_refused(exchange: Exchange) -> bool:
+    """Return whether a device refused a request because of who sends it."""
+    answer = exchange.response
+    is_fault = answer.status >= _ERRORS and "xml" in answer.media_type and bool(_FAULT.search(answer.body))
+    return answer.status in REFUSALS or is_fault
+
+
+@dataclass
+class RefusalListener(Listener):
+    """Counts refusals of the requests that carry the run's credentials, and ends the run when these expire.
+
+    Attributes:
+        run: is aborted when credentials expire.
+        has_credentials: whether the run has any.
+        rest: returns the device's REST interface, if it has one.
+        accepted: number of requests for what demands credentials that were answered 2xx or 3xx.
+        expired: whether the device has begun to refuse them.
+        open: number of such requests for what demands none.
+        refused: number of refusals by status.
+        challenge: the first WWW-Authenticate of a refusal.
+    """
+
+    run: Run
+    has_credentials: bool
+    rest: Callable[[], RestInterface | None]
+    accepted: int = 0
+    open: int = 0
+    refused: Counter[int] = field(default_factory=Counter)
+    challenge: str = ""
+    expired: bool = False
+    _usual: Request | None = None
+    _looks: bool = False
+
+    def answered(self, exchange: Exchange) -> None:
+        """Count a response.
+
+        Raises:
+            NotPossibleError: the device has begun to refuse the credentials, which ends the running check.
+        """
+        request, answer = exchange.request, exchange.response
+        carries = any(is_shown(text) for text in (*(value for _, value in request.headers), request.query))
+        demands = self._demands(request)
+        if self._looks or demands is None or (self.has_credentials and not carries):
+            return
+        if not is_refused(exchange):
+            is_accepted = answer.status < _ERRORS
+            self.accepted += is_accepted and demands
+            self.open += is_accepted and not demands
+            if demands and request.method == "GET" and answer.ok and self._usual is None:
+                self._usual = request
+            return
+        if demands or not self.open:
+            self.refused[answer.status] += 1
+            self.challenge = self.challenge or (answer.header("www-authenticate") or "")[:_SHOWN_CHALLENGE]
+        if demands and self.accepted and answer.status in _EXPIRED and self._is_refused_now():
+            self.expired = True
+            self.run.aborted = self.text
+            if self.run.judge.check_name:
+                raise NotPossibleError(self.run.aborted)
+
+    def _demands(self, request: Request) -> bool | None:
+        """Return whether a request is for what demands credentials; None if it shows nothing of that."""
+        contract, rest = self.run.contract, self.rest()
+        speaks_soap = contract.publishers_path or contract.subscribers_path or services_of(contract)
+        if request.method == "POST" and "xml" in request.media_type and speaks_soap:
+            return True
+        if rest is None or not request.url.startswith(rest.client.base_url):
+            return None
+        method = "GET" if request.method == "HEAD" else request.method
+        operation = matching(contract, method, request.url[len(rest.client.base_url) :].partition("?")[0])
+        if operation is None:
+            return None
+        declared = any(item.security for item in operations_of(contract))
+        return not declared or (bool(operation.security) and all(operation.security))
+
+    def _is_refused_now(self) -> bool:
+        """Send a request that the device has accepted before; return whether it is refused now."""
+        rest, usual = self.rest(), self._usual
+        if rest is None or usual is None or self.expired:
+            return False
+        self._looks = True
+        try:
+            headers = [(name, value) for name, value in usual.headers if name == "Accept"]
+            target = usual.url[len(rest.client.base_url) :]
+            return rest.client.send("GET", target, headers=headers, fresh=True).response.status in _EXPIRED
+        except NoAnswerError:
+            return False
+        finally:
+            self._looks = False
+
+    def withdraw(self) -> None:
+        """Withdraw the findings that the refusals made: what they show is not the device's fault.
+
+        Where nothing was accepted, those stay that need no credentials: crashes, and faults of the description itself.
+        """
+        for evidence in self.run.judge.evidence.values():
+            evidence.findings = {key: one for key, one in evidence.findings.items() if self._stands(one)}
+
+    def _stands(self, finding: Finding) -> bool:
+        shown = finding.exchange
+        if isinstance(shown, Exchange) and is_refused(shown):
+            return False
+        if self.expired or shown is None or finding.requirement.startswith("robustness/"):
+            return True
+        return isinstance(shown, Exchange) and shown.response.status >= _SERVER_ERRORS
+
+    @property
+    def text(self) -> str:
+        """How the device refused the run's credentials, and what to do; empty if it accepted them."""
+        if not self.refused or (self.accepted and not self.expired) or (self.open and not self.has_credentials):
+            return ""
+        statuses = " or ".join(str(status) for status, _ in self.refused.most_common())
+        challenge = f" (WWW-Authenticate: {self.challenge})" if self.challenge else ""
+        if self.expired:
+            return (
+                f"The device accepted the credentials of {self.accepted} requests and then answered {statuses}"
+                f"{challenge}: what came after was not judged. Give credentials that last as long as the run."
+            )
+        whole = "" if not self.open else " for what demands credentials"
+        advice = (
+            "Check that the credentials are right and have not expired, and that they may do this."
+            if self.has_credentials
+            else "Give the device's credentials: --token-file, --basic-file, --api-key with --api-key-file, or"
+            " --headers-file for any other header, such as a lease."
+        )
+        count = self.refused.total()
+        return f"All {count} requests{whole} were answered {statuses}{challenge}: nothing was judged. {advice}"
