@@ -18,11 +18,14 @@ from conformance.documents.wsdl_gaps import gaps
 from conformance.documents.wsdl_imports import Fetch, Locate, collect
 from conformance.documents.xml_names import ENVELOPE, WSDL, WSDL_SOAP, XSD, clark
 from conformance.documents.xsd import SchemaError, Types
-from conformance.documents.xsd_assembly import SchemaDocument
+from conformance.documents.xsd_assembly import SchemaDocument, rpc_wrapper
 
 ENVELOPE_12: Final = "http://www.w3.org/2003/05/soap-envelope"
 _WSDL_SOAP_12: Final = "http://schemas.xmlsoap.org/wsdl/soap12/"
 _SPACES: Final = {WSDL_SOAP: ENVELOPE, _WSDL_SOAP_12: ENVELOPE_12}
+_MULTIPART, _PART, _CONTENT = (
+    f"{{http://schemas.xmlsoap.org/wsdl/mime/}}{name}" for name in ("multipartRelated", "part", "content")
+)
 _PREFIXES: Final = {"w": WSDL, "xs": XSD}
 
 
@@ -216,10 +219,12 @@ class _Reader:
                     continue
                 part = bound.find(clark(WSDL, way))
                 body = _soap(part, "body") if part is not None else None
+                if way == "input" and part is not None and part.find(f".//{_CONTENT}") is not None:
+                    remark = "its request has attachments, which the suite does not make"
                 if body is not None and body.get("use") == "encoded":
                     remark = "its messages are encoded (WS-I BP R2706 allows literal alone)"
                     break
-                tags[way] = self._tag(message, style, name if way == "input" else f"{name}Response", body)
+                tags[way] = self._tag(message, style, name if way == "input" else f"{name}Response", part)
             action = (own.get("soapAction") if own is not None else None) or ""
             headers = tuple(self._headers(bound))
             addressed = addressing_action(declared, kind, action)
@@ -235,13 +240,17 @@ class _Reader:
                 if part.get("name") == block.get("part") and part.get("element"):
                     yield _qname(part, part.get("element") or "")
 
-    def _tag(self, reference: etree._Element, style: str, wrapper: str, body: etree._Element | None) -> str:
+    def _tag(self, reference: etree._Element, style: str, wrapper: str, bound: etree._Element | None) -> str:
         """Return the tag of a message's element; empty if the Body is empty."""
+        body = _soap(bound, "body") if bound is not None else None
         message = self._named("w:message", reference, "message")
         parts = list(message.iterfind(clark(WSDL, "part"))) if message is not None else []
         listed = body.get("parts") if body is not None else None
         if listed is not None:
             parts = [part for part in parts if part.get("name") in listed.split()]
+        elif bound is not None and len(parts) > 1:
+            blocks = {one.get("part") for one in bound.iter("{*}header")}
+            parts = [part for part in parts if part.get("name") not in blocks]
         if style == "rpc":
             return self._wrapper(wrapper, (body.get("namespace") if body is not None else None) or "", parts)
         element = parts[0].get("element") if parts else None
@@ -253,28 +262,17 @@ class _Reader:
         if tag in self._made:
             return tag
         self._made.add(tag)
-        root = etree.Element(clark(XSD, "schema"), {"targetNamespace": space} if space else {}, nsmap={"xs": XSD})
-        spaces = dict.fromkeys(etree.QName(_qname(one, one.get("type") or "")).namespace for one in parts)
-        for other in filter(lambda one: one and one not in {XSD, space}, spaces):
-            etree.SubElement(root, clark(XSD, "import"), namespace=str(other))
-        element = etree.SubElement(root, clark(XSD, "element"), name=name)
-        whole = etree.SubElement(element, clark(XSD, "complexType"))
-        inside = etree.SubElement(whole, clark(XSD, "sequence"))
-        for part in parts:
-            kind = etree.QName(_qname(part, part.get("type") or "xs:anyType"))
-            nsmap = {"t": kind.namespace} if kind.namespace else None
-            etree.SubElement(
-                inside,
-                clark(XSD, "element"),
-                {"name": part.get("name", ""), "type": f"t:{kind.localname}" if nsmap else kind.localname},
-                nsmap=nsmap,
-            )
-        self.wrappers.append(SchemaDocument(f"rpc:{name}", root, inline=True))
+        types = [_qname(part, part.get("type") or "") if part.get("type") else clark(XSD, "anyType") for part in parts]
+        names = [part.get("name", "") for part in parts]
+        self.wrappers.append(rpc_wrapper(name, space, list(zip(names, types, strict=True))))
         return tag
 
 
 def _soap(parent: etree._Element, name: str) -> etree._Element | None:
-    return next((one for space in _SPACES for one in parent.iterfind(clark(space, name))), None)
+    # SOAP with attachments has the body inside a mime:part (WSDL 1.1, 5.9).
+    tags = [clark(space, name) for space in _SPACES]
+    found = (parent.find(f"{place}{tag}") for tag in tags for place in ("", f"{_MULTIPART}/{_PART}/"))
+    return next((one for one in found if one is not None), None)
 
 
 def _has(root: etree._Element, element: etree._Element) -> bool:

@@ -14,7 +14,7 @@ from urllib.parse import urljoin
 
 from lxml import etree
 
-from conformance.documents.xml_names import XSD, clark
+from conformance.documents.xml_names import XSD, clark, local, namespace
 from conformance.documents.xsd_unknown import Component, allow_anything, stand_ins
 
 _IMPORT, _INCLUDE = clark(XSD, "import"), clark(XSD, "include")
@@ -236,3 +236,18 @@ def _only_imports(document: SchemaDocument) -> bool:
     return not document.namespace and all(
         child.tag == _IMPORT for child in document.root if isinstance(child.tag, str) and "annotation" not in child.tag
     )
+
+
+def rpc_wrapper(name: str, space: str, parts: Sequence[tuple[str, str]]) -> SchemaDocument:
+    """Return a schema with the wrapper of an rpc message (WSDL 1.1, 3.5): its parts by name and type."""
+    root = etree.Element(_SCHEMA, {"targetNamespace": space} if space else {}, nsmap={"xs": XSD})
+    for other in dict.fromkeys(namespace(type_) for _, type_ in parts):
+        if other not in {"", XSD, space}:
+            etree.SubElement(root, _IMPORT, namespace=other)
+    whole = etree.SubElement(etree.SubElement(root, clark(XSD, "element"), name=name), clark(XSD, "complexType"))
+    inside = etree.SubElement(whole, clark(XSD, "sequence"))
+    for part, type_ in parts:
+        nsmap = {"t": namespace(type_)} if namespace(type_) else None
+        written = f"t:{local(type_)}" if nsmap else local(type_)
+        etree.SubElement(inside, clark(XSD, "element"), {"name": part, "type": written}, nsmap=nsmap)
+    return SchemaDocument(f"rpc:{name}", root, inline=True)

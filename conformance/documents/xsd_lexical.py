@@ -118,6 +118,11 @@ def plain(simple: Simple) -> str:
         "anyURI": "urn:example:a",
         "base64Binary": "AAAA",
         "hexBinary": "00FF",
+        "gYear": "2026",
+        "gYearMonth": "2026-01",
+        "gMonth": "--01",
+        "gMonthDay": "--01-31",
+        "gDay": "---31",
     }
     text = known.get(simple.builtin, "map")
     # A text longer than any message cannot be sent.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Any, Final
 
@@ -116,7 +116,9 @@ class _Reader:
         if declared.elem is not None and declared.elem.get(UNKNOWN):
             unknown = Complex(wildcard=True, unknown=True)
             return Element(tag, unknown, declared.min_occurs, declared.max_occurs, nillable=nillable)
-        return Element(tag, self._type(declared.type), declared.min_occurs, declared.max_occurs, nillable=nillable)
+        own = self._type(declared.type)
+        own = _fixed(own, declared.fixed) if isinstance(own, Simple) else own
+        return Element(tag, own, declared.min_occurs, declared.max_occurs, nillable=nillable)
 
     def _type(self, declared: Any) -> Simple | Complex:
         if declared.is_simple():
@@ -127,7 +129,7 @@ class _Reader:
         if self.path.count(id(declared)) > 1 or self.left < 0:
             return Complex()
         attributes = tuple(
-            (str(name), _simple(attribute.type), attribute.use == "required")
+            (str(name), _fixed(_simple(attribute.type), attribute.fixed), attribute.use == "required")
             for name, attribute in declared.attributes.items()
             if name is not None and attribute.use != "prohibited"
         )
@@ -160,7 +162,20 @@ def _is_any(declared: Any) -> bool:
     return type(declared).__name__.endswith("AnyElement")
 
 
+def _fixed(simple: Simple, value: str | None) -> Simple:
+    """Return a type with the one value that a declaration allows, if it does."""
+    return simple if value is None else replace(simple, enumeration=(value,))
+
+
 def _simple(declared: Any) -> Simple:
+    """Return a simple type; of a list that of its items, of a union that of its first member."""
+    within = getattr(declared, "base_type", None)
+    if declared.is_list() and not getattr(declared, "enumeration", None):
+        items = getattr(declared, "item_type", None) or getattr(within, "item_type", None)
+        return _simple(items) if items is not None else Simple("string")
+    if declared.is_union() and not getattr(declared, "enumeration", None):
+        members = getattr(declared, "member_types", None) or getattr(within, "member_types", None)
+        return _simple(members[0]) if members else Simple("string")
     builtin = declared
     while builtin is not None and not str(builtin.name or "").startswith(clark(XSD, "")):
         builtin = builtin.base_type

@@ -159,7 +159,7 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
         _leave_out(
             seen[id_]
             for id_, item in run.contract.ledger.items()
-            if item.class_ != MOTION and (item.class_ != SOAP or Prerequisite.SEEN in item.needs)
+            if item.class_ != MOTION and (not id_.startswith(f"{SOAP}/") or Prerequisite.SEEN in item.needs)
         )
     verdicts = [
         verdict_of(requirement, seen[requirement.id], run.claims, run.statement.undeclared)

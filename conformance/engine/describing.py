@@ -178,7 +178,7 @@ def soap_contract(
     from conformance.documents.wsdl_imports import SchemaFolder  # noqa: PLC0415
 
     # xmlschema and lxml take a third of a second, which other devices need not pay.
-    from conformance.documents.wsdl_pack import write_soap_pack  # noqa: PLC0415
+    from conformance.documents.wsdl_pack import each, label_of, write_soap_pack  # noqa: PLC0415
 
     load, documents, named = _Loader(connection, source), dict[str, bytes](), dict[str, str]()
     folder = SchemaFolder(schemas) if schemas else None
@@ -221,6 +221,7 @@ def soap_contract(
         for port in found.ports
         if not moved(port.url, base_of(found), base).startswith(base)
     )
+    uncalled = (f"{label_of(port, one)} is not called: {one.remark}." for port, one in each(found.ports) if one.remark)
     pack = write_soap_pack(out / FOLDER, found, source, documents, address, named=named, foreign=foreign, moves=moves)
     Contract.load.cache_clear()
-    return Contract.load(pack), msgspec.structs.replace(endpoints, rest=base), (*elsewhere, *found.notes)
+    return Contract.load(pack), msgspec.structs.replace(endpoints, rest=base), (*elsewhere, *uncalled, *found.notes)

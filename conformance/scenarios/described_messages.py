@@ -139,7 +139,7 @@ class DescribedMessages:
             fault = self.found.types.invalid(parse(node.written()))
             if not fault:
                 return declared, node
-        raise NotPossibleError(f"no valid message can be made for {operation.name}: {fault}")
+        raise NotPossibleError(f"no valid message can be made for {operation.name} without values in [values]: {fault}")
 
 
 def values_in(element: etree._Element) -> dict[str, list[str]]:
@@ -170,5 +170,6 @@ def target_of(port: SoapPort) -> str:
 def fields_of(port: SoapPort, operation: SoapOperation) -> Headers:
     """Return the header fields of a message (SOAP 1.1, 6.1.1; SOAP 1.2 Part 2, 7.5.1 and Appendix B)."""
     if port.is_12:
-        return (("Content-Type", f'application/soap+xml; charset=utf-8; action="{operation.action}"'),)
+        action = f'; action="{operation.action}"' if operation.action else ""
+        return (("Content-Type", f"application/soap+xml; charset=utf-8{action}"),)
     return (("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", f'"{operation.action}"'))

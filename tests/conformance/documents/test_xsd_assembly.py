@@ -253,3 +253,46 @@ def test_entities_and_depth_are_no_way_in():
     )
     found = read_services(wsdl.encode(), "http://device/a.wsdl", lambda _: b"")
     assert not found.types.invalid(_answer("<v>9</v>"))
+
+
+_LIST = '<xs:simpleType name="L"><xs:list itemType="xs:int"/></xs:simpleType>'
+_UNION = '<xs:simpleType name="U"><xs:union memberTypes="xs:gMonthDay t:L"/></xs:simpleType>'
+
+
+def test_a_message_can_be_made_of_each_kind_of_value():
+    names = (
+        "t:L",
+        "t:U",
+        "xs:gYear",
+        "xs:gYearMonth",
+        "xs:gMonth",
+        "xs:gMonthDay",
+        "xs:gDay",
+        "xs:NMTOKENS",
+        "xs:QName",
+    )
+    values = "".join(f'<xs:element name="v{number}" type="{name}"/>' for number, name in enumerate(names))
+    fixed = '<xs:element name="f" type="xs:int" fixed="7"/>'
+    attribute = '<xs:attribute name="a" type="xs:token" use="required" fixed="always"/>'
+    some = f"<xs:sequence>{values}{fixed}</xs:sequence>{attribute}"
+    found = _read(_schema("urn:t", _LIST + _UNION + _got(some)))
+    made = ordinary(found.types.shape("{urn:t}Got"))
+    assert not found.types.invalid(etree.fromstring(made.written())), made.written()
+
+
+def test_header_parts_and_attachments_of_a_binding():
+    """A header part is no part of the Body; a body within mime:part is found; attachments in a request are named."""
+    types = _schema("urn:t", _value("xs:int") + '<xs:element name="Head" type="xs:int"/>')
+    both = '<w:part name="h" element="t:Head"/><w:part name="p" element="t:Get"/>'
+    wsdl = _WSDL.replace("TYPES", types).replace('<w:part name="p" element="t:Get"/>', both)
+    header = '<s:header message="t:i" part="h" use="literal"/></w:input>'
+    spaces = 'xmlns:m="http://schemas.xmlsoap.org/wsdl/mime/"'
+    packaged = f'<m:multipartRelated {spaces}><m:part><s:body use="literal"/></m:part>MORE</m:multipartRelated>'
+    plain = wsdl.replace('<w:input><s:body use="literal"/></w:input>', f'<w:input><s:body use="literal"/>{header}')
+    for more, remark in (("", ""), ('<m:part><m:content part="a" type="image/png"/></m:part>', "attachments")):
+        text = plain.replace('<s:body use="literal"/>', packaged.replace("MORE", more), 1)
+        (port,) = read_services(text.encode(), "http://device/a.wsdl", lambda _: b"").ports
+        (operation,) = port.operations
+        assert (operation.request, operation.headers) == ("{urn:t}Get", ("{urn:t}Head",))
+        assert remark in operation.remark
+        assert bool(operation.remark) is bool(remark)

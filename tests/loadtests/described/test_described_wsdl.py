@@ -62,7 +62,7 @@ def test_each_value_of_the_statement_that_is_accepted_is_used(tmp_path):
     statement.write_text('[values]\nchannel = [1, "no number", 3]\nunit = ["g"]\n')
     with serving(scale()) as url:
         device = opened(url, "scale", statement)
-        with pytest.raises(SettingsError, match="no valid message can be made for GetLoad"):
+        with pytest.raises(SettingsError, match="no valid message can be made for GetLoad without values"):
             robot_of(device, list(chosen(device, ["GetLoad"]).weights))
         statement.write_text('[values]\nchannel = [1, 2, 3]\nunit = ["g"]\n')
         refusing = scale()
