@@ -1,16 +1,23 @@
 """``roaas replay``: send a finding's requests again and report whether the finding still occurs."""
 
+from __future__ import annotations
+
 import json
+import tempfile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.commandline.terminal import inert
-from conformance.contract.locating import ContractError
+from conformance.contract.described import copy_as_data
+from conformance.contract.locating import ContractError, is_installed
 from conformance.contract.pack import DEFAULT_PACK, Contract
+
+if TYPE_CHECKING:
+    from conformance.statement.statement import Statement
 
 _FORMAT = "roaas-result/1"
 _TIMEOUT_S = 10.0
@@ -65,11 +72,11 @@ def replay(  # noqa: C901 - one branch for each way to judge
     """Send the requests of findings again, in order, and report whether each failure occurs again.
 
     RESULT is a result.json, or its folder; REQUIREMENT is an id such as http/head, or the number of a finding; by
-    default all findings. A response that is wrong in itself is judged as in the run. Any other failure counts as
-    repeated if the last response has the same status, media type and content as in the run. With --statement, the
-    requirements' own checks run again, with the seed and effort of the result; options override the statement.
+    default all findings. A response that is wrong in itself, or by the description in the result, is judged as in the
+    run. Of any other failure, requests alone cannot tell. With --statement, the requirements' own checks run again, by
+    the description that its [api] names, with the seed and effort of the result; options override the statement.
 
-    Exit code: 0 no failure again, 1 a failure again, 2 usage, 3 robot not reached, 4 the checks could not judge.
+    Exit code: 0 no failure again, 1 a failure again, 2 usage, 4 it cannot be told, as where the robot does not respond.
     """
     # Imported here, so that --help stays quick.
     from conformance.engine.permission import moves  # noqa: PLC0415
@@ -90,7 +97,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
         if statement_file:
             given = {"token_file": token_file, "ca_file": ca_file, "timeout_s": timeout_s}
             requirements = {id_ for id_, _ in chosen}
-            contract = _contract_of(document, pack, folder)
+            contract = None if _names_description(statement_file) and not pack else _contract_of(document, pack, folder)
             return _judge_again(document, contract, statement_file, given, requirements, allow_motion=allow_motion)
         acting = [] if allow_motion else [failure for _, failure in chosen if moves(failure)]
         chosen = [one for one in chosen if one[1] not in acting]
@@ -107,8 +114,9 @@ def replay(  # noqa: C901 - one branch for each way to judge
     for one in replayed:
         now = f"now {one.came}" if one.came else ""
         if one.sent:
-            now += f", after {one.sent} request{'' if one.sent == 1 else 's'} (judged {one.told_by})"
-        told = ". ".join(filter(None, (now, f"In the run: {one.message}")))
+            judged = f" (judged {one.told_by})" if one.told_by else ""
+            now += f", after {one.sent} request{'' if one.sent == 1 else 's'}{judged}"
+        told = ". ".join(filter(None, (one.why, now, f"In the run: {one.message}")))
         click.echo(f"{one.outcome}: {one.requirement}: {inert(told)}")
     if acting:
         numbers = ", ".join(str(failure.get("number", "")) for failure in acting)
@@ -116,11 +124,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
     outcomes = {one.outcome for one in replayed}
     if Outcome.STILL_THERE in outcomes:
         return CommandResult(ExitCode.FAILED)
-    if Outcome.UNREACHABLE in outcomes:
-        return CommandResult(ExitCode.UNREACHABLE)
-    if outcomes == {Outcome.NOT_REPLAYED}:
-        raise click.UsageError("none of these findings has requests that could be sent again")
-    return CommandResult(ExitCode.PASSED)
+    return CommandResult(ExitCode.PASSED if outcomes == {Outcome.GONE} else ExitCode.INCONCLUSIVE)
 
 
 def _judge_again(
@@ -134,13 +138,18 @@ def _judge_again(
 ) -> CommandResult:
     import msgspec  # noqa: PLC0415 - as above
 
+    from conformance.documents.description import DescriptionError  # noqa: PLC0415
+    from conformance.engine.describing import UnreachableError  # noqa: PLC0415
     from conformance.engine.replay import judged_by_checks  # noqa: PLC0415
     from conformance.statement.statement import StatementError, load_statement  # noqa: PLC0415
 
-    if contract is None:
-        raise click.UsageError("the result is by a contract that is not at hand: name its pack with --contract")
     try:
-        statement = load_statement(statement_file, contract)
+        if contract is None and _names_description(statement_file):
+            statement, contract = _described(statement_file, given)
+        elif contract is None:
+            raise click.UsageError("the result is by a contract that is not at hand: name its pack with --contract")
+        else:
+            statement = load_statement(statement_file, contract)
         options = {name: value for name, value in given.items() if value is not None}
         statement = msgspec.structs.replace(
             statement, endpoints=msgspec.structs.replace(statement.endpoints, **options)
@@ -153,7 +162,10 @@ def _judge_again(
             seed=document["seed"],
             effort=document["effort"],
         )
-    except (StatementError, ContractError, OSError) as error:
+    except UnreachableError as error:
+        click.echo(f"cannot tell: the device does not respond: {error}")
+        return CommandResult(ExitCode.INCONCLUSIVE)
+    except (StatementError, ContractError, DescriptionError, OSError) as error:
         raise click.UsageError(str(error)) from error
     for item in judged:
         word = _WORDS.get(item["verdict"], "not judged")
@@ -162,6 +174,33 @@ def _judge_again(
     if verdicts & {"fail", "warn"}:
         return CommandResult(ExitCode.FAILED)
     return CommandResult(ExitCode.PASSED if verdicts == {"pass"} else ExitCode.INCONCLUSIVE)
+
+
+def _names_description(statement_file: Path) -> bool:
+    """Return whether a statement's [api] says where the device's own description is."""
+    from conformance.statement.statement import StatementError, api_of  # noqa: PLC0415 - see replay()
+
+    try:
+        api = api_of(statement_file)
+    except StatementError as error:
+        raise click.UsageError(str(error)) from error
+    return bool(api.openapi or api.wsdl)
+
+
+def _described(statement_file: Path, given: dict[str, Any]) -> tuple[Statement, Contract]:
+    """Return a statement and the contract of the description that its [api] names, as it is now.
+
+    Raises:
+        StatementError, ContractError, DescriptionError: one of them cannot be used.
+        UnreachableError: the server of the description does not respond.
+    """
+    from conformance.cli.certify_target import what_is_judged  # noqa: PLC0415 - see replay()
+
+    folder = Path(click.get_current_context().with_resource(tempfile.TemporaryDirectory()))
+    unset = ("base_url", "wsdl", "schemas", "profile", "ros_domain_id")
+    empty = ("overlays", "allow", "never", "classes")
+    options = {**dict.fromkeys(unset), **dict.fromkeys(empty, ()), "pack": DEFAULT_PACK, "out": folder, **given}
+    return what_is_judged(None, statement_file, options)
 
 
 def _judge_recorded(
@@ -213,21 +252,26 @@ def _check_addresses(failures: list[dict[str, Any]], trusted: tuple[str, ...]) -
 def _contract_of(document: dict[str, Any], pack: str | None, folder: Path) -> Contract | None:
     """Return the current version of the contract that judged, or None if it is not installed.
 
-    That of a device's own description is in the folder of the result.
+    That of a device's own description is in the folder of the result, of which nothing is executed: a result is data.
 
     Raises:
         click.UsageError: the pack named by the user cannot be used.
     """
     from conformance.engine.describing import FOLDER  # noqa: PLC0415 - see replay()
 
-    described = folder / FOLDER
-    beside = str(described) if "api" in document and described.is_dir() else None
-    named = pack or beside or str(document.get("pack", {}).get("name", DEFAULT_PACK))
+    described, named = folder / FOLDER, pack or str(document.get("pack", {}).get("name", DEFAULT_PACK))
     try:
+        if pack is None and "api" in document:
+            copy = click.get_current_context().with_resource(tempfile.TemporaryDirectory())
+            named = str(copy_as_data(described, Path(copy)))
+        elif pack is None and not is_installed(named):
+            return None
         contract = Contract.load(named)
     except ContractError as error:
         if pack:
             raise click.UsageError(str(error)) from error
+        return None
+    except (OSError, ValueError, KeyError, TypeError):
         return None
     return contract if document["suite"]["contract"] == contract.label else None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -68,6 +69,30 @@ def write_described_pack(
         ("openapi.json", document), (ORIGINAL_NAME, original), (UNRESOLVED_NAME, list(unresolved)),
     ):  # fmt: skip
         (folder / file).write_text(json.dumps(content, ensure_ascii=False), encoding="utf-8")
+    return folder
+
+
+def copy_as_data(pack: Path, folder: Path) -> Path:
+    """Copy a described pack from a result, whose writer nobody knows, without anything that could be executed.
+
+    Args:
+        pack: the folder in the result.
+        folder: where; it is there.
+
+    Returns:
+        The folder of the copy.
+
+    Raises:
+        OSError, ValueError, KeyError, TypeError: the pack is malformed.
+    """
+    given = tomllib.loads((pack / MANIFEST).read_text(encoding="utf-8"))
+    lines = [f"{key} = {basic_string(str(given[key]))}" for key in ("name", "version", "title")]
+    lines += ["closed_answers = true", "described = true"]
+    lines += [f"without = {json.dumps([str(one) for one in given.get('without', ())])}"]
+    lines += [f"\n[[class]]\nname = {basic_string(str(one['name']))}" for one in given["class"]]
+    (folder / MANIFEST).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    for file in pack.glob("*.json"):
+        (folder / file.name).write_text(json.dumps(json.loads(file.read_text(encoding="utf-8"))), encoding="utf-8")
     return folder
 
 

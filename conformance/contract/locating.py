@@ -26,6 +26,11 @@ def built_in_packs() -> tuple[str, ...]:
     return tuple(sorted(path.parent.name for path in _BUILT_IN.glob(f"*/{MANIFEST}")))
 
 
+def is_installed(name: str) -> bool:
+    """Return whether a name is that of a built-in pack or of an installed package's, and not only a folder."""
+    return name in built_in_packs() or (bool(entry_points(group=ENTRY_POINTS, name=name)) and not Path(name).is_dir())
+
+
 def folder_of(pack: Path | str) -> Path:
     """Return the folder of a pack.
 

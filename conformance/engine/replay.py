@@ -13,12 +13,17 @@ import msgspec
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.observers import Observer
+from conformance.api.rest.variations import Kind
 from conformance.contract.generic import generic_ledger
 from conformance.contract.pack import Contract
+from conformance.documents.resources import matching
 from conformance.engine.certification import certify
 from conformance.engine.connecting import connection_of
-from conformance.engine.resending import is_same, read_request, send_again
+from conformance.engine.refused import is_refused
+from conformance.engine.resending import read_request, send_again
 from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.scenarios.rule import Case, Rule
+from conformance.scenarios.survey import Probe, Survey
 from conformance.statement.statement import Statement, empty_statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Response, Unanswered
@@ -28,7 +33,15 @@ from conformance.verdict.run import Run
 # A pause between two requests is kept, as what is judged may be what comes after it; never longer than this, s.
 _LONGEST_PAUSE_S = 10.0
 _BY_JUDGEMENT = "as in the run"
-_BY_KIND = "by status, media type and whether there is content"
+_BY_STATUS = "by the status"
+_BY_SILENCE = "by the missing response"
+_ALONE = "from the request alone: give --statement, so that the requirement's own checks judge the device"
+# By these a gateway says that the device is away, or the device that it will not say now.
+_AWAY = frozenset({502, 503, 504})
+_SERVER_ERROR = 500
+_SECURITY = "description/security"
+# As much of the text on a missing response says of which kind it was.
+_ALIKE = 20
 
 
 class Outcome(StrEnum):
@@ -36,8 +49,7 @@ class Outcome(StrEnum):
 
     STILL_THERE = "still there"
     GONE = "gone"
-    NOT_REPLAYED = "cannot be sent again"
-    UNREACHABLE = "the robot cannot be reached"
+    UNKNOWN = "cannot tell"
 
 
 @dataclass(frozen=True)
@@ -51,6 +63,7 @@ class Replayed:
         came: description of the new response.
         sent: number of requests sent.
         told_by: how the outcome was decided, in a few words.
+        why: why it cannot be told, where that is not the new response.
     """
 
     requirement: str
@@ -59,6 +72,7 @@ class Replayed:
     came: str = ""
     sent: int = 0
     told_by: str = ""
+    why: str = ""
 
 
 def findings(result: Mapping[str, Any], chosen: str | None) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -86,14 +100,15 @@ def replay(
 ) -> Replayed:
     """Send one finding's requests again.
 
-    Findings of observers are judged again by the new response. For others, only status and media type are compared.
+    What one response shows is judged again by the new response: by an observer, a rule on the description, or as a
+    server error. Of others, one response cannot tell.
 
     Args:
         id_: id of the requirement.
         failure: the finding, as in result.json.
         connection: settings for the robot's clients.
         rest: base URL of the robot's REST interface, or None.
-        contract: whose observers judge; None: only status and media type are compared.
+        contract: whose observers and description judge, or None.
 
     Raises:
         ValueError, KeyError, TypeError: the result is malformed.
@@ -101,7 +116,7 @@ def replay(
     message, sequence = str(failure["message"]), failure.get("sequence") or []
     requests = [request for item in sequence if (request := read_request(item)) is not None]
     if failure["response"] is None or not requests or len(requests) < len(sequence):
-        return Replayed(id_, message, Outcome.NOT_REPLAYED)
+        return Replayed(id_, message, Outcome.UNKNOWN, why=_ALONE)
     came: list[Attempt] = []
     began = time.monotonic()
     for item, request in zip(sequence, requests, strict=True):
@@ -109,11 +124,12 @@ def replay(
         time.sleep(min(max(0.0, due - time.monotonic()), _LONGEST_PAUSE_S))
         attempt = send_again(request, connection)
         if isinstance(attempt, Unanswered) and attempt.kind is NoAnswer.REFUSED:
-            return Replayed(id_, message, Outcome.UNREACHABLE, attempt.problem)
+            return Replayed(id_, message, Outcome.UNKNOWN, attempt.problem)
         came.append(attempt)
     there, told_by = _still_there(id_, failure["response"], requests[-1], came[-1], rest, contract)
-    outcome = Outcome.STILL_THERE if there else Outcome.GONE
-    return Replayed(id_, message, outcome, came[-1].came, len(requests), told_by)
+    outcome = Outcome.UNKNOWN if there is None else Outcome.STILL_THERE if there else Outcome.GONE
+    why = _ALONE if there is None and not told_by else ""
+    return Replayed(id_, message, outcome, came[-1].came, len(requests), told_by, why)
 
 
 def judged_by_checks(
@@ -161,25 +177,51 @@ def judged_by_checks(
 
 def _still_there(
     id_: str, recorded: Mapping[str, Any], request: Request, came: Attempt, rest: str | None, contract: Contract | None
-) -> tuple[bool, str]:
-    """Return whether the new response shows the finding again, and how that was decided."""
-    if recorded["status"] is None or not isinstance(came, Exchange):
-        return recorded["status"] is None and not isinstance(came, Exchange), _BY_KIND
+) -> tuple[bool | None, str]:
+    """Return whether the new response shows the finding again, or None if it cannot tell, and how that was decided."""
+    if not isinstance(came, Exchange):
+        same = recorded["status"] is None and str(recorded.get("error", ""))[:_ALIKE] == came.problem[:_ALIKE]
+        return (True if same else None), _BY_SILENCE
+    status = came.response.status
+    if status in _AWAY and status != recorded["status"]:
+        return None, _BY_STATUS
+    if recorded["status"] is None:
+        return False, _BY_SILENCE
     fields = tuple(
         (name, str(value))
         for name, values in recorded["headers"].items()
         for value in (values if isinstance(values, list) else [values])
     )
-    before = Response(recorded["status"], fields, (recorded["body"] or "").encode(), 0.0)
+    before = Exchange(request, Response(recorded["status"], fields, (recorded["body"] or "").encode(), 0.0))
+    now = Exchange(request, came.response)
+    # The device may refuse this request, or fail, before it comes to what was found.
+    hidden = status != recorded["status"] and (is_refused(now) or status >= _SERVER_ERROR)
     # Of a long body the result has only the beginning, of which nobody can judge.
-    if (
-        rest
-        and contract
-        and "body_length" not in recorded
-        and _observed_to_fail(contract, rest, id_, Exchange(request, before))
-    ):
-        return _observed_to_fail(contract, rest, id_, Exchange(request, came.response)), _BY_JUDGEMENT
-    return is_same(before, came), _BY_KIND
+    if rest and contract and "body_length" not in recorded:
+        for fails in (_observed_to_fail, _fails_by_description):
+            if fails(contract, rest, id_, before):
+                return (None if hidden and id_ != _SECURITY else fails(contract, rest, id_, now)), _BY_JUDGEMENT
+    if recorded["status"] >= _SERVER_ERROR:
+        return (None if is_refused(now) else status >= _SERVER_ERROR), _BY_STATUS
+    return None, ""
+
+
+def _fails_by_description(contract: Contract, base_url: str, requirement: str, exchange: Exchange) -> bool:
+    """Return whether one exchange fails a rule that compares single responses with the description."""
+    # Imported late: the rules of described devices take a tenth of a second.
+    from conformance.rules.description import test_answers, test_security  # noqa: PLC0415
+
+    found = (value for module in (test_answers, test_security) for value in vars(module).values())
+    rule = next((one for one in found if isinstance(one, Rule) and one.requirement == requirement), None)
+    path = exchange.request.url.removeprefix(base_url.rstrip("/")).partition("?")[0]
+    operation = matching(contract, exchange.request.method, path) if rule else None
+    if rule is None or operation is None or not contract.described:
+        return False
+    trace = (
+        (exchange,) if requirement == _SECURITY else Survey((Probe(operation.label, Kind.USUAL, exchange=exchange),))
+    )
+    run = Run(empty_statement(contract), contract)
+    return any(isinstance(one, Case) and not one.holds for one in rule.outcomes(trace, {"run": run}.__getitem__))
 
 
 def _observed_to_fail(contract: Contract, base_url: str, requirement: str, exchange: Exchange) -> bool:

@@ -190,7 +190,8 @@ def test_a_requirement_without_findings_is_wrong_usage(tmp_path, requirement):
 
 
 def test_a_robot_that_is_not_there(tmp_path):
-    assert _replay(_result(tmp_path, "http://127.0.0.1:1", ("GET",))).exit_code == 3
+    done = _replay(_result(tmp_path, "http://127.0.0.1:1", ("GET",)))
+    assert (done.exit_code, done.output.split(":")[0]) == (4, "cannot tell")
 
 
 def test_a_file_that_is_no_result(tmp_path):
