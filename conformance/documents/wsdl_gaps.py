@@ -49,10 +49,8 @@ def gaps(
         if types.shape(tag) is None and namespace(tag) not in found.lacking
     ]
     faults += [f"two of its schemas declare the {one.kind} {one.tag}, each in its own way" for one in types.twice]
-    if types.problems and all(any(words in one for words in _AMBIGUOUS) for one in types.problems):
-        notes.append(
-            f"A content model of its schemas is ambiguous, and judged by one of two validators: {types.problems[0]}"
-        )
+    if types.is_11 or (types.problems and all(any(words in one for words in _AMBIGUOUS) for one in types.problems)):
+        notes.append(f"Its schemas are ambiguous or XSD 1.1, and one of two validators judges: {types.problems[0]}")
     else:
         faults += [f"its schemas are refused by one of two compilers: {problem}" for problem in types.problems]
     return faults, notes

@@ -50,6 +50,7 @@ class Types:
         self.libxml: etree.XMLSchema | None = None
         self.python: Any = None
         self.problems: list[str] = []
+        self.is_11 = False
         self._errors = xmlschema.XMLSchemaException
         self._shapes: dict[str, Element | None] = {}
         with tempfile.TemporaryDirectory(prefix="roaas-xsd-") as folder:
@@ -66,6 +67,7 @@ class Types:
             for version, how in _WAYS:
                 try:
                     self.python = getattr(xmlschema, version)(str(assembly.entry), allow="local", validation=how)
+                    self.is_11 = version == "XMLSchema11"
                     break
                 except (xmlschema.XMLSchemaException, ValueError, OSError, RecursionError) as error:
                     self.problems.append(f"xmlschema: {' '.join(str(error).split())[:_SHOWN]}")
