@@ -11,6 +11,7 @@ import jsonschema_rs
 
 from conformance.api.rest.statuses import CRASHES
 from conformance.api.rest.variations import Kind
+from conformance.documents.field_reading import parts_of
 from conformance.documents.json_schema import Schema, kinds_of, shape_of
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, is_json, operations_of
@@ -75,8 +76,11 @@ def _in_question(probe: Probe, status: int) -> bool:
 
 
 def _is_unreadable(probe: Probe) -> bool:
-    """Return whether a request's content is not JSON, although its Content-Type says so."""
+    """Return whether a request's content is no JSON, or no form, although its Content-Type says so."""
     request = probe.exchange.request if probe.exchange else None
+    if request is not None and request.media_type == "multipart/form-data":
+        content_type = next(value for name, value in request.headers if name.lower() == "content-type")
+        return parts_of(request.body, content_type) is None
     if request is None or not is_json(request.media_type):
         return False
     return bool(request.body and read_json(request.body).unreadable)

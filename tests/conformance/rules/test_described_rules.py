@@ -85,6 +85,12 @@ def _page(status=404, **more):
     return _probe(status, b"<html>", media_type="text/html", x_n="", **more)
 
 
+def _multipart(body):
+    probe = _probe(400, {"detail": ""}, kind=Kind.GENERATED, operation=_OTHER, **_PROBLEM)
+    request = replace(probe.exchange.request, headers=(("Content-Type", "multipart/form-data; boundary=b"),), body=body)
+    return replace(probe, exchange=replace(probe.exchange, request=request))
+
+
 _PROBLEM = {"media_type": "application/problem+json", "x_n": ""}
 _OK = _probe()
 _RIGHT = [
@@ -97,6 +103,7 @@ _RIGHT = [
     _probe(429, b"", x_n=""),
     _page(400, kind=Kind.ODD),
     _page(403, kind=Kind.GENERATED),
+    _multipart(b"--b\r\nx--b--"),
     _page(404, kind=Kind.ODD, place="path id", operation=_PLAIN),
     _probe(422, {"detail": ""}, kind=Kind.GENERATED, invents=True, **_PROBLEM),
     _page(414, kind=Kind.ODD),
@@ -145,6 +152,7 @@ def test_a_right_device_is_not_blamed(rule, run):
         (answers.status_declared, [_probe(403)]),
         (answers.status_declared, [_probe(403, kind=Kind.GENERATED)]),
         (answers.status_declared, [_probe(423)]),
+        (answers.status_declared, [_multipart(b"--b\r\nContent-Disposition: form-data; name=a\r\n\r\nx\r\n--b--")]),
         (answers.status_declared, [_probe(428)]),
         (answers.status_declared, [_probe(422, kind=Kind.GENERATED)]),
         (answers.status_declared, [_probe(503, kind=Kind.ODD)]),
