@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from email.message import Message
 from typing import Final, TypeVar
 
-from conformance.documents.json_schema import Schema, kinds_of, shape_of
+from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Body, is_json
 from conformance.documents.parameter_reading import (
@@ -20,6 +20,7 @@ from conformance.documents.parameter_reading import (
     Reading,
     decoded_query,
     judged,
+    judged_json,
     judged_text,
     judged_value,
 )
@@ -176,7 +177,7 @@ def _one_part(schema: Schema, given: str, part: Part) -> str:
         text = read_json(part.content)
         if text.problem and not text.malformed:
             return UNCLEAR
-        return VALID if not text.malformed and shape_of(schema).holds(text.value) else INVALID
+        return INVALID if text.malformed else judged_json(schema, text.value)
     # A text with a file name is a file to some frameworks; OpenAPI leaves other ways to write an object open.
     is_text = not part.is_file and "object" not in kinds_of(schema)
     return text_verdict(part.content, schema) if is_text else UNCLEAR

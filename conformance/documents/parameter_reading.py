@@ -17,7 +17,7 @@ from conformance.documents.json_schema import Schema, kinds_of, shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json
 from conformance.documents.parameters import Parameter
-from conformance.documents.representation import flat
+from conformance.documents.representation import discriminator_of, flat, has_formats
 from conformance.documents.serialization import SEPARATORS
 
 VALID, INVALID, UNCLEAR = "valid", "invalid", "unclear"
@@ -106,7 +106,7 @@ def judged_value(schema: Schema, reading: Reading) -> str:
     for one in _alternatives(schema):
         value, sure = _typed(one, reading.value)
         if shape.holds(value):
-            return VALID if reading.sure else UNCLEAR
+            return VALID if reading.sure and has_formats(schema, value) else UNCLEAR
         said.add(sure)
     return INVALID if said == {True} else UNCLEAR
 
@@ -119,7 +119,7 @@ def _of_content(parameter: Parameter, texts: Sequence[str], decode: Callable[[st
         return INVALID
     if text.non_finite or text.twice or text.encoding:
         return UNCLEAR
-    return VALID if shape_of(parameter.schema).holds(text.value) else INVALID
+    return judged_json(parameter.schema, text.value)
 
 
 def _of_scalar(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], str]) -> str:
@@ -136,9 +136,38 @@ def judged_text(schema: Schema, text: str) -> str:
         return UNCLEAR
     readings, sure = _scalars(schema, text)
     shape = shape_of(schema)
-    if any(shape.holds(value) for value in readings):
-        return VALID
+    held = [value for value in readings if shape.holds(value)]
+    if held:
+        return VALID if any(has_formats(schema, value) for value in held) else UNCLEAR
     return INVALID if sure else UNCLEAR
+
+
+def judged_json(schema: Schema, value: Any) -> str:
+    """Return whether a JSON value is valid; a text without its format may be refused, as an author means it."""
+    shape = shape_of(schema)
+    if not shape.holds(value):
+        return INVALID
+    plain = has_formats(schema, value) and _is_discriminated(schema, value) and not _has_read_only(schema, value)
+    return VALID if plain else UNCLEAR
+
+
+def _has_read_only(schema: Schema, value: Any) -> bool:
+    """Return whether a request has a member that only responses should have (OpenAPI 3.0, 4.7.24.2)."""
+    given = flat(schema)
+    if isinstance(value, list):
+        items = given.get("items")
+        return isinstance(items, dict) and any(_has_read_only(items, item) for item in value)
+    properties = given.get("properties", {}) if isinstance(value, dict) else {}
+    parts = [(part, value[name]) for name, part in properties.items() if name in value and isinstance(part, dict)]
+    return any(part.get("readOnly") is True or _has_read_only(part, item) for part, item in parts)
+
+
+def _is_discriminated(schema: Schema, value: Any) -> bool:
+    """Return whether a value names one of its alternatives, if it has to (OpenAPI 3.1, 4.8.25)."""
+    if "discriminator" not in str(schema):
+        return True
+    name, known = discriminator_of(schema)
+    return isinstance(value, dict) and value.get(name) in known
 
 
 def _scalars(schema: Schema, text: str) -> tuple[list[Any], bool]:

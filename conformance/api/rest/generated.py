@@ -13,11 +13,13 @@ from urllib.parse import urlsplit
 
 import requests
 import schemathesis
+from hypothesis.errors import Unsatisfiable
 from hypothesis.strategies import SearchStrategy
 from schemathesis import GenerationMode
 from schemathesis.config import SchemathesisConfig
 from schemathesis.core.result import Ok
 from schemathesis.core.transport import Response as ThesisResponse
+from schemathesis.errors import SerializationNotPossible
 from schemathesis.generation.drivers import CoverageGenerator, ExamplesGenerator
 from schemathesis.generation.feedback import NO_FEEDBACK
 from schemathesis.generation.overrides import Override
@@ -26,6 +28,8 @@ from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange
 
+#: Raised where no case can be made: schemas allow everything or nothing, or Schemathesis does not know a media type.
+NOT_GENERATED = (Unsatisfiable, SerializationNotPossible)
 _BASE = "http://robot.invalid"
 # A header's name and value (RFC 9110 5.1, 5.5), as far as every server takes them.
 _FIELD = re.compile(r"[!#$%&'*+\-.^_`|~0-9A-Za-z]+")

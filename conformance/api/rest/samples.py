@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from conformance.documents.json_schema import Schema, kinds_of, shape_of
-from conformance.documents.representation import flat
+from conformance.documents.representation import discriminator_of, flat
 
 _DEPTH = 6
 #: A value of each format that JSON Schema and OpenAPI name.
@@ -64,6 +64,9 @@ def sample(schema: Schema, depth: int = 0, *, whole: bool = False) -> Any:
 def backwards(schema: Schema, depth: int = 0) -> Schema:
     """Return a schema with the alternatives of its unions, and of its members' unions, in the opposite order."""
     turned = {key: schema[key][::-1] for key in ("anyOf", "oneOf") if isinstance(schema.get(key), list)}
+    given = schema.get("discriminator")
+    if isinstance(given, dict) and isinstance(given.get("mapping"), dict):
+        turned["discriminator"] = {**given, "mapping": dict(reversed(given["mapping"].items()))}
     properties = schema.get("properties")
     if isinstance(properties, dict) and depth < _DEPTH:
         turned["properties"] = {name: backwards(part, depth + 1) for name, part in properties.items()}
@@ -82,7 +85,14 @@ def _object(schema: Schema, depth: int, *, whole: bool) -> dict[str, Any]:
     required = [name for name in schema.get("required", ()) if not properties.get(name, {}).get("readOnly")]
     optional = [name for name in properties if name not in required and not properties[name].get("readOnly")]
     names = required + (optional if whole else []) if depth < _DEPTH else []
-    return {name: sample(properties.get(name, {}), depth + 1, whole=whole) for name in names}
+    made = {name: sample(properties.get(name, {}), depth + 1, whole=whole) for name in names}
+    return {**made, **_discriminating(schema, made)}
+
+
+def _discriminating(schema: Schema, made: dict[str, Any]) -> dict[str, Any]:
+    """Return the member that says which alternative an object is, if the alternative leaves its value open."""
+    name, known = discriminator_of(schema)
+    return {name: known[0]} if known and name in made and made[name] not in known else {}
 
 
 def _array(schema: Schema, depth: int, *, whole: bool) -> list[Any]:

@@ -9,7 +9,7 @@ from conformance.documents.field_reading import multipart_verdict, query_verdict
 from conformance.documents.json_schema import Schema, kinds_of, shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Body, Operation, is_json, is_xml
-from conformance.documents.parameter_reading import INVALID, UNCLEAR, VALID, decoded_path, judged
+from conformance.documents.parameter_reading import INVALID, UNCLEAR, VALID, decoded_path, judged, judged_json
 from conformance.documents.parameters import Parameter
 from conformance.documents.representation import UnreadableError, from_element, local_name, parse_xml
 from conformance.documents.resources import is_normal, matching
@@ -194,7 +194,7 @@ def json_fault(body: bytes, schema: Schema) -> _Said:
             return INVALID, requirement, text.problem or "no body"
     problem = shape_of(schema).problem(text.value)
     if not problem:
-        return VALID, "", ""
+        return judged_json(schema, text.value), "", ""
     rule, whole = shape_of(schema).broken_rule(text.value)
     requirement = "json-root" if whole and rule == "type" else _RULES.get(rule, "json-bounds")
     return INVALID, requirement, problem

@@ -77,6 +77,11 @@ def test_paths(style, explode, schema, texts):
         (_POINT, {"media_type": "application/json"}, {"p=%7B": "invalid", "p=%7B%22x%22:NaN%7D": "unclear"}),
         ({"anyOf": [{"type": "string"}, {"type": "array"}]}, {}, {"p=a": "valid", "p=a&p=b": "valid"}),
         (_WHOLE, {"empty": True}, {"p=": "unclear"}),
+        (
+            {"type": "string", "format": "uuid"},
+            {},
+            {"p=0": "unclear", "p=3fa85f64-5717-4562-b3fc-2c963f66afa6": "valid"},
+        ),
         ({"type": "string", "enum": ["a"]}, {}, {"p=a": "valid", "p=b": "invalid", "q=b": "unclear"}),
     ],
 )
