@@ -206,12 +206,12 @@ def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
 
 def _explore(caller: _Caller, port: SoapPort, operation: SoapOperation) -> None:
     """Send the messages of one operation."""
-    declared, node = _usual(caller, port, operation)
+    declared, node, kind = _usual(caller, port, operation)
     effort = caller.api.run.effort
     for _ in range(0 if effort.name == "quick" else _USUAL - 1):
-        caller.send(
-            port, operation, caller.probes[-1].kind, "a valid message", caller.messages.message(port, operation, node)
-        )
+        if label_of(port, operation) not in caller.lost:
+            message = caller.messages.message(port, operation, node)
+            caller.send(port, operation, kind, "a valid message", message)
     until = time.monotonic() + _BUDGET_S
     invalid = list(_invalid(caller.messages.found, declared, node)) if declared and node else []
     for says, wrong in effort.draw(invalid, _MOST, f"{caller.api.run.seed}/{label_of(port, operation)}"):
@@ -229,8 +229,8 @@ def _explore(caller: _Caller, port: SoapPort, operation: SoapOperation) -> None:
             )
 
 
-def _usual(caller: _Caller, port: SoapPort, operation: SoapOperation) -> tuple[Element | None, Node | None]:
-    """Send valid messages until one is accepted; return the declaration and the last one.
+def _usual(caller: _Caller, port: SoapPort, operation: SoapOperation) -> tuple[Element | None, Node | None, Kind]:
+    """Send valid messages until one is accepted; return the declaration, the last message and its kind.
 
     Where the device refuses a value that the suite invented, it is asked with values that it gave. That it refuses an
     invented one is no fault: the message is recorded as tried.
@@ -238,19 +238,21 @@ def _usual(caller: _Caller, port: SoapPort, operation: SoapOperation) -> tuple[E
     messages, tried = caller.messages, list[Node | None]()
     declared, node = messages.usual(operation)
     invented = bool(declared and node and messages.invented(declared, node))
+    kind = Kind.TRIED if invented else Kind.USUAL
     for turn in range(_TRIED + 1 if invented else 1):
+        if label_of(port, operation) in caller.lost:
+            break
         if turn:
             node = messages.usual(operation, turn - 1, caller.given)[1]
         if node in tried:
             continue
         tried.append(node)
-        kind = Kind.TRIED if invented else Kind.USUAL
         probe = caller.send(port, operation, kind, "a valid message", messages.message(port, operation, node))
         if probe.succeeded:
-            caller.probes[-1] = replace(probe, kind=Kind.USUAL)
+            kind, caller.probes[-1] = Kind.USUAL, replace(probe, kind=Kind.USUAL)
             caller.learn(probe)
             break
-    return declared, node
+    return declared, node, kind
 
 
 def _invalid(found: SoapDescription, declared: Element, node: Node) -> Iterator[tuple[str, Node]]:

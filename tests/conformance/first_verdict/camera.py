@@ -201,6 +201,8 @@ class Camera:
             if request.content_type != ("application/soap+xml" if space == _S12 else "text/xml"):
                 return web.Response(status=415)
             status, inside = self._answered(name, space, await request.read())
+            if "closed" in inside and request.transport is not None:
+                request.transport.close()
             packaged = name == "media" and status == 200
             answer = _message(space, status, inside, packaged=packaged)
             if self._media_type and not packaged:

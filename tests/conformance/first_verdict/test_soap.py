@@ -53,6 +53,14 @@ def test_what_is_wrong_in_one_operation_is_found_there(tmp_path):
         assert b"GetEventsResponse" in again.stdout, again
 
 
+def test_an_operation_that_closes_its_connections_is_a_finding(tmp_path):
+    with small_device({}, Camera({"GetEvents": "closed"}).routes) as url:
+        outcome = certified(f"{url}/a/camera.wsdl", tmp_path, "--never", "ptz", "--never", "media", effort="standard")
+    assert outcome.exit_code == 1
+    assert "error" not in outcome.blamed.values(), outcome.text
+    assert "GetEvents" in str(_failures(outcome, "soap/answered"))
+
+
 def test_one_cause_is_one_finding_with_a_valid_message(tmp_path):
     with small_device({}, Camera(media_type="text/plain").routes) as url:
         outcome = certified(f"{url}/a/camera.wsdl", tmp_path)
