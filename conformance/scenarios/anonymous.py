@@ -1,11 +1,11 @@
 """Requests without credentials, and with wrong ones, to operations for which the description requires some."""
 
 from contextlib import closing, suppress
-from dataclasses import replace
 
 from conformance.api.rest.applicable import allowed
 from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.stranger import Stranger
 from conformance.api.rest.values import Values
 from conformance.documents.openapi import operations_of
 from conformance.documents.security import demands
@@ -15,7 +15,7 @@ from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError
 
 
-@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.INPUT)
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)
 def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ...]:
     """Send each operation for which the description requires credentials, without any, and with wrong ones."""
     closed = [
@@ -25,10 +25,12 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
     ]
     if not closed:
         raise NotPossibleError("no operation that may be called requires credentials by the description")
-    connection, found = api.client.connection, []
-    stranger = replace(connection, token=None, credentials=connection.credentials.wrong)
-    with closing(HttpClient(api.client.base_url, stranger)) as unknown:
-        tried = [(api.client, False), *([(unknown, True)] if connection.credentials else [])]
+    found = []
+    with closing(Stranger(api)) as unknown:
+        tried: list[tuple[HttpClient | Stranger, bool]] = [
+            (api.client, False),
+            *([(unknown, True)] if api.client.connection.credentials else []),
+        ]
         for operation in closed:
             if operation.label in api.streams:
                 continue
@@ -44,5 +46,5 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
                         authorized=authorized,
                         fresh=True,
                     )
-                    found.append(exchange)
+                    found += [exchange] if exchange else []
     return tuple(found)

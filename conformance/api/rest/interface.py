@@ -33,6 +33,7 @@ class RestInterface:
         values: what the survey of a described API knows for parameters and bodies, or None.
         looked: the exchanges by which the run has connected, before anything observed them.
         server: the Server field of the first response that had one; empty: none had.
+        is_shut_out: whether the device has refused the suite for too many wrong credentials.
         is_recorded: whether the present exchange is recorded by a scenario, whose rules judge it.
     """
 
@@ -50,6 +51,7 @@ class RestInterface:
     looked: list[Exchange] = field(default_factory=list)
     server: str = ""
     is_recorded: bool = False
+    is_shut_out: bool = False
     device: Device = field(init=False)
 
     def __post_init__(self) -> None:

@@ -94,7 +94,8 @@ def incomplete_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
 def unauthorised_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a move without credentials is refused, and moves nothing."""
     tried = [one for one in trace.tried if one.kind == "unauthorised"]
-    yield from _refused(tried, 401, 403)
+    # 423 and 428 refuse a client without the lease (RFC 4918 11.3, RFC 6585 3).
+    yield from _refused(tried, 401, 403, 423, 428)
     yield from _nothing_moved(trace, motion, "unauthorised")
 
 

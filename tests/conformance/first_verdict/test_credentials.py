@@ -3,8 +3,9 @@
 import re
 
 import pytest
+from aiohttp import web
 from guarded_device import SECRET, guarded
-from small_device import certified, constant, small_device
+from small_device import certified, constant, described, error, reading, small_device
 
 
 @pytest.fixture(name="secret")
@@ -125,3 +126,49 @@ def test_what_a_device_refused_altogether_is_said_first_and_is_not_green(given, 
     assert "<error" in (tmp_path / "out" / "junit.xml").read_text()
     for page in ("certificate.html", "certificate.md"):
         assert done.result["refused"][:30] in (tmp_path / "out" / page).read_text()
+
+
+@pytest.mark.parametrize("forgives", [True, False])
+def test_a_gateway_with_leases_that_shuts_out_who_sends_wrong_keys(forgives, secret, tmp_path):
+    """A lease comes by POST; without it 428, with another one 423; after three wrong keys 429, or until a right one."""
+    wrong = []
+
+    def path(handle):
+        async def answered(request):
+            key, lease = request.headers.get("X-Api-Key"), request.headers.get("X-Lease")
+            if len(wrong) >= 3:
+                return error(429, "too many wrong keys")
+            if key != SECRET:
+                wrong.extend([key] if key else [])
+                return error(401, "no such key", **{"WWW-Authenticate": "Key"})
+            if forgives:
+                wrong.clear()
+            if request.path == "/lease":
+                return web.json_response({"id": "lease-0815"})
+            if lease != "lease-0815":
+                return error(423 if lease else 428, "another client has the lease" if lease else "acquire a lease")
+            return web.json_response({"on": True})
+
+        return {handle: answered}
+
+    state = {"type": "object", "required": ["on"], "properties": {"on": {"type": "boolean"}}}
+    paths = {f"/{name}": reading(state) for name in ("arm", "base", "camera", "gripper")}
+    lease = {"type": "object", "properties": {"id": {"type": "string"}}}
+    paths["/lease"] = {"post": {**reading(lease)["get"], "security": [{"key": []}]}}
+    schemes = {
+        "key": {"type": "apiKey", "in": "header", "name": "X-Api-Key"},
+        "lease": {"type": "apiKey", "in": "header", "name": "X-Lease"},
+    }
+    components = {"securitySchemes": schemes}
+    description = described(paths, components=components, security=[{"key": [], "lease": []}])
+    routes = {name: path("POST" if name == "/lease" else "GET") for name in paths}
+    with small_device(description, routes) as url:
+        statement = tmp_path / "robot.toml"
+        statement.write_text(
+            f'[endpoints]\nrest = "{url}"\napi_key = "header X-Api-Key"\napi_key_file = "{secret(SECRET)}"\n'
+            f'[api]\nopenapi = "{url}/openapi.json"\n'
+            '[auth]\nlogin = "POST /lease"\ntoken = "/id"\nsend_as = "header X-Lease"\n'
+        )
+        done = certified(statement, tmp_path / "out")
+    assert (done.blamed, done.exit_code) == ({}, 0), done.text
+    assert done.requirement("description/security")["verdict"] == "pass"
