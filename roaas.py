@@ -35,6 +35,7 @@ _COMMANDS = {
     "explain": ("conformance.cli.explain", "Explain a requirement: why, by which source, how judged, how to fix it."),
 }
 _EXTRAS = {"load"}  # commands that need the optional dependencies of the same name
+_INTERRUPTED = 130
 _INSTALLED = Path(__file__).with_name("roaas_rooms")
 
 
@@ -79,15 +80,27 @@ class _Rooms(click.Group):
         return command
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command; name the extra that it lacks, if it turns out to need one, as the report of a load test."""
+        """Run a command; name the extra that it lacks, if it turns out to need one, as the report of a load test.
+
+        Whatever else goes wrong is told in one sentence, and never ends with an exit code that is a verdict.
+        """
+        open_rooms()
+        guard = import_module("conformance.commandline.guard")
+        guard.make_streams_lenient()
         try:
             return super().invoke(ctx)
+        except (click.ClickException, click.exceptions.Exit):
+            raise
+        except (KeyboardInterrupt, click.Abort):
+            ctx.exit(_INTERRUPTED)
         except ModuleNotFoundError as missing:
             extras = import_module("conformance.commandline.extras")
             problem = extras.told(missing.name, f"'roaas {ctx.invoked_subcommand}'")
             if problem is None:
-                raise
+                ctx.exit(guard.report_failure(missing))
             raise click.UsageError(problem) from missing
+        except Exception as error:  # noqa: BLE001 - a traceback would end with 1, which means "not conformant"
+            ctx.exit(guard.report_failure(error))
 
 
 class FrontDoor:

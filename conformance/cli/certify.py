@@ -13,11 +13,12 @@ from click.core import ParameterSource
 
 from conformance.api.call_rules import CallRules, told
 from conformance.cli.certify_init import init, init_described
-from conformance.cli.certify_target import told_apart, what_is_judged
+from conformance.cli.certify_target import check_folder, told_apart, what_is_judged
 from conformance.cli.summary import print_summary
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, FrontDoor, ResultCommand
+from conformance.commandline.terminal import inert
 from conformance.commandline.without_folders import command_without_folders
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
@@ -176,15 +177,25 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
         return init(statement, chosen, contract, force=options["force"])
     if options["nonce"] is not None:
         _check_nonce(options["nonce"])
+    if not options["plan"]:
+        check_folder(options["out"])
     # Before the run: what cannot be signed by this key is told at once.
     notary = door.notary(Path(options["key"])) if options["key"] else None
     if options["plan"]:
         return _plan(chosen, options, contract)
     outcome = _certify(door, chosen, options, contract, statement)
+    if outcome.unwritten:
+        print_summary(outcome)
+        click.echo(
+            f"error: the result could not be written: {inert(outcome.unwritten)}. What is printed is all that is kept",
+            err=True,
+        )
+        return CommandResult(outcome.exit_code)
     if options["as_json"]:
         click.echo(outcome.path.read_text(encoding="utf-8"), nl=False)
     else:
         print_summary(outcome)
+        click.echo(f"result: {outcome.path}")
     return CommandResult(outcome.exit_code, outcome.path, notary, tell=not options["as_json"])
 
 

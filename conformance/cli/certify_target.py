@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -189,3 +190,17 @@ def _claims(options: dict[str, Any], contract: Contract) -> tuple[str, ...]:
             if name not in known:
                 raise StatementError(f"{option} {name!r}: {contract.name} has {', '.join(known)}")
     return (*contract.profiles.get(options["profile"] or "", ()), *options["classes"])
+
+
+def check_folder(out: Path) -> None:
+    """Make the folder for the results, before a run whose results it could not take.
+
+    Raises:
+        click.UsageError: it cannot be made, or nothing can be written to it.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise click.UsageError(f"--out {out}: {error.strerror}") from error
+    if not os.access(out, os.W_OK | os.X_OK):
+        raise click.UsageError(f"--out {out}: nothing can be written to this folder")

@@ -31,7 +31,6 @@ def print_summary(outcome: Certification) -> None:
     if outcome.exit_code == ExitCode.UNREACHABLE:
         reasons = (item["reason"] for item in document["requirements"] if item["verdict"] == "error")
         click.echo(f"error: {inert(next(reasons, 'the robot could not be reached'))}", err=True)
-        click.echo(f"result: {outcome.path}")
         return
     click.echo(f"{inert(document['refused'])}\n" if "refused" in document else "")
     for name, value in document["classes"].items():
@@ -70,7 +69,6 @@ def print_summary(outcome: Certification) -> None:
         f"\n{document['verdict_line']}{accepted}: {told}; "
         f"{document['requests']} requests in {document['duration_s']:.1f} s, seed {document['seed']}"
     )
-    click.echo(f"result: {outcome.path}")
 
 
 def _print_line(cause: dict[str, Any], requirement: dict[str, Any]) -> None:

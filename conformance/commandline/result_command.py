@@ -49,7 +49,12 @@ class ResultCommand(click.Command):
         """
         result: CommandResult = super().invoke(ctx)
         if result.file is not None and ctx.obj is not None:
-            for path in ctx.obj.render(result.file, result.notary):
-                if result.tell:
-                    click.echo(f"report: {path}")
+            try:
+                for path in ctx.obj.render(result.file, result.notary):
+                    if result.tell:
+                        click.echo(f"report: {path}")
+            except (OSError, click.ClickException) as error:
+                # The verdict stands without its pages.
+                said = error.message if isinstance(error, click.ClickException) else error
+                click.echo(f"the pages could not be written: {said}. {result.file} is kept", err=True)
         ctx.exit(result.exit_code)

@@ -7,6 +7,7 @@ from urllib.parse import unquote
 
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation, operations_of
+from conformance.transport.exchange import sendable
 
 # A parameter in a path.
 PARAMETER = re.compile(r"\{([^{}]*)\}")
@@ -23,6 +24,7 @@ class Resource:
     def pattern(self) -> re.Pattern[str]:
         """A regular expression that matches the paths of the template."""
         parts = PARAMETER.split(self.template)
+        parts[::2] = map(sendable, parts[::2])
         return re.compile("".join(re.escape(part) if i % 2 == 0 else "[^/]*" for i, part in enumerate(parts)))
 
     @property
@@ -53,6 +55,7 @@ def resources_of(contract: Contract) -> tuple[Resource, ...]:
 @lru_cache(maxsize=512)
 def resource_at(contract: Contract, path: str) -> Resource | None:
     """Return the resource of a path, or None; literal paths precede templates (OpenAPI 3.1, 4.8.8.2)."""
+    path = sendable(path)
     found = [item for item in resources_of(contract) if item.pattern.fullmatch(path)]
     return min(found, key=lambda item: item.template.count("{"), default=None)
 

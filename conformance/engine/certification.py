@@ -18,7 +18,7 @@ from conformance.engine.interruption import remembered
 from conformance.engine.planning import pytest_options
 from conformance.engine.progress import Progress
 from conformance.engine.resending import look_again
-from conformance.engine.result import result_document, write_result
+from conformance.engine.result import RESULT_NAME, result_document, write_result
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.scenario import Recordings
 from conformance.scenarios.stored import write_traces
@@ -46,11 +46,13 @@ class Certification:
         exit_code: exit code of the command (docs/cli.md).
         document: content of result.json.
         path: where result.json was written.
+        unwritten: why it could not be written, or empty.
     """
 
     exit_code: int
     document: dict[str, Any]
     path: Path
+    unwritten: str = ""
 
 
 def certify(
@@ -77,7 +79,7 @@ def certify(
         announced: what is printed and not among the remarks, because the result tells it elsewhere.
 
     Raises:
-        OSError: the result cannot be written, or the CA file cannot be read.
+        OSError: the CA file cannot be read.
     """
     run, started = robot.run, dt.datetime.now(dt.UTC)
     remarks = list(notes)
@@ -131,10 +133,10 @@ def certify(
         interrupted=run.interrupted,
     )
     document = robot.connection.credentials.hidden_in(document)
-    path = write_result(document, out)
-    write_traces(recordings, out)
-    if run.interrupted:
-        return Certification(ExitCode.INTERRUPTED, document, path)
+    path, unwritten = out / RESULT_NAME, _unwritten(document, recordings, out)
+    if run.interrupted or unwritten:
+        code = ExitCode.INTERRUPTED if run.interrupted else ExitCode.INCONCLUSIVE
+        return Certification(code, document, path, unwritten)
     code = OF_VERDICT[overall(accepted, enough=run.enough)] if reached else ExitCode.UNREACHABLE
     return Certification(code, document, path)
 
@@ -144,6 +146,16 @@ def _deciding(
 ) -> dict[str, tuple[ClassValue, str]]:
     """Return verdict and reason of each class that decides the verdict."""
     return {name: value for name, value in class_verdicts(verdicts, claims).items() if name not in beside}
+
+
+def _unwritten(document: dict[str, Any], recordings: Recordings, out: Path) -> str:
+    """Write the result and its traces; return why that failed, or an empty text."""
+    try:
+        write_result(document, out)
+        write_traces(recordings, out)
+    except OSError as error:
+        return str(error)
+    return ""
 
 
 def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:

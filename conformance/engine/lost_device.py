@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from conformance.contract.classes import CauseKind
 from conformance.engine.resending import send_again
 from conformance.engine.smaller_requests import smaller
 from conformance.transport.client import Connection
@@ -104,7 +103,7 @@ class LostDevice:
         return False
 
     def _requirement(self, kind: NoAnswer | None) -> str:
-        """Return the requirement that the loss breaks; empty if the contract or the running check names none."""
+        """Return the requirement that the loss breaks; empty if the contract has none on that."""
         run, ledger = self._run, self._run.contract.ledger
         id_ = _HANG if kind is NoAnswer.TIMEOUT else _CRASH
         if id_ in ledger:
@@ -112,10 +111,7 @@ class LostDevice:
                 # Whatever the user chose: nothing can be judged of a device that is lost.
                 ledger[id_] = replace(ledger[id_], also=(*ledger[id_].also, run.claims[0]))
             return id_
-        if run.judge.at_risk:
-            return ""
-        cause = CauseKind.HANG if kind is NoAnswer.TIMEOUT else CauseKind.NO_RESPONSE
-        return next((item.id for item in ledger.values() if cause in item.forbids and item.binds(run.claims)), "")
+        return ""
 
     def _comes_back(self) -> bool:
         """Restart the device by the user's command, if there is one; return whether it responds again."""

@@ -23,6 +23,7 @@ from conformance.verdict.scope import verdict_line
 from conformance.verdict.verdicts import ClassValue, Verdict, overall, views
 
 RESULT_FORMAT = "roaas-result/1"
+RESULT_NAME = "result.json"
 # As much of a body as a reader looks at; its length is always told.
 _SHOWN_BODY = 4096
 _SHOWN_CURL = 20_000
@@ -252,4 +253,4 @@ def write_result(document: dict[str, Any], directory: Path) -> Path:
     """
     directory.mkdir(parents=True, exist_ok=True)
     text = json.dumps(document, indent=1, ensure_ascii=False)
-    return write_atomically(directory / "result.json", text + "\n")
+    return write_atomically(directory / RESULT_NAME, text + "\n")

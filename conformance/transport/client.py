@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
-from urllib.parse import quote, urlsplit
+from urllib.parse import urlsplit
 
 import h11
 
@@ -26,6 +26,7 @@ from conformance.transport.exchange import (
     Response,
     Sending,
     Unanswered,
+    sendable,
 )
 from conformance.transport.pace import Pace, time_to_arrive
 
@@ -39,10 +40,9 @@ _HANGS_WITHIN_S = 60.0
 _CHALLENGE = 401
 # A request that met the end of a kept connection is sent so often in all.
 _ATTEMPTS = 2
-# The last requests that are kept, and what may stand in a request target without being percent-encoded (RFC 3986 2.1).
+# The last requests that are kept.
 _RECENT: Final = 60
 _CRASHED: Final = "the server closed the connection without a response, and accepts no other connection"
-_SENDABLE: Final = "".join(map(chr, range(0x21, 0x7F)))
 
 
 @dataclass
@@ -181,7 +181,7 @@ class HttpClient:
             NoAnswerError: no HTTP response was received.
             NotPermittedError: the request may not be sent in this run, or HTTP has no way to write it.
         """
-        path = quote(path, safe=_SENDABLE, errors="surrogateescape")
+        path = sendable(path)
         fields = self._fields(method, tuple(headers), body, close=fresh)
         shown = tuple((name, value) for name, value in fields if name != "Connection")
         sent, target, query = list(fields), path, ""

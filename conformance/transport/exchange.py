@@ -7,12 +7,15 @@ import shlex
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from typing import NamedTuple
+from typing import Final, NamedTuple
+from urllib.parse import quote
 
 from conformance.transport.credentials import quoted
 
 # By these nothing is done (RFC 9110 9.2.1), so they may be sent again without leave.
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+# What a request target consists of, whatever a path of a description has (RFC 3986 2).
+_SENDABLE: Final = "".join(map(chr, range(0x21, 0x7F)))
 # Twice has the effect of once (RFC 9110 9.2.2), so a client may send them again on a new connection.
 IDEMPOTENT_METHODS = SAFE_METHODS | {"PUT", "DELETE"}
 _CURL_PLAIN_LIMIT = 4000
@@ -114,6 +117,11 @@ class Request:
         words.append(self.url + self.query)
         # The shell has to expand the variables of credentials.
         return pipe + " ".join(quoted(word) or shlex.quote(word) for word in words)
+
+
+def sendable(target: str) -> str:
+    """Return a request target with everything percent-encoded that HTTP cannot carry, such as letters beyond ASCII."""
+    return quote(target, safe=_SENDABLE, errors="surrogateescape")
 
 
 def media_type_of(content_type: str) -> str:

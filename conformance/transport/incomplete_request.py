@@ -6,7 +6,7 @@ import struct
 from typing import Final, Self
 
 from conformance.transport.client import Headers, HttpClient
-from conformance.transport.exchange import NoAnswer, NoAnswerError, Request, Sending, Unanswered
+from conformance.transport.exchange import NoAnswer, NoAnswerError, Request, Sending, Unanswered, sendable
 
 # l_onoff 1, l_linger 0: close() sends RST instead of FIN.
 _RESET: Final = struct.pack("ii", 1, 0)
@@ -40,7 +40,7 @@ class PartialRequest:
         headers: Headers = (),
     ) -> None:
         credentials = client.connection.credentials
-        target = client.prefix + credentials.target(path)
+        target = client.prefix + credentials.target(sendable(path))
         head = [f"{method} {target} HTTP/1.1", f"Host: {client.authority}"]
         if (sent or promised) and not any(name.lower() == "content-type" for name, _ in headers):
             head.append("Content-Type: application/json")

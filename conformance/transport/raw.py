@@ -25,6 +25,7 @@ from conformance.transport.exchange import (
     Response,
     Sending,
     Unanswered,
+    sendable,
 )
 from conformance.transport.pace import time_for
 
@@ -74,7 +75,7 @@ def head(client: HttpClient, method: str, path: str, *fields: str, host: bool = 
         host: whether to send Host.
     """
     credentials = client.connection.credentials
-    target = client.prefix + credentials.target(path)
+    target = client.prefix + credentials.target(sendable(path))
     lines = [f"{method} {target} HTTP/1.1"]
     if host:
         lines.append(f"Host: {client.authority}")

@@ -7,6 +7,7 @@ from conformance.api.rest import by_hand
 from conformance.api.rest.applicable import reads
 from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
+from conformance.scenarios.scenario import NoOccasionError
 from conformance.transport import raw
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Unanswered
@@ -30,6 +31,8 @@ _GARBAGE = (
 def _first(api: RestInterface) -> Call:
     """Return a GET that every robot of the contract has, without parameters where possible."""
     calls = [call for call in reads(api) if not call.operation.optional] or reads(api)
+    if not calls:
+        raise NoOccasionError("no operation that only reads may be called")
     return min(calls, key=lambda call: "?" in call.path)
 
 

@@ -18,6 +18,7 @@ from conformance.api.expectation import expect
 from conformance.api.rest.applicable import reads
 from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
+from conformance.scenarios.scenario import NoOccasionError
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, Unanswered
 from conformance.transport.parallel import is_busy
@@ -126,6 +127,8 @@ def _send(api: RestInterface, series: _Reads) -> None:
     if series.attempts:
         return
     calls, connection = reads(api), api.client.connection
+    if not calls:
+        raise NoOccasionError("no operation that only reads may be called")
     usual: dict[str, int] = {}
     resent = connection.resent
     with closing(HttpClient(api.client.base_url, connection)) as client:

@@ -1,0 +1,68 @@
+"""What keeps a fault of the suite, a full disk or a closed terminal from looking like a verdict."""
+
+import io
+import os
+import sys
+import tempfile
+import traceback
+from pathlib import Path
+from typing import Any, TextIO
+
+import click
+
+from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.terminal import inert
+
+_SHOWN = 300
+
+
+class _Lenient(io.FileIO):
+    """A file descriptor whose reader may go away, as `head` does: what can no longer be written is dropped."""
+
+    def write(self, octets: Any, /) -> int:
+        try:
+            return super().write(octets) or 0
+        except OSError:
+            return memoryview(octets).nbytes
+
+
+def make_streams_lenient() -> None:
+    """Let the process end with the exit code of its verdict also where nobody reads its stdout or stderr any more."""
+    sys.stdout = _lenient(sys.stdout, sys.__stdout__)
+    sys.stderr = _lenient(sys.stderr, sys.__stderr__)
+
+
+def _lenient(stream: TextIO | None, own: TextIO | None) -> TextIO:
+    """Return a stream that never fails; one that a test or a program put in place of the process's stays."""
+    if stream is None:
+        # It was closed before the process began; a socket would take its number otherwise.
+        return Path(os.devnull).open("w", encoding="utf-8")
+    if stream is not own:
+        return stream
+    raw = _Lenient(stream.fileno(), "wb", closefd=False)
+    return io.TextIOWrapper(io.BufferedWriter(raw), stream.encoding, stream.errors, line_buffering=True)
+
+
+def report_failure(error: Exception) -> ExitCode:
+    """Print one sentence on an exception that no command expects, and where the details are; return the exit code."""
+    if isinstance(error, OSError) and error.errno is not None:
+        said = f"error: {inert(str(error))[:_SHOWN]}. Nothing was judged by this."
+        click.echo(said, err=True)
+        return ExitCode.INCONCLUSIVE
+    text = inert(f"{type(error).__name__}: {error}")[:_SHOWN]
+    click.echo(
+        f"error: the suite itself failed, and says nothing of the device: {text}. Please report this{_kept(error)}.",
+        err=True,
+    )
+    return ExitCode.INCONCLUSIVE
+
+
+def _kept(error: Exception) -> str:
+    """Write the traceback to a file; return where it is, as the end of a sentence, or an empty text."""
+    try:
+        descriptor, path = tempfile.mkstemp(prefix="roaas-error-", suffix=".txt")
+        with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:
+            file.writelines(traceback.format_exception(error))
+    except (OSError, RecursionError):
+        return ""
+    return f"; the details are in {path}"
