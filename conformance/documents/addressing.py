@@ -1,9 +1,10 @@
-"""WS-Addressing: whether a WSDL demands it, which action an operation has, and the header blocks of a request."""
+"""Addresses of services; WS-Addressing: whether a WSDL demands it, an operation's action, a request's header blocks."""
 
 from __future__ import annotations
 
 import uuid
 from typing import TYPE_CHECKING, Final
+from urllib.parse import urlsplit
 
 from conformance.documents.xml_names import ADDRESSING, WSAM, WSAW, WSDL, clark
 from conformance.documents.xml_node import Node
@@ -16,6 +17,15 @@ if TYPE_CHECKING:
 _ANONYMOUS: Final = f"{ADDRESSING}/anonymous"
 _TRUE: Final = frozenset({"true", "1"})
 _POLICIES: Final = ("http://www.w3.org/ns/ws-policy", "http://schemas.xmlsoap.org/ws/2004/09/policy")
+
+
+def is_http(address: str) -> bool:
+    """Return whether an address is a URL over HTTP that can be called."""
+    try:
+        parts = urlsplit(address)
+        return bool(parts.hostname) and parts.scheme in {"http", "https"} and parts.port != 0
+    except ValueError:
+        return False
 
 
 def wants_addressing(places: Sequence[etree._Element], policies: Sequence[etree._Element]) -> bool:

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 from lxml import etree
 
-from conformance.documents.addressing import addressing_action, wants_addressing
+from conformance.documents.addressing import addressing_action, is_http, wants_addressing
 from conformance.documents.wsdl_gaps import gaps
 from conformance.documents.wsdl_imports import Fetch, Locate, collect
 from conformance.documents.xml_names import ENVELOPE, WSDL, WSDL_SOAP, XSD, clark
@@ -174,7 +174,9 @@ class _Reader:
         for port in self._all("w:service/w:port"):
             address = next((one for space in _SPACES for one in port.iterfind(clark(space, "address"))), None)
             url = address.get("location", "") if address is not None else ""
-            if not url.startswith(("http://", "https://")):
+            if not is_http(url):
+                if url.startswith("http"):
+                    self.faults.append(f"the address of port {port.get('name')} is no URL: {url}")
                 continue
             binding = self._named("w:binding", port, "binding")
             service = port.getparent()

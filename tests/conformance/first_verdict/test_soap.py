@@ -105,6 +105,7 @@ _NO_WSDL = {
     "half": ("text/xml", _WSDL[: len(_WSDL) // 2], "not well-formed XML"),
     "other": ("text/xml", "<a/>", "the root element a instead of wsdl:definitions"),
     "two": ("text/xml", '<description xmlns="http://www.w3.org/ns/wsdl"/>', "WSDL 2.0"),
+    "misplaced": ("text/xml", _WSDL.replace("BASE", "http://[::1"), "no port over HTTP"),
     "unplaced": ("text/xml", _WSDL.replace("BASE", ""), "--base-url"),
 }
 
