@@ -15,11 +15,12 @@ class CallError(Exception):
     Attributes:
         kind: `refused`, `resolve`, `network`, `tls`, `closed`, `timeout`, `malformed`, `status`, `redirect`,
             `fault` or `content`.
+        refused: the status by which the robot refused who sent the request; 0: it did not.
     """
 
-    def __init__(self, kind: str, message: str) -> None:
+    def __init__(self, kind: str, message: str, refused: int = 0) -> None:
         super().__init__(message)
-        self.kind = kind
+        self.kind, self.refused = kind, refused
 
 
 #: Kinds that mean that no server listens there; the others are bad responses.
@@ -28,6 +29,8 @@ UNREACHABLE = frozenset({"refused", "resolve", "network", "tls"})
 _FAULT_STRING = re.compile(rb"<(?:[\w.-]+:)?(?:faultstring|Text)\b[^>]*>\s*(.*?)\s*</", re.DOTALL)  # SOAP 1.1, 1.2
 _FAULT = re.compile(rb"<(?:[\w.-]+:)?Fault[\s>/]")
 _SHOWN = 160
+# By these a robot refuses a request because of who sends it, or because another client has the lease.
+_REFUSALS = frozenset({401, 403, 407, 423, 428})
 # Plain integers: every request is compared with them, and members of HTTPStatus compare more slowly.
 _OK = int(HTTPStatus.OK)
 _MULTIPLE_CHOICES = int(HTTPStatus.MULTIPLE_CHOICES)
@@ -67,16 +70,17 @@ def _error(status: int, location: str | None, body: bytes, expects: bytes) -> Ca
         return CallError("content", f"status {status}, but the body lacks {expects.decode()!r}: {shown(body)}")
     if HTTPStatus.MULTIPLE_CHOICES <= status < HTTPStatus.BAD_REQUEST:  # RFC 9110 section 15.4: redirection
         return CallError("redirect", f"status {status} to {location!r}: use that address as the endpoint")
+    refused = status if status in _REFUSALS else 0
     if _FAULT.search(body):
-        return _fault(status, body)
-    hint = " (does it need a --token-file?)" if status in {401, 403} else ""
-    return CallError("status", f"status {status}{hint}: {shown(body)}")
+        return _fault(status, body, refused)
+    hint = " (does it need a --token-file?)" if refused else ""
+    return CallError("status", f"status {status}{hint}: {shown(body)}", refused)
 
 
-def _fault(status: int, body: bytes) -> CallError:
+def _fault(status: int, body: bytes, refused: int = 0) -> CallError:
     found = _FAULT_STRING.search(body)
     reason = found.group(1).decode("utf-8", "replace")[:_SHOWN] if found else shown(body)
-    return CallError("fault", f"status {status}, SOAP fault: {reason}")
+    return CallError("fault", f"status {status}, SOAP fault: {reason}", refused)
 
 
 @dataclass(frozen=True)

@@ -105,6 +105,8 @@ class Run:
                 raise RunAborted(ExitCode.INTERRUPTED, "interrupted before the measurement began")
             if findings.unreachable:
                 raise RunAborted(ExitCode.UNREACHABLE, f"{whose} cannot be reached: {told}")
+            if refused := findings.refused(whose):
+                raise RunAborted(ExitCode.INCONCLUSIVE, f"{refused} {told}")
             if findings.failures:
                 raise RunAborted(ExitCode.INCONCLUSIVE, f"{whose} does not respond as {self._promise} says: {told}")
             self.outcome.invalid += [

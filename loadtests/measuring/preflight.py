@@ -45,6 +45,16 @@ class Findings:
         """Return whether a service could not be reached."""
         return any(failure.kind in UNREACHABLE for failure in self.failures.values())
 
+    def refused(self, whose: str) -> str:
+        """Return a sentence on the robot that refused the credentials of every request; empty if it did not."""
+        statuses = {failure.refused for failure in self.failures.values()}
+        if self.sizes or not statuses or 0 in statuses:
+            return ""
+        return (
+            f"All {len(self.failures)} requests to {whose} were answered {' or '.join(map(str, sorted(statuses)))}: "
+            "nothing was measured. Check that the credentials are given, are right and have not expired."
+        )
+
     def messages(self) -> list[str]:
         """Return the failures as sentences, each once."""
         worded = [f"{name[0]} over {name[1]} ({name[2]}): {failure}" for name, failure in self.failures.items()]

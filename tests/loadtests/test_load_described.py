@@ -124,6 +124,14 @@ def test_a_slower_device_takes_turns_with_it(device, load):
     assert "GET /events (sse)" in latency_markdown(result)
 
 
+def test_a_device_that_refuses_the_token_is_not_measured(device, load, tmp_path):
+    (tmp_path / "token").write_text("wrong-one")
+    url = device("--auth", "bearer")
+    run = load(f"--openapi {url}/openapi.json", SHORT, f"--operation 'GET /state' --token-file {tmp_path / 'token'}")
+    assert run.code == 4, run.out + run.err
+    assert "All 1 requests to the robot were answered 401: nothing was measured" in run.err
+
+
 def test_https_with_its_own_authority_and_a_login(started, load, certificate, tmp_path):
     cert, key = certificate
     _, port = started("toy_api.py", "--auth", "bearer", "--tls", str(cert), str(key))

@@ -26,7 +26,7 @@ from conformance.verdict.run import Run
 _BODILESS = frozenset({204, 205, 304})
 _ON = (survey, generated_requests, others)
 # HTTP lets any server or gateway send these, whatever the operation: conditions, ranges, rates, sizes, upgrades.
-_ANY_TIME = frozenset({100, 101, 206, 304, 401, 407, 408, 411, 412, 413, 414, 416, 417, 421, 423, 425, 426, 429, 431})
+_ANY_TIME = frozenset({100, 101, 206, 304, 401, 407, 408, 411, 412, 413, 414, 416, 417, 421, 425, 426, 429, 431})
 # ... and these, unless the request was the operation's usual one.
 _OF_REQUEST = frozenset({405, 406, 415, 501})
 # By these a device says that it does not know what a request refers to.
