@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -52,6 +53,7 @@ def print_summary(outcome: Certification) -> None:
                 _print_cause(cause, requirement)
             else:
                 _print_line(cause, requirement)
+    _print_suite_errors(document.get("suite_errors", ()))
     if "web_server" in document:
         click.echo(f"\nThe web server\n  {inert(document['web_server']['text'])}")
     if document["causes"]:
@@ -69,6 +71,15 @@ def print_summary(outcome: Certification) -> None:
         f"\n{document['verdict_line']}{accepted}: {told}; "
         f"{document['requests']} requests in {document['duration_s']:.1f} s, seed {document['seed']}"
     )
+
+
+def _print_suite_errors(faults: Sequence[Mapping[str, Any]]) -> None:
+    """Print what could not be judged because of an error in the suite."""
+    if faults:
+        count = len({id_ for fault in faults for id_ in fault["requirements"]})
+        click.echo(f"\n{count} requirements could not be judged because of an error in the suite:")
+    for fault in faults:
+        click.echo(f"  {inert(fault['text'])}")
 
 
 def _print_line(cause: dict[str, Any], requirement: dict[str, Any]) -> None:

@@ -137,7 +137,9 @@ def certify(
     if run.interrupted or unwritten:
         code = ExitCode.INTERRUPTED if run.interrupted else ExitCode.INCONCLUSIVE
         return Certification(code, document, path, unwritten)
-    code = OF_VERDICT[overall(accepted, enough=run.enough)] if reached else ExitCode.UNREACHABLE
+    code = (
+        OF_VERDICT[overall(accepted, enough=run.enough and not run.judge.faults)] if reached else ExitCode.UNREACHABLE
+    )
     return Certification(code, document, path)
 
 

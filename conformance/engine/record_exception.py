@@ -37,6 +37,7 @@ def record_exception(
         _no_answer(run, alive, known, open_ids, error)
         return
     where = traceback.extract_tb(error.__traceback__)[-1]
+    run.judge.fault(f"in the check {run.judge.check_name}", error, open_ids)
     for id_ in open_ids:
         run.judge.error(
             id_, f"the suite could not judge this: {type(error).__name__}: {error} ({where.name}, line {where.lineno})"

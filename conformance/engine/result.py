@@ -19,6 +19,7 @@ from conformance.engine.web_server import web_server
 from conformance.transport.exchange import Attempt, Unanswered
 from conformance.verdict.causes import Cause
 from conformance.verdict.finding import Finding
+from conformance.verdict.run import Run
 from conformance.verdict.scope import verdict_line
 from conformance.verdict.verdicts import ClassValue, Verdict, overall, views
 
@@ -52,7 +53,7 @@ def result_document(
     verdicts = [one for one in verdicts if one not in aside]
     ids = {one.requirement.id for one in verdicts}
     causes = [cause for cause in causes if cause.finding.requirement in ids]
-    value = overall(classes, enough=run.enough)
+    value = overall(classes, enough=run.enough and not run.judge.faults)
     return {
         "format": RESULT_FORMAT,
         "verdict": value,
@@ -104,9 +105,16 @@ def result_document(
         "causes": [_cause(cause) for cause in causes],
         "contract_sections": {anchor: section._asdict() for anchor, section in run.contract.cited_sections.items()},
         "notes": notes,
+        **_faults(run),
         **_api(robot, causes),
         **_beside(robot, aside),
     }
+
+
+def _faults(run: Run) -> dict[str, Any]:
+    """Return what could not be judged because of an error in the suite, under its key; empty if there was none."""
+    faults = [{"text": text, "requirements": sorted(ids)} for text, ids in run.judge.faults.items()]
+    return {"suite_errors": faults} if faults else {}
 
 
 def _beside(robot: RobotUnderTest, aside: list[Verdict]) -> dict[str, Any]:

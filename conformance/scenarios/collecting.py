@@ -45,8 +45,12 @@ class RulesPlugin:
 
         def check(request: pytest.FixtureRequest, judge: Judge) -> None:
             recording = recordings.of(scenario, request.getfixturevalue)
-            outcomes = [] if recording.trace is None else rule.outcomes(recording.trace, request.getfixturevalue)
-            record(judge, rule.requirement, outcomes)
+            if recording.trace is not None:
+
+                def report(operation: str, error: Exception) -> None:
+                    judge.fault(operation, error, [rule.requirement])
+
+                record(judge, rule.requirement, rule.outcomes_apart(recording.trace, request.getfixturevalue, report))
             if recording.error is not None:
                 # Also where the trace shows something: what ended the scenario must not pass unnoticed.
                 raise recording.error

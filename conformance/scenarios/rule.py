@@ -2,11 +2,11 @@
 
 import inspect
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from conformance.scenarios.scenario import Scenario
-from conformance.transport.exchange import Attempt
+from conformance.scenarios.scenario import NotPossibleError, Scenario
+from conformance.transport.exchange import Attempt, NoAnswerError
 from conformance.verdict.evidence import Judge
 from conformance.verdict.finding import Showing
 
@@ -80,6 +80,46 @@ class Rule:
     def outcomes(self, trace: Any, fixture: Callable[[str], Any]) -> list[Outcome]:
         """Return the outcomes for a trace."""
         return list(self.judge(trace, **{name: fixture(name) for name in self.fixtures}))
+
+    def outcomes_apart(
+        self, trace: Any, fixture: Callable[[str], Any], report: Callable[[str, Exception], None]
+    ) -> list[Outcome]:
+        """Return the outcomes for a trace, operation by operation if judging it as a whole raises an exception.
+
+        Args:
+            trace: what the scenario recorded.
+            fixture: returns a fixture of the run by its name.
+            report: is called with an operation that could not be judged, and the exception.
+
+        Raises:
+            Exception: it was raised, and the trace is none of operations.
+        """
+        try:
+            return self.outcomes(trace, fixture)
+        except (NoAnswerError, NotPossibleError):
+            raise
+        except Exception:
+            parts = _by_operation(trace)
+            if not parts:
+                raise
+        found: list[Outcome] = []
+        for operation, part in parts.items():
+            try:
+                found += self.outcomes(part, fixture)
+            except Exception as error:  # noqa: BLE001 - whatever it is, it is told, and others are judged
+                report(operation, error)
+        return found
+
+
+def _by_operation(trace: Any) -> dict[str, Any]:
+    """Return the part of a trace that each operation has; empty if its parts do not name operations."""
+    whole: tuple[Any, ...] = trace if isinstance(trace, tuple) else getattr(trace, "probes", ())
+    if not all(hasattr(one, "operation") for one in whole):
+        return {}
+    parts: dict[str, tuple[Any, ...]] = {}
+    for one in whole:
+        parts[one.operation] = (*parts.get(one.operation, ()), one)
+    return {label: part if isinstance(trace, tuple) else replace(trace, probes=part) for label, part in parts.items()}
 
 
 def rule(requirement: str, *, on: tuple[Scenario, ...]) -> Callable[[Callable[..., Iterable[Outcome]]], Rule]:

@@ -34,7 +34,7 @@ from conformance.documents.openapi import Operation, operations_of
 from conformance.documents.resources import known_path
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
-from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, NotPermittedError, Unanswered
 from conformance.verdict.effort import Effort
 from conformance.verdict.explorer import Explorer
 
@@ -357,9 +357,15 @@ def survey(api: RestInterface, values: Values) -> Survey:
     surveyor = Surveyor(api, values)
     api.values = values
     for operation in sorted(operations, key=order_of):
-        surveyor.begin(operation)
-        if operation.label not in surveyor.given_up:
-            surveyor.vary(operation, run.effort, run.seed)
+        try:
+            surveyor.begin(operation)
+            if operation.label not in surveyor.given_up:
+                surveyor.vary(operation, run.effort, run.seed)
+        except (NoAnswerError, NotPossibleError, NotPermittedError, PartialTraceError):
+            raise
+        except Exception as error:  # noqa: BLE001 - one schema that cannot be read leaves the others to be judged
+            run.judge.fault(operation.label, error)
+            surveyor.given_up.add(operation.label)
     surveyor.create_and_delete(operations)
     for operation in operations:
         if operation.method == "GET" and operation.parameter("path") and operation.label not in surveyor.given_up:

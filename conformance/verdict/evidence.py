@@ -22,6 +22,8 @@ MAX_SEQUENCES = 10
 # Requests before a finding that are kept with it.
 MAX_SEQUENCE = 40
 _REST = "the rest"
+# Characters of the message of an error of the suite.
+_FAULT = 200
 # What differs between two cases of one finding: numbers, and values in quotes.
 _VALUES = re.compile(r"[-+]?\d[\d.e+-]*|'[^']*'|\"[^\"]*\"")
 
@@ -80,6 +82,7 @@ class Judge:
         check_name: name of the running check.
         at_risk: the requirements that fail if the robot stops responding during a hostile request.
         met: findings of the running check, newest last.
+        faults: what the suite could not judge because of an error of its own, with the requirements concerned.
         ended_by: the finding after which the robot stopped responding, or None.
         concerned: returns the labels of the operations of a description that a request concerns.
     """
@@ -89,6 +92,7 @@ class Judge:
         self.check_name = ""
         self.at_risk: tuple[str, ...] = ()
         self.met: list[Finding] = []
+        self.faults: dict[str, set[str]] = {}
         self.ended_by: Finding | None = None
         self.concerned: Callable[[Request], Iterable[str]] = lambda _: ()
         self._ledger: Mapping[str, Requirement] = known if isinstance(known, Mapping) else {}
@@ -266,6 +270,12 @@ class Judge:
     def error(self, requirement: str, reason: str) -> None:
         """Record why judging was aborted."""
         self._say(requirement, reason, lambda evidence: evidence.errors)
+
+    def fault(self, what: str, error: Exception, ids: Iterable[str] = ()) -> None:
+        """Record an error of the suite that kept it from judging something, such as one operation."""
+        said = (str(error).splitlines() or [""])[0][:_FAULT]
+        text = f"{what}: not judged: {type(error).__name__}: {said}"
+        self.faults.setdefault(text, set()).update(self._renamed.get(id_, id_) for id_ in ids)
 
     def note(self, requirement: str, remark: str) -> None:
         """Add a remark that changes no verdict."""

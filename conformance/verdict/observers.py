@@ -1,9 +1,13 @@
 """Observers: judge every exchange of a run, whichever check sent it."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import Final, TypeVar
 
-from conformance.transport.exchange import Exchange, Listener, Unanswered
+from conformance.transport.exchange import Attempt, Exchange, Listener, Unanswered
 from conformance.verdict.evidence import Judge
+
+_Attempt = TypeVar("_Attempt", bound=Attempt)
+_SHOWN: Final = 100
 
 
 class Observers(Listener):
@@ -22,10 +26,18 @@ class Observers(Listener):
         """Call each observer with an exchange."""
         with self._judge.by_rule():
             for observer in self._observers:
-                observer.answered(exchange)
+                self._call(observer.answered, exchange)
 
     def unanswered(self, request: Unanswered) -> None:
         """Call each observer with a request without a response."""
         with self._judge.by_rule():
             for observer in self._observers:
-                observer.unanswered(request)
+                self._call(observer.unanswered, request)
+
+    def _call(self, observe: Callable[[_Attempt], None], attempt: _Attempt) -> None:
+        """Call an observer; what it cannot judge is no reason not to judge the rest of the run."""
+        try:
+            observe(attempt)
+        except Exception as error:  # noqa: BLE001 - whatever it is, it is told
+            request = attempt.request
+            self._judge.fault(f"{request.method} {request.target.partition('?')[0][:_SHOWN]}", error)
