@@ -47,6 +47,7 @@ class RefusalListener(Listener):
         accepted: number of requests for what demands credentials that were answered 2xx or 3xx.
         expired: whether the device has begun to refuse them.
         open: number of such requests for what demands none.
+        other: number of such requests that were refused for another reason, or failed.
         refused: number of refusals by status.
         challenge: the first WWW-Authenticate of a refusal.
     """
@@ -56,6 +57,7 @@ class RefusalListener(Listener):
     rest: Callable[[], RestInterface | None]
     accepted: int = 0
     open: int = 0
+    other: int = 0
     refused: Counter[int] = field(default_factory=Counter)
     challenge: str = ""
     expired: bool = False
@@ -76,6 +78,7 @@ class RefusalListener(Listener):
         if not is_refused(exchange):
             is_accepted = answer.status < _ERRORS
             self.accepted += is_accepted and demands
+            self.other += not is_accepted and demands
             self.open += is_accepted and not demands
             if demands and request.method == "GET" and answer.ok and self._usual is None:
                 self._usual = request
@@ -138,7 +141,9 @@ class RefusalListener(Listener):
     @property
     def text(self) -> str:
         """How the device refused the run's credentials, and what to do; empty if it accepted them."""
-        if not self.refused or (self.accepted and not self.expired) or (self.open and not self.has_credentials):
+        # 403 and its like may be about one request, as from a firewall; 401 never is.
+        is_clear = bool(self.refused.keys() & {401, 407}) or self.refused.total() > self.other
+        if not is_clear or (self.accepted and not self.expired) or (self.open and not self.has_credentials):
             return ""
         statuses = " or ".join(str(status) for status, _ in self.refused.most_common())
         challenge = f" (WWW-Authenticate: {self.challenge})" if self.challenge else ""

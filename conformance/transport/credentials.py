@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # A shorter secret is not looked for in responses: it would be found everywhere.
 _SHORTEST: Final = 4
+# Other cookies than the session's are words, as in theme=dark.
+_SHORTEST_IN_COOKIE: Final = 8
 _VARIABLE: Final = re.compile(r"\$ROAAS_[A-Z0-9_]+")
 # The head of a request, and in it what answers a challenge (RFC 7616 3.4).
 _REQUEST_LINE: Final = re.compile(rb"(\S+) (\S+) HTTP/")
@@ -104,7 +106,8 @@ class Credential:
         """The texts that must not be shown, the longest first."""
         parts = [*self.secret.split(":", 1)[1:], self.secret.removeprefix(self.scheme).lstrip()]
         if self.kind is Kind.HEADER and self.header.lower() == "cookie":
-            parts += [pair.partition("=")[2] for pair in self.secret.split("; ")]
+            values = (pair.partition("=")[2] for pair in self.secret.split("; "))
+            parts += [value for value in values if len(value) >= _SHORTEST_IN_COOKIE]
         return tuple(sorted({self.sent, self.secret, *parts}, key=len, reverse=True))
 
     @property

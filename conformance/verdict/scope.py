@@ -34,7 +34,7 @@ def view_of(verdicts: Iterable[Verdict]) -> View:
 def verdict_line(run: Run, value: Overall, verdicts: Iterable[Verdict]) -> str:
     """Return the verdict in a line, such as "conformant to full (contract 1.2), seen on ROS"."""
     if run.refused and value is Overall.INCONCLUSIVE:
-        return f"inconclusive: {run.refused}"
+        return "inconclusive, because the device refused the credentials"
     if run.contract.described:
         said = _OF_DESCRIBED[value]
         return f"{said}, {run.less}" if run.less else said
