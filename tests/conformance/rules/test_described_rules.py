@@ -151,7 +151,6 @@ def test_a_right_device_is_not_blamed(rule, run):
         (answers.status_declared, [_probe(409)]),
         (answers.status_declared, [_probe(403)]),
         (answers.status_declared, [_probe(403, kind=Kind.GENERATED)]),
-        (answers.status_declared, [_probe(423)]),
         (answers.status_declared, [_multipart(b"--b\r\nContent-Disposition: form-data; name=a\r\n\r\nx\r\n--b--")]),
         (answers.status_declared, [_probe(428)]),
         (answers.status_declared, [_probe(422, kind=Kind.GENERATED)]),
