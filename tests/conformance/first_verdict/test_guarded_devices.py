@@ -6,6 +6,9 @@ import pytest
 from aiohttp import web
 from guarded_device import SECRET, guarded
 from small_device import certified, constant, described, error, reading, small_device
+from soap_devices import SOAP_11, camera, serving
+
+WSSE = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-wssecurity-secext-1.0.xsd"
 
 
 @pytest.fixture(name="secret")
@@ -172,3 +175,19 @@ def test_a_gateway_with_leases_that_shuts_out_who_sends_wrong_keys(forgives, sec
         done = certified(statement, tmp_path / "out")
     assert (done.blamed, done.exit_code) == ({}, 0), done.text
     assert done.requirement("description/security")["verdict"] == "pass"
+
+
+@pytest.mark.parametrize("status", [401, 500])
+def test_a_soap_service_that_refuses_every_message_is_said_first_and_is_not_green(status, tmp_path):
+    """A refusal is a 401 with a fault, or a fault that says so (WS-Security 12)."""
+    fault = (
+        f'<e:Envelope xmlns:e="{SOAP_11}"><e:Body><e:Fault><faultcode xmlns:w="{WSSE}">w:FailedAuthentication'
+        "</faultcode><faultstring>who are you?</faultstring></e:Fault></e:Body></e:Envelope>"
+    )
+    device = camera()
+    device.alter = lambda _request, *_answer: (status, "text/xml; charset=utf-8", fault.encode())
+    with serving(device) as url:
+        done = certified(f"{url}/camera.wsdl", tmp_path / "out")
+    assert re.match(rf"All \d+ requests were answered {status}\b.*nothing was judged", done.text), done.text
+    assert (done.exit_code, done.result["verdict"]) == (4, "inconclusive"), done.text
+    assert not {"fail", "warn"} & set(done.blamed.values())
