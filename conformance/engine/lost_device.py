@@ -25,6 +25,7 @@ from conformance.verdict.run import Run
 
 _CRASH: Final = "robustness/no-crash"
 _HANG: Final = "robustness/no-hang"
+_SOAP: Final = "soap/answered"
 # How long a lost device is waited for: one that a supervisor restarts, and one that the user's command restarts, s.
 _RETURN_S: Final = 20.0
 _RESTART_S: Final = 60.0
@@ -106,12 +107,13 @@ class LostDevice:
         """Return the requirement that the loss breaks; empty if the contract has none on that."""
         run, ledger = self._run, self._run.contract.ledger
         id_ = _HANG if kind is NoAnswer.TIMEOUT else _CRASH
-        if id_ in ledger:
-            if run.claims and not ledger[id_].binds(run.claims):
-                # Whatever the user chose: nothing can be judged of a device that is lost.
-                ledger[id_] = replace(ledger[id_], also=(*ledger[id_].also, run.claims[0]))
-            return id_
-        return ""
+        id_ = id_ if id_ in ledger else _SOAP
+        if id_ not in ledger:
+            return ""
+        if run.claims and not ledger[id_].binds(run.claims):
+            # Whatever the user chose: nothing can be judged of a device that is lost.
+            ledger[id_] = replace(ledger[id_], also=(*ledger[id_].also, run.claims[0]))
+        return id_
 
     def _comes_back(self) -> bool:
         """Restart the device by the user's command, if there is one; return whether it responds again."""
