@@ -1,4 +1,4 @@
-"""Serve ASGI and WSGI apps on loopback, alone or behind nginx, with a server that keeps HTTP to the letter."""
+"""Serve ASGI and WSGI apps on loopback, alone or behind nginx."""
 
 import socket
 import subprocess
@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 import uvicorn
 from starlette.applications import Starlette
@@ -18,9 +17,8 @@ from starlette.routing import BaseRoute, Route
 
 @contextmanager
 def serving_app(app: Any, **settings: Any) -> Iterator[str]:
-    """Serve an app with uvicorn on h11, which refuses a request without Host; yields the base URL."""
+    """Serve an app with uvicorn on h11; yields the base URL."""
     with socket.create_server(("127.0.0.1", 0)) as listening:
-        app = _to_the_letter(app)
         config = uvicorn.Config(app, http="h11", log_level="critical", timeout_graceful_shutdown=1, **settings)
         server = uvicorn.Server(config)
         thread = threading.Thread(target=server.run, args=([listening],), daemon=True)
@@ -32,32 +30,14 @@ def serving_app(app: Any, **settings: Any) -> Iterator[str]:
         thread.join(10)
 
 
-def _to_the_letter(app: Any) -> Any:
-    """Return an app that does what uvicorn does not: absolute targets, closing at two lengths (RFC 9112 3.2.2, 6.1)."""
-
-    async def wrapped(scope: Any, receive: Any, send: Any) -> None:
-        async def closing(message: Any) -> None:
-            if message["type"] == "http.response.start":
-                message = {**message, "headers": [*message.get("headers", ()), (b"connection", b"close")]}
-            await send(message)
-
-        if scope["type"] == "http" and scope["path"].startswith("http://"):
-            path = urlsplit(scope["path"]).path or "/"
-            scope = {**scope, "path": path, "raw_path": path.encode()}
-        both = {b"content-length", b"transfer-encoding"} <= {name for name, _ in scope.get("headers", ())}
-        await app(scope, receive, closing if both else send)
-
-    return wrapped
-
-
 @contextmanager
-def behind_nginx(upstream: str, prefix: str, folder: Path) -> Iterator[str]:
-    """Serve an upstream server below a path; yields the base URL without that path."""
+def behind_nginx(upstream: str, prefix: str, folder: Path, place: str = "") -> Iterator[str]:
+    """Serve an upstream server below a path, or by another location block; yields the base URL without that path."""
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     names = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
     temporary = "".join(f"{name}_temp_path {folder}/{name};" for name in names)
-    place = f"location {prefix}/ {{ proxy_pass {upstream}/; proxy_set_header Host $http_host; }}"
+    place = place or f"location {prefix}/ {{ proxy_pass {upstream}/; proxy_set_header Host $http_host; }}"
     (folder / "nginx.conf").write_text(
         f"daemon off; pid {folder}/pid; error_log {folder}/log; events {{}}\n"
         f"http {{ access_log off; {temporary} server {{ listen 127.0.0.1:{port}; {place} }} }}"

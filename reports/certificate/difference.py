@@ -76,7 +76,12 @@ class Change:
 
     @property
     def regression(self) -> bool:
-        """Return whether a MUST fails that did not fail before, or passed before and could not be judged now."""
+        """Return whether a MUST fails that did not fail before, or passed before and could not be judged now.
+
+        What is judged beside a verdict is no regression.
+        """
+        if (self.new or {}).get("beside"):
+            return False
         return self.kind is Kind.NEW_FAILURE or (
             self.kind is Kind.LOST and self.new is not None and self.new["level"] == "MUST"
         )
@@ -145,7 +150,11 @@ def _by_present_id(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[t
 def _beside(result: Mapping[str, Any]) -> Iterator[Requirement]:
     """Yield the requirements beside a verdict, for which a failure is a warning."""
     for item in result.get("web_server", {}).get("requirements", ()):
-        yield {**item, "verdict": {"fail": "warn", "error": "skip"}.get(item["verdict"], item["verdict"])}
+        yield {
+            **item,
+            "beside": True,
+            "verdict": {"fail": "warn", "error": "skip"}.get(item["verdict"], item["verdict"]),
+        }
 
 
 def _kinds(old: Requirement | None, new: Requirement | None) -> Iterator[Kind]:

@@ -5,6 +5,7 @@ import re
 import pytest
 
 from conformance.contract.classes import Topic
+from conformance.contract.described import write_described_pack
 from conformance.contract.generic import generic_classes, generic_ledger
 from conformance.contract.ledger import LedgerError, load_ledger
 from conformance.contract.locating import ContractError
@@ -86,3 +87,15 @@ def test_a_ledger_that_cannot_be_used(tmp_path, text):
 def test_a_folder_that_describes_nothing(tmp_path):
     with pytest.raises(ContractError, match="describes nothing"):
         Contract.load(tmp_path)
+
+
+def test_a_class_that_a_pack_does_not_name_is_within_another(tmp_path):
+    moved = [item for item in LEDGER.values() if item.id.startswith("web-server/")]
+    assert {item.classes for item in moved} == {("http",)}
+    assert all(CONTRACT.renamed[f"http/{item.id.partition('/')[2]}"] == item.id for item in moved)
+    described = Contract.load(write_described_pack(tmp_path, {"paths": {}}, {"paths": {}}))
+    assert {item.classes for id_, item in described.ledger.items() if id_ in {one.id for one in moved}} == {
+        ("web-server",)
+    }
+    assert "web-server" in described.classes
+    assert "web-server" not in described.profiles["full"]

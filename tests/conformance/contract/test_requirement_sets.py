@@ -19,6 +19,13 @@ def test_ids_levels_and_texts_of_a_set_stay_as_they_were(name):
     assert {id_: frozen(LEDGER[id_]) for id_ in kept if id_ in LEDGER} == dict(kept)
 
 
+def test_a_new_id_changes_neither_the_digest_nor_what_is_in_a_set():
+    """Signed certificates name the digest; requirements got the class web-server after the freeze."""
+    kept = load_set(CONTRACT, "1.2")
+    assert kept.digest == "sha256:dff37acc19f5bf0720efb68ec6d6e773208ca0e950ecaae5a75e6692a47aafff"
+    assert {"http/host-missing", "web-server/host-missing"} & kept.requirements.keys() == {"web-server/host-missing"}
+
+
 def test_what_a_suite_has_is_known_by_its_set_only_when_it_is_the_same():
     ledger = dict(LEDGER)
     newest = current(CONTRACT, ledger)

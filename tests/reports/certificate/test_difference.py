@@ -133,3 +133,15 @@ def test_requirements_that_were_merged_are_compared_with_the_one_that_asks_it_no
     assert found.changes[-1].reason == "It was http/one, http/two."
     same = difference(*pair([requirement(id_="http/one"), requirement(id_="http/two")], [merged]))
     assert {change.kind for change in same.changes} == {Kind.MERGED}
+
+
+def test_what_is_beside_the_verdict_is_shown_and_no_regression(pair):
+    """A result of an earlier suite has the requirement by its old id, and within the verdict."""
+    old, new = pair([requirement("pass", id="http/host-missing")], [])
+    beside = requirement("fail", id="web-server/host-missing", aliases=["http/host-missing"])
+    new["web_server"] = {"requirements": [beside]}
+    found = difference(old, new)
+    assert {change.kind for change in found.changes} == {Kind.MERGED, Kind.NEW_WARNING}
+    assert not found.regressions
+    lost = {"requirements": [requirement("skip", id="web-server/host-missing", aliases=["http/host-missing"])]}
+    assert not difference(old, {**new, "web_server": lost}).regressions

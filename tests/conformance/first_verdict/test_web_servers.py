@@ -1,0 +1,62 @@
+"""What a web server's parser does is told once, beside the verdict on the API."""
+
+import re
+
+import pytest
+from serving import serving
+from serving_apps import behind_nginx
+from small_device import certified
+
+from conformance.explaining.advice import topic_of
+
+# What these servers do in the versions of constraints.txt.
+_NOT_MET = {
+    "uvicorn, h11": {"absolute-form", "length-and-chunks-closed"},
+    "uvicorn, httptools": {"host-missing"},
+    "hypercorn": {"absolute-form", "length-and-chunks-closed"},
+    "gunicorn, gthread": {"host-missing", "target-length"},
+    "Werkzeug": {"host-missing", "content-length-conflict", "space-before-colon", "malformed-request"},
+    "aiohttp": set[str](),
+    "http.server": None,
+    "Node http": None,
+}
+
+
+@pytest.mark.parametrize("server", _NOT_MET)
+def test_a_right_api_keeps_its_description_on_every_server(server, tmp_path):
+    with serving(server) as url:
+        outcome = certified(f"{url}/openapi.json", tmp_path)
+    assert (outcome.exit_code, outcome.blamed) == (0, {})
+    beside = outcome.result["web_server"]
+    not_met = {one["id"].partition("/")[2] for one in beside["requirements"] if one["verdict"] in {"fail", "warn"}}
+    assert _NOT_MET[server] in {None, frozenset(not_met)}
+    assert f"Its web server, {beside['server']} by its Server field" in outcome.text or not beside["server"]
+    assert "web-server" not in outcome.result["classes"]
+    assert all(f"web-server/{name}" in beside["text"] for name in not_met)
+    pages = {name: (tmp_path / name).read_text(encoding="utf-8") for name in ("certificate.html", "certificate.md")}
+    assert all("Its web server, " in page for page in pages.values())
+    assert "web-server" not in (tmp_path / "junit.xml").read_text(encoding="utf-8")
+
+
+def test_a_claim_makes_the_web_server_decide(tmp_path):
+    with serving("uvicorn, httptools") as url:
+        asked = certified(f"{url}/openapi.json", tmp_path / "asked", "--class", "web-server")
+        other = certified(f"{url}/openapi.json", tmp_path / "other", "--class", "http")
+    assert (asked.exit_code, asked.result["classes"]) == (1, {"web-server": "fail"} | asked.result["classes"])
+    assert asked.blamed == {"web-server/host-missing": "fail"}
+    assert "web_server" not in asked.result
+    assert other.exit_code == 0
+    assert "web_server" not in other.result
+
+
+def test_the_advice_to_stand_behind_nginx_makes_each_rule_pass(tmp_path):
+    topic = topic_of("web-server/host-missing")
+    assert topic is not None
+    place = re.search(r"`(location .*?)`", topic.fix)
+    assert place is not None
+    with serving("uvicorn, httptools") as server:
+        advised = place[1].replace("http://127.0.0.1:7004", server)
+        with behind_nginx(server, "", tmp_path, place=advised) as url:
+            claims = ("--class", "web-server", "--class", "http")
+            outcome = certified(f"{url}/openapi.json", tmp_path / "out", *claims)
+    assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
