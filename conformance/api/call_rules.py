@@ -14,11 +14,17 @@ from conformance.documents.openapi import Operation
 # Words in a path or operationId that say that a call may do harm, whatever its method.
 _HARMFUL: Final = frozenset(
     {
-        "shutdown", "poweroff", "reboot", "restart", "delete", "erase", "wipe", "format", "install", "uninstall",
-        "firmware", "flash", "factory", "reset", "upgrade", "auth", "oauth", "login", "logout", "token", "password",
-        "secret", "credentials",
+        "shutdown", "poweroff", "reboot", "restart", "delete", "erase", "wipe", "purge", "destroy", "format", "install",
+        "uninstall", "firmware", "flash", "factory", "reset", "upgrade", "downgrade", "update", "upload", "shell",
+        "script", "exec", "execute", "eval", "sudo", "kill", "terminate", "network", "wifi", "hotspot", "auth", "oauth",
+        "login", "logout", "token", "password", "secret", "credentials",
     }
 )  # fmt: skip
+_SEVERAL: Final = frozenset(f"{word}s" for word in _HARMFUL - {"format"})
+# The id of an operation often says what its method does.
+_OF_METHODS: Final = {method: frozenset(words) for method, words in {
+    "DELETE": ("delete", "deletes"), "PUT": ("update", "updates"), "PATCH": ("update", "updates")
+}.items()}  # fmt: skip
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _PARAMETER: Final = re.compile(r"\{[^{}]*\}")
 
@@ -92,11 +98,12 @@ def is_literal(pattern: str, operation: Operation) -> bool:
 
 
 def harmful_words(operation: Operation) -> list[str]:
-    """Return the words in an operation's path and id that say that it may do harm."""
+    """Return the words in an operation's path, id and tags that say that it may do harm."""
     text = f"{_PARAMETER.sub(' ', operation.template)} {operation.id}"
-    # The id of an operation often ends with its method.
-    words = {word.lower() for word in _WORD.findall(text)} - ({"delete"} if operation.method == "DELETE" else set())
-    return sorted(words & _HARMFUL)
+    # Tags name a group: of what only reads in it, nothing is to be feared.
+    text += "" if operation.safe else f" {' '.join(operation.tags)}"
+    words = {word.lower() for word in _WORD.findall(text)} - _OF_METHODS.get(operation.method, frozenset())
+    return sorted(words & (_HARMFUL | _SEVERAL))
 
 
 def told(rules: CallRules, operations: Sequence[Operation]) -> list[str]:
@@ -114,7 +121,8 @@ def told(rules: CallRules, operations: Sequence[Operation]) -> list[str]:
         labels = by_reason.get(reason, [])
         if labels and reason is not Reason.SAFE:
             verb = "  Calls" if reason.may else "  Does not call"
-            lines.append(f"{verb} {len(labels)}, because {reason}: {_listed(labels)}")
+            named = f", as in --call '{labels[0]}'" if reason is Reason.HARMFUL else ""
+            lines.append(f"{verb} {len(labels)}, because {reason}{named}: {_listed(labels)}")
     stops = [operation.label for operation in operations if operation.stop]
     if stops and changing:
         lines.append(f"  Sends at the end, to stop the device (x-roaas-stop): {_listed(stops)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -14,12 +15,14 @@ from conformance.contract.classes import QUESTIONS
 from conformance.verdict.finding import counted
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from conformance.engine.certification import Certification
 
 _COLOURS = {"pass": "green", "fail": "red", "inconclusive": "yellow"}
 _MARKS = {"pass": "pass", "fail": "FAIL", "inconclusive": "inconclusive", "not-claimed": "not claimed"}
 # A device that is judged by its own description conforms to no contract.
-_SHOWN_CURL = 1000
+_SHOWN_CURL = 2000
 _SHOWN_BLOCKED = 5
 # Findings of one requirement that are printed in full; each further one has a line.
 _IN_FULL = 5
@@ -50,7 +53,7 @@ def print_summary(outcome: Certification) -> None:
         for cause, requirement in found:
             printed[requirement["id"]] += 1
             if printed[requirement["id"]] <= _IN_FULL:
-                _print_cause(cause, requirement)
+                _print_cause(cause, requirement, outcome.path.parent)
             else:
                 _print_line(cause, requirement)
     _print_suite_errors(document.get("suite_errors", ()))
@@ -92,7 +95,7 @@ def _print_line(cause: dict[str, Any], requirement: dict[str, Any]) -> None:
     click.echo(f"{cause['number']}. {requirement['verdict'].upper()} {requirement['id']}: {inert(said)}{more}")
 
 
-def _print_cause(cause: dict[str, Any], requirement: dict[str, Any]) -> None:
+def _print_cause(cause: dict[str, Any], requirement: dict[str, Any], folder: Path) -> None:
     """Print a finding and the requirements that are not tested because of it."""
     head = f"{requirement['verdict'].upper()} {requirement['id']} ({requirement['level']}, {requirement['source']})"
     click.echo(f"\n{cause['number']}. {head}\n  {requirement['text']}\n  {inert(cause['text'])}")
@@ -105,4 +108,10 @@ def _print_cause(cause: dict[str, Any], requirement: dict[str, Any]) -> None:
         click.echo(f"  not tested because of it: {shown}{more}")
     failure = next(item for item in requirement["failures"] if item["number"] == cause["number"])
     if failure["request"]:
-        click.echo(f"  replay: {inert(failure['request']['curl'][:_SHOWN_CURL])}")
+        click.echo(f"  replay: {inert(_command(failure['request']['curl'], cause['number'], folder))}")
+
+
+def _command(curl: str, number: int, folder: Path) -> str:
+    """Return the command that sends a finding's request; one that is too long for a terminal is left to the result."""
+    shown = len(curl) <= _SHOWN_CURL and not curl.startswith("#")
+    return curl if shown else f"roaas replay {shlex.quote(str(folder))} {number}"

@@ -17,7 +17,7 @@ from conformance.engine.checks_plugin import ChecksPlugin
 from conformance.engine.interruption import remembered
 from conformance.engine.planning import pytest_options
 from conformance.engine.progress import Progress
-from conformance.engine.resending import look_again
+from conformance.engine.resending import look_again, mask
 from conformance.engine.result import RESULT_NAME, result_document, write_result
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.scenario import Recordings
@@ -112,6 +112,7 @@ def certify(
         robot.refusals.withdraw()
     remarks += run.remarks
     seen, causes = draw_verdicts(run)
+    mask((cause.finding for cause in causes), robot.connection.credentials)
     if run.requirement_set is not None and run.scored is not None:
         seen = score(seen, run.scored, f"requirement set {run.requirement_set.name}")
     verdicts = apply_baseline(seen, baseline, dt.datetime.now(dt.UTC).date())

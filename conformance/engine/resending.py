@@ -4,8 +4,9 @@ import base64
 import re
 import time
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import closing
+from dataclasses import replace
 from http import HTTPStatus
 from typing import Any
 from urllib.parse import urlsplit
@@ -15,7 +16,7 @@ from conformance.api.rest.stops import send_stops
 from conformance.documents.readable import unreadable
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
-from conformance.transport.credentials import is_shown
+from conformance.transport.credentials import Credentials, is_shown
 from conformance.transport.exchange import (
     SAFE_METHODS,
     Attempt,
@@ -74,6 +75,23 @@ def written(sequence: Sequence[Sent]) -> list[dict[str, Any]]:
     ]
 
 
+def mask(findings: Iterable[Finding], credentials: Credentials) -> None:
+    """Put variables in place of secrets in the requests of findings, before anything encodes them."""
+    if not credentials:
+        return
+
+    def masked(request: Request) -> Request:
+        body = credentials.hidden_bytes(request.body)
+        return request if body == request.body else replace(request, body=body)
+
+    for finding in findings:
+        if finding.exchange is not None:
+            finding.exchange = replace(finding.exchange, request=masked(finding.exchange.request))
+        finding.sequence = tuple(one._replace(request=masked(one.request)) for one in finding.sequence)
+        for label, one in finding.operations.items():
+            finding.operations[label] = one._replace(request=one.request and masked(one.request))
+
+
 def read_request(item: dict[str, Any]) -> Request | None:
     """Return a request from its JSON, or None if it was too large to be stored.
 
@@ -115,7 +133,12 @@ def send_again(request: Request, connection: Connection) -> Attempt:
                 own.append(("Accept", ""))
             target = where.path + (f"?{where.query}" if where.query else "")
             return client.send(
-                request.method, target, headers=own, body=request.body, fresh=True, authorized=authorized
+                request.method,
+                target,
+                headers=own,
+                body=connection.credentials.revealed(request.body),
+                fresh=True,
+                authorized=authorized,
             )
         except NoAnswerError as none:
             return none.unanswered

@@ -216,7 +216,7 @@ def _request(exchange: Attempt) -> dict[str, Any]:
     request = exchange.request
     curl = request.curl()
     if len(curl) > _SHOWN_CURL:
-        curl = f"# the request is {len(curl)} characters long as a command; run the check again with the same seed\n"
+        curl = f"# as a command the request has {len(curl)} characters: roaas replay sends it"
     shown = {"method": request.method, "url": request.url, "headers": _headers(request.headers), "curl": curl}
     return {**shown, **_body(request.raw if request.raw is not None else request.body)}
 

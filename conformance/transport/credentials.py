@@ -259,6 +259,6 @@ def quoted(word: str) -> str | None:
     if not is_shown(word):
         return None
     parts = re.split(f"({_VARIABLE.pattern})", word)
-    return (
-        '"' + "".join(part if odd % 2 else re.sub(r'([\\"$`])', r"\\\1", part) for odd, part in enumerate(parts)) + '"'
-    )
+    # An interactive shell replaces "!" in double quotes.
+    escaped = [part if odd % 2 else re.sub(r'([\\"$`])', r"\\\1", part) for odd, part in enumerate(parts)]
+    return '"' + "".join(part.replace("!", "\"'!'\"") for part in escaped) + '"'

@@ -1,16 +1,13 @@
 """Requests and responses as values that can be recorded, shown and sent again."""
 
-import base64
-import gzip
 import re
-import shlex
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from typing import Final, NamedTuple
 from urllib.parse import quote
 
-from conformance.transport.credentials import quoted
+from conformance.transport.shell_command import bytes_command, shell_command
 
 # By these nothing is done (RFC 9110 9.2.1), so they may be sent again without leave.
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -18,9 +15,6 @@ SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _SENDABLE: Final = "".join(map(chr, range(0x21, 0x7F)))
 # Twice has the effect of once (RFC 9110 9.2.2), so a client may send them again on a new connection.
 IDEMPOTENT_METHODS = SAFE_METHODS | {"PUT", "DELETE"}
-_CURL_PLAIN_LIMIT = 4000
-# How a request shows that it answers a challenge: curl does so by itself.
-_DIGEST = "Digest $ROAAS_DIGEST"
 # A segment of a path that holds this, or is longer than this, is a value and no name.
 _VALUE = re.compile(r"\d|%|NaN|Infinity")
 _LONG_SEGMENT = 40
@@ -85,38 +79,10 @@ class Request:
         return f"{self.method} {scheme}//{rest.partition('/')[0]}{path}{operation}"
 
     def curl(self) -> str:
-        """Return a shell command that sends the request again: curl, or nc for a raw request."""
+        """Return a shell command that sends the request again: curl, or Python where curl cannot."""
         if self.raw is not None:
-            host, _, port = self.url.split("//", 1)[-1].split("/", 1)[0].rpartition(":")
-            return f"{_printed(self.raw)} | nc {host.strip('[]')} {port}"
-        words = ["curl", "-i", "--path-as-is", "-g"]
-        if self.method == "HEAD":
-            words.append("-I")
-        elif self.method != "GET" or self.body:
-            words += ["-X", self.method]
-        for name, value in self.headers:
-            if name.lower() in {"host", "content-length", "connection", "user-agent", "accept-encoding"}:
-                continue
-            if value == _DIGEST:
-                words += ["--digest", "-u", _DIGEST.split()[1]]
-                continue
-            words += ["-H", f"{name}: {value}" if value else f"{name};"]
-        pipe = ""
-        if self.body:
-            text = self.body.decode("utf-8", "replace")
-            if _is_plain(self.body) and {"\n", "\t"} & set(text):
-                # In one line, as terminals and tables show it: printf makes line ends and tabs of the escapes.
-                escaped = text.replace("\\", "\\\\").replace("\n", "\\n").replace("\t", "\\t")
-                pipe = f"printf %b {quoted(escaped) or shlex.quote(escaped)} | "
-                words += ["--data-binary", "@-"]
-            elif _is_plain(self.body):
-                words += ["--data-binary", self.body.decode()]
-            else:
-                pipe = f"{_printed(self.body)} | "
-                words += ["--data-binary", "@-"]
-        words.append(self.url + self.query)
-        # The shell has to expand the variables of credentials.
-        return pipe + " ".join(quoted(word) or shlex.quote(word) for word in words)
+            return bytes_command(self.url, self.raw)
+        return shell_command(self.method, self.url, self.headers, self.body, self.query)
 
 
 def sendable(target: str) -> str:
@@ -127,23 +93,6 @@ def sendable(target: str) -> str:
 def media_type_of(content_type: str) -> str:
     """Return the media type in the value of a Content-Type, without parameters, in lower case (RFC 9110 8.3)."""
     return content_type.partition(";")[0].strip().lower()
-
-
-def _is_plain(body: bytes) -> bool:
-    if len(body) > _CURL_PLAIN_LIMIT or body.startswith(b"@"):
-        return False
-    try:
-        return all(char.isprintable() or char in "\n\t" for char in body.decode())
-    except UnicodeDecodeError:
-        return False
-
-
-def _printed(body: bytes) -> str:
-    """Return a shell command that prints ``body``, compressed if that makes the command shorter."""
-    packed = gzip.compress(body, mtime=0)
-    if len(packed) < len(body):
-        return f"echo {base64.b64encode(packed).decode()} | base64 -d | gunzip"
-    return f"echo {base64.b64encode(body).decode()} | base64 -d"
 
 
 @dataclass(frozen=True)

@@ -150,8 +150,8 @@ def counted(number: int, what: str) -> str:
 
 def in_full(finding: Finding) -> str:
     """Return the finding as text, with a command that sends its request again."""
-    curl = f"\n  {finding.exchange.request.curl()[:_SHOWN_CURL]}" if finding.exchange else ""
-    return f"{finding.text}{curl}"
+    curl = finding.exchange.request.curl() if finding.exchange else ""
+    return f"{finding.text}\n  {curl}" if curl and len(curl) <= _SHOWN_CURL else finding.text
 
 
 def kind_of(exchange: Attempt | None, found: str = "") -> CauseKind:

@@ -31,6 +31,16 @@ _READ = Operation("", "GET", "/state/{id}")
         (Operation("", "GET", "/hf-auth/start"), CallRules(), Reason.HARMFUL),
         (Operation("", "GET", "/hf-auth/start"), CallRules(("GET /hf-auth/start",)), Reason.SAFE),
         (Operation("", "GET", "/tokenize/{token}"), CallRules(), Reason.SAFE),
+        (Operation("", "GET", "/lua/firmware"), CallRules(("*",)), Reason.HARMFUL),
+        (Operation("", "GET", "/lua/firmware"), CallRules(("GET /lua/firmware",)), Reason.SAFE),
+        (Operation("", "GET", "/formats"), CallRules(), Reason.SAFE),
+        (Operation("runShellCommand", "POST", "/a"), CallRules(("*",)), Reason.HARMFUL),
+        (Operation("", "POST", "/scripts/{name}/run"), CallRules(("*",)), Reason.HARMFUL),
+        (Operation("", "POST", "/kill_all"), CallRules(("POST /*",)), Reason.HARMFUL),
+        (Operation("", "POST", "/start", tags=("Network Hotspot",)), CallRules(("*",)), Reason.HARMFUL),
+        (Operation("", "GET", "/address", tags=("network",)), CallRules(), Reason.SAFE),
+        (Operation("updatePose", "PUT", "/pose"), CallRules(("*",)), Reason.ALLOWED),
+        (Operation("", "POST", "/update"), CallRules(("*",)), Reason.HARMFUL),
         (Operation("a_delete", "DELETE", "/a"), CallRules(("/a",)), Reason.ALLOWED),
         (Operation("", "POST", "/delete/{id}"), CallRules(("*",)), Reason.HARMFUL),
         (Operation("", "POST", "/a", motion=True), CallRules(("/a",)), Reason.MOVES),
@@ -49,6 +59,11 @@ def test_a_run_says_what_it_calls_and_why():
     assert lines[0] == "Calls 1 of 3 operations (1 change state); 2 are not called."
     assert [line.split(":")[-1].strip() for line in lines[1:]] == ["POST /move/goto", "PUT /a", "GET /state/{id}"]
     assert CallRules(("/move/*", "/gone")).unused([_GOTO]) == ["/gone"]
+
+
+def test_what_is_held_back_for_its_name_is_told_with_the_option_that_names_it():
+    (line,) = told(CallRules(("*",)), [Operation("", "GET", "/lua/firmware")])[1:]
+    assert line.endswith("allows it, as in --call 'GET /lua/firmware': GET /lua/firmware")
 
 
 def test_what_the_description_says_of_motion_and_of_tests():
