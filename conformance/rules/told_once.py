@@ -51,7 +51,7 @@ def told_once(
             faults.setdefault(cause, []).append((probe, fault))
     for cause, found in faults.items():
         # The smallest request shows it best; a usual one better than an odd one.
-        probe, fault = min(found, key=lambda pair: (pair[0].kind in _LESS_PLAIN, pair[0].attempt.request.size))
+        probe, fault = min(found, key=lambda pair: (_oddness(pair[0].kind), pair[0].attempt.request.size))
         showing = {probe.operation: Showing(probe.operation, 0), **{one: Showing(one, 0) for one in _labels(found)}}
         for one, _ in found:
             was = showing[one.operation]
@@ -67,6 +67,11 @@ def told_once(
             subject=probe.operation,
             operations=tuple(showing.values()),
         )
+
+
+def _oddness(kind: Kind) -> int:
+    """Return how odd a request is: a usual one shows a fault best."""
+    return 0 if kind is Kind.USUAL else 2 if kind in _LESS_PLAIN else 1
 
 
 def _labels(found: list[tuple[Probe, Fault]]) -> list[str]:

@@ -203,7 +203,9 @@ class Judge:
         kind = self._kind(requirement, exchange, found)
         observed = observed_in(exchange, found)
         causes = causes_of(kind, exchange)
-        key = f"{kind} {cause or ' '.join((_likeness(kind, exchange), _VALUES.sub('#', f'{expected}|{observed}')))}"
+        # Not what came beside it: a header that each response lacks is one cause, whatever the responses' status.
+        said = _VALUES.sub("#", f"{expected}|{found or observed}")
+        key = f"{kind} {cause or ' '.join((_likeness(kind, exchange), said))}"
         if key not in evidence.findings and len(evidence.findings) >= MAX_FINDINGS:
             key = _REST
         finding = evidence.findings.get(key)
