@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -23,6 +25,7 @@ _COLOURS = {"pass": "green", "fail": "red", "inconclusive": "yellow"}
 _MARKS = {"pass": "pass", "fail": "FAIL", "inconclusive": "inconclusive", "not-claimed": "not claimed"}
 # A device that is judged by its own description conforms to no contract.
 _SHOWN_CURL = 2000
+_PARAMETER = re.compile(r"\{([^{}]+)\}")
 _SHOWN_BLOCKED = 5
 # Findings of one requirement that are printed in full; each further one has a line.
 _IN_FULL = 5
@@ -67,6 +70,7 @@ def print_summary(outcome: Certification) -> None:
     counts[not_claimed] = counts.pop("not-claimed", 0)
     told = ", ".join(f"{count} {value}" for value, count in sorted(counts.items()) if count)
     if "api" in document:
+        _print_unshown(document["api"]["operations"])
         called, described = document["api"]["coverage"]["operations"]
         told = f"{called} of {described} operations called; {told}"
     accepted = f", accepted by the baseline until {document['accepted_until']}" if "accepted_until" in document else ""
@@ -83,6 +87,22 @@ def _print_suite_errors(faults: Sequence[Mapping[str, Any]]) -> None:
         click.echo(f"\n{count} requirements could not be judged because of an error in the suite:")
     for fault in faults:
         click.echo(f"  {inert(fault['text'])}")
+
+
+def _print_unshown(rows: list[dict[str, Any]]) -> None:
+    """Print the operations that were sent requests and never answered 2xx, and what they would need."""
+    unshown = [row for row in rows if row["requests"] and not any(code.startswith("2") for code in row["statuses"])]
+    if not unshown:
+        return
+    click.echo(f"\n{counted(len(unshown), 'operation')} never answered 2xx, so little of them was judged:")
+    for row in unshown:
+        statuses = ", ".join(f"{code} × {count}" for code, count in row["statuses"].items()) or "no response"
+        click.echo(f"  {inert(row['operation'])}: {statuses}")
+    names = sorted({name for row in unshown for name in _PARAMETER.findall(row["operation"])})
+    if names:
+        click.echo("  values that the device knows, in a statement, may help:\n    [values]")
+        for name in names:
+            click.echo(f'    {inert(json.dumps(name, ensure_ascii=False))} = ["…"]')
 
 
 def _print_line(cause: dict[str, Any], requirement: dict[str, Any]) -> None:

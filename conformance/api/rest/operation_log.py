@@ -150,11 +150,13 @@ class OperationLog(Listener):
 
     def _row(self, operation: Operation, rules: CallRules) -> dict[str, Any]:
         record = self._records[operation.label]
+        reason = rules.decide(operation)
         keys = {operation.response_key(status) for status in record.statuses} - {None}
         return {
             "operation": operation.label,
-            "called": rules.decide(operation).may,
-            "reason": str(rules.decide(operation)),
+            # A stop and what a motion map names are sent although no pattern allows them.
+            "called": reason.may or record.sent > 0,
+            "reason": str(reason) if reason.may or not record.sent else "the motion map or the end of the run sends it",
             "requests": record.sent,
             "unanswered": record.unanswered,
             "statuses": {str(status): count for status, count in sorted(record.statuses.items())},

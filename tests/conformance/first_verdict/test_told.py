@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from aiohttp import web
-from small_device import certified, constant, described, reading, small_device
+from small_device import certified, constant, described, error, reading, small_device
 
 _WAYS: Mapping[str, tuple[Any, Any]] = {
     "a": ({"type": "integer"}, "x"),
@@ -24,13 +24,21 @@ async def _crash(_: web.Request) -> web.Response:
     return web.Response(status=500, text="Internal Server Error")
 
 
+async def _unknown(_: web.Request) -> web.Response:
+    return error(404, "no such unit")
+
+
 def test_all_operations_are_named_once_in_result_terminal_pages_and_matrix(tmp_path):
     secured = {"security": [{"k": []}]}
     paths = {f"/{way}": reading(schema) for way, (schema, _) in _WAYS.items()}
     paths |= {path: reading({"type": "object"}, **secured) for path in _OPEN}
-    paths |= {path: reading({}) for path in _BROKEN}
+    paths |= {path: reading({}) for path in (*_BROKEN, "/units/{unit}")}
+    paths["/units/{unit}"]["parameters"] = [
+        {"name": "unit", "in": "path", "required": True, "schema": {"type": "string"}}
+    ]
     routes = {f"/{way}": constant(value) for way, (_, value) in _WAYS.items()}
     routes |= {path: constant({}) for path in _OPEN} | {path: {"GET": _crash} for path in _BROKEN}
+    routes |= {"/units/{unit}": {"GET": _unknown}}
     scheme = {"securitySchemes": {"k": {"type": "http", "scheme": "bearer"}}}
     with small_device(described(paths, components=scheme), routes) as base:
         done = certified(f"{base}/openapi.json", tmp_path)
@@ -50,8 +58,10 @@ def test_all_operations_are_named_once_in_result_terminal_pages_and_matrix(tmp_p
             for one in failure.get("operations", ()):
                 listed[one["operation"]].append(failure["number"])
     assert matrix == {label: sorted(numbers) for label, numbers in listed.items()}
-    assert all(matrix.values())
+    assert all(numbers for label, numbers in matrix.items() if label != "GET /units/{unit}")
     assert "and 9 more operations" in done.text
+    assert f"{len(_BROKEN) + 1} operations never answered 2xx" in done.text
+    assert '    "unit" = ["…"]' in done.text
     for way in _WAYS:
         assert f"GET /{way}" in done.text
     html, markdown = ((tmp_path / f"certificate.{kind}").read_text(encoding="utf-8") for kind in ("html", "md"))
