@@ -96,7 +96,7 @@ def _print_unshown(rows: list[dict[str, Any]]) -> None:
         return
     click.echo(f"\n{counted(len(unshown), 'operation')} never answered 2xx, so little of them was judged:")
     for row in unshown:
-        statuses = ", ".join(f"{code} × {count}" for code, count in row["statuses"].items()) or "no response"
+        statuses = ", ".join(f"{count} times {code}" for code, count in row["statuses"].items()) or "no response"
         click.echo(f"  {inert(row['operation'])}: {statuses}")
     names = sorted({name for row in unshown for name in _PARAMETER.findall(row["operation"])})
     if names:
