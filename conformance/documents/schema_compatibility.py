@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from conformance.documents.json_schema import Schema
-from conformance.documents.schema_containment import Placed, apart, introduced, is_covered, witness
+from conformance.documents.schema_containment import Placed, apart, are_apart, introduced, is_covered, witness
 from conformance.documents.schema_merging import alternatives, are_related, common_types, kind_in, types_in
 from conformance.documents.schema_sides import OPAQUE, UNSENT, Side, is_same
 from conformance.documents.schema_wording import below, change_text, cut, differing, name_of, type_text
@@ -133,8 +133,8 @@ class _Comparison:
         sender = self._ordered(old, new)[0]
         sure = (
             not _has(whole, "oneOf")
-            or (not self.request and _has(sender, "oneOf"))
-            or _are_apart([(other, side) for other in taken])
+            or self._may_overlap(sender, taken)
+            or are_apart([(other, side) for other in taken])
         )
         for one in sent:
             if len(sent) > 1:
@@ -158,6 +158,10 @@ class _Comparison:
         for one in taken:
             if not any(kind_in(one) == kind_in(other) for other in sent):
                 yield Finding(breaks=False, text=f" may {'now' if self.request else 'no longer'} be {name_of(one)}")
+
+    def _may_overlap(self, sender: Any, taken: list[Any]) -> bool:
+        """Return whether a client takes an object that fits several alternatives, as both schemas have oneOf."""
+        return not self.request and _has(sender, "oneOf") and all(kind_in(one) == "object" for one in taken)
 
     def _gone(self, one: Any, taken: list[Any]) -> Iterator[Finding]:
         """Yield the members that are gone from the one shape that has values of a shape that is sent."""
@@ -211,14 +215,15 @@ class _Comparison:
         within = old, new
         if self._is_covered(one, other, within):
             breaks: bool | None = False
-            if self._is_covered(other, one, within):
+            sent, taken = self._placed(one, other)
+            if is_covered(taken, sent, frozenset()):
                 return
         elif self._witness(one, other, within) is not None or words == ("format",):
             breaks = True
         else:
             breaks = None
         for word in words:
-            if old.get(word) != new.get(word):
+            if before.get(word, before) != after.get(word, after):
                 unknown = f": not compared: {word}"
                 yield Finding(breaks, unknown if breaks is None else change_text(word, old, new, request=self.request))
                 if word in {"enum", "const"}:
@@ -288,10 +293,6 @@ class _Comparison:
             pair = [some[number] if number < len(some) else other for some, other in zip(first, rest, strict=True)]
             yield from (replace(one, text=f"[{number}]{one.text}") for one in self.findings(*pair))
         yield from (replace(one, text=f"[]{one.text}") for one in self.findings(*rest))
-
-
-def _are_apart(schemas: list[Placed]) -> bool:
-    return all(apart(one, other) for number, one in enumerate(schemas) for other in schemas[:number])
 
 
 def _has(schema: Any, word: str) -> bool:

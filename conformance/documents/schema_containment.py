@@ -75,6 +75,11 @@ def apart(one: Placed, other: Placed) -> bool:
         return False
 
 
+def are_apart(schemas: list[Placed]) -> bool:
+    """Return whether each two of several schemas are known to have no value in common."""
+    return all(apart(one, other) for number, one in enumerate(schemas) for other in schemas[:number])
+
+
 def _options() -> dict[str, Any]:
     return {"draft": jsonschema_rs.Draft202012, "validate_formats": True}
 

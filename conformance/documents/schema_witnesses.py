@@ -43,7 +43,7 @@ class Witnesses:
             if key in {"enum", "const"}:
                 self._values += value if key == "enum" else [value]
             elif key == "multipleOf":
-                self._numbers |= dict.fromkeys((value, -value, 2 * value, 3 * value, 5 * value))
+                self._numbers |= dict.fromkeys((value / 3, 1.5 * value, value, -value, 2 * value, 3 * value, 5 * value))
             elif isinstance(value, int | float) and not isinstance(value, bool):
                 if key.startswith(("min", "max")) and key not in {"minimum", "maximum"}:
                     self._sizes |= dict.fromkeys(max(0, min(int(value) + more, 300)) for more in (-1, 0, 1))
@@ -53,8 +53,9 @@ class Witnesses:
                 self._texts |= dict.fromkeys(_near(value))
             elif key == "format":
                 self._texts |= dict.fromkeys(_FORMATS)
-            elif key == "required":
-                self._members |= dict.fromkeys(value)
+            elif key in {"required", "dependentRequired"}:
+                others = value.values() if key == "dependentRequired" else ()
+                self._members |= dict.fromkeys([*value, *(name for names in others for name in names)])
             self._look_below(key, value)
 
     def _look_below(self, key: str, value: Any) -> None:
