@@ -103,6 +103,11 @@ class RobotUnderTest:
             self.connection.endless = self.connection.resends = True
         self._connect_rest()
         self._connect_soap()
+        kinds = [one.kind for one in self.connection.recent]
+        # It was there, and one of the first requests was too much for it.
+        lost = not self.reached and NoAnswer.CLOSED in kinds and kinds[-1] is NoAnswer.REFUSED
+        if lost and self.alive():
+            self.run.unreachable.clear()
 
     def _connect_rest(self) -> None:
         where = self.run.statement.endpoints
@@ -193,8 +198,8 @@ class RobotUnderTest:
 
     @property
     def reached(self) -> bool:
-        """Whether any interface responded at the start."""
-        return any(self.has(name) and name not in self.run.unreachable for name in Interface)
+        """Whether any interface responded at the start, or was lost in one of the first requests."""
+        return self.run.losses > 0 or any(self.has(name) and name not in self.run.unreachable for name in Interface)
 
     def alive(self) -> bool:
         """Return whether the run can go on: the device responds, or does so again after it was lost."""
@@ -254,7 +259,7 @@ class RobotUnderTest:
     def _answering(self) -> list[tuple[HttpClient, str]]:
         """Return a client and a path for each interface that responded at the start."""
         found: list[tuple[HttpClient, str]] = []
-        if self.rest is not None and Interface.REST not in self.run.unreachable:
+        if self.rest is not None and (Interface.REST not in self.run.unreachable or not self.reached):
             found.append((self.rest.client, self.rest.path))
         found += [
             (service.client, service.path)

@@ -93,3 +93,9 @@ def test_a_device_that_answers_500_ever_after_fails_and_is_not_called_lost(tmp_p
     assert outcome.exit_code == 1
     assert outcome.requirement("robustness/no-server-error")["verdict"] == "fail"
     assert outcome.requirement("robustness/no-crash")["verdict"] == "pass"
+
+
+def test_a_device_that_dies_of_the_first_request_is_no_device_that_was_not_reached(tmp_path):
+    outcome = judged("first", tmp_path)
+    assert outcome.exit_code == 1
+    assert only_failure(outcome, "robustness/no-crash")["request"]["url"].endswith("/joints")
