@@ -9,6 +9,7 @@ from reports.certificate.description_changes import changes_pages, changes_text,
 from reports.cli.difference import diff
 
 GONE = (True, "GET /a", "status 404 is gone")
+UNKNOWN = (None, "GET /a", "not compared: xml")
 NEW = (False, "GET /b", "the operation is new")
 
 
@@ -32,6 +33,7 @@ def run(door, *arguments):
     [
         ([], "No change breaks existing clients."),
         ([NEW], "No change breaks existing clients; 1 other change."),
+        ([UNKNOWN, NEW], "Of 1 change it is not known whether existing clients break; 1 other change."),
         ([GONE], "1 change breaks existing clients."),
         ([GONE, (True, "GET /a", "gone"), NEW, NEW], "2 changes break existing clients; 1 other change."),
     ],
@@ -57,7 +59,9 @@ def test_hostile_text_stays_text(hostile_text):
         assert "\x1b" not in text
 
 
-@pytest.mark.parametrize(("found", "code"), [([GONE, NEW], 1), ([NEW], 0), ([], 0)])
+@pytest.mark.parametrize(
+    ("found", "code"), [([GONE, NEW], 1), ([NEW], 0), ([], 0), ([UNKNOWN, NEW], 4), ([UNKNOWN, GONE], 1)]
+)
 def test_two_descriptions(tmp_path, found, code):
     (tmp_path / "old.yaml").write_text("openapi: 3.1.0")
     door = Door(*found)
