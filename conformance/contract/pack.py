@@ -18,10 +18,10 @@ from types import ModuleType
 from typing import Any
 
 import msgspec
-import yaml
 
 from conformance.contract.classes import FULL, ConformanceClass, Topic
 from conformance.contract.described import ORIGINAL_NAME, UNRESOLVED_NAME
+from conformance.contract.document_text import parsed
 from conformance.contract.generic import LEDGER, ClassEntry, generic_classes, generic_ledger
 from conformance.contract.interfaces import Interface
 from conformance.contract.ledger import LedgerError, Requirement, load_ledger, renamed
@@ -31,8 +31,6 @@ from conformance.contract.toml_file import Text, read_toml
 
 #: The pack that is used where none is named.
 DEFAULT_PACK = "table1"
-# libyaml, where PyYAML was built with it, is ten times as fast: a third of a second of each run.
-_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _OPENAPI_NAMES = ("openapi.yaml", "openapi.yml", "openapi.json")
 
 
@@ -204,14 +202,12 @@ class Contract:
         if self.openapi_path is None:
             return {}
         try:
-            document = yaml.load(self.openapi_path.read_text(encoding="utf-8"), _LOADER)  # noqa: S506 - a safe one
-        except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
+            document = parsed(self.openapi_path.read_bytes(), self.openapi_path.name)
+        except (ValueError, OSError) as error:
             raise ContractError(f"{self.openapi_path} cannot be read: {error}") from error
         if not isinstance(document, dict) or "paths" not in document:
             raise ContractError(f"{self.openapi_path} is no OpenAPI description: it has no 'paths'")
-        # Through JSON, so that YAML's dates and sharing are gone and what is left is what a device can be asked for.
-        plain: dict[str, Any] = json.loads(json.dumps(document, default=str))
-        return plain
+        return document
 
     @property
     def described(self) -> bool:

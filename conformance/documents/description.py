@@ -11,17 +11,14 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urljoin, urlsplit
 
-import yaml
-
+from conformance.contract.document_text import parsed
 from conformance.documents.description_faults import unresolved
 from conformance.documents.json_schema import Schema, UnresolvedError, pointed
 from conformance.documents.overlay import OverlayError, overlaid
+from conformance.documents.schema_places import DATA, FILES, make_plain
 from conformance.documents.swagger import as_openapi_3
 
-#: Where the contents of other files stand in a description that has been made one document.
-FILES: Final = "x-roaas-files"
-_LOADER: Final[Any] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-_MOST_FILES: Final = 200
+_MOST_FILES: Final = 5_000
 # Other keywords of OpenAPI 3 describe these, so header parameters of these names are ignored (OpenAPI 3.1, 4.8.12.2).
 _IGNORED: Final = frozenset({"accept", "content-type", "authorization"})
 _VARIABLE: Final = re.compile(r"\{([^{}]+)\}")
@@ -65,6 +62,13 @@ def read_description(source: str, load: Load, overlays: Iterable[str] = ()) -> D
     Raises:
         DescriptionError: it cannot be read, or is neither OpenAPI 3 nor Swagger 2.0.
     """
+    try:
+        return _description(source, load, overlays)
+    except RecursionError as error:
+        raise DescriptionError(f"{source} cannot be read: it is nested too deeply") from error
+
+
+def _description(source: str, load: Load, overlays: Iterable[str]) -> Description:
     original = _parsed(source, load)
     bundle = _Bundle(source, load)
     document = bundle.with_files(original)
@@ -137,15 +141,12 @@ def _parsed(source: str, load: Load) -> Schema:
         DescriptionError: it cannot be read.
     """
     try:
-        text = load(source).decode("utf-8-sig")
-        # YAML is read through JSON, so that its dates become the texts that a device can be sent.
-        document = json.loads(text) if text.lstrip().startswith("{") else yaml.load(text, _LOADER)  # noqa: S506 - a safe one
-        plain = json.loads(json.dumps(document, default=str))
-    except (OSError, ValueError, TypeError, yaml.YAMLError, RecursionError) as error:
+        document = parsed(load(source), urlsplit(source).path if is_url(source) else source)
+    except (OSError, ValueError) as error:
         raise DescriptionError(f"{source} cannot be read: {error}") from error
-    if not isinstance(plain, dict):
+    if not isinstance(document, dict):
         raise DescriptionError(f"{source} is no description: it holds no object")
-    return plain
+    return document
 
 
 @dataclass
@@ -155,12 +156,16 @@ class _Bundle:
     source: str
     load: Load
     numbers: dict[str, str] = field(default_factory=dict)
+    anchors: dict[str, dict[str, str]] = field(default_factory=dict)
     files: dict[str, Any] = field(default_factory=dict)
     unresolved: list[str] = field(default_factory=list)
 
     def with_files(self, document: Schema) -> Schema:
         """Return the document with the files that it refers to below FILES, and references to there."""
-        whole: Schema = self._walked(document, self.source, "#")
+        plain = json.loads(json.dumps(document))
+        self.anchors[self.source] = make_plain(plain, self.source)
+        plain.pop("jsonSchemaDialect", None)  # any is judged as OpenAPI's own, which is JSON Schema 2020-12
+        whole: Schema = self._walked(plain, self.source, "#")
         return {**whole, FILES: self.files} if self.files else whole
 
     def _walked(self, value: Any, location: str, root: str) -> Any:
@@ -168,7 +173,10 @@ class _Bundle:
             return [self._walked(item, location, root) for item in value]
         if not isinstance(value, dict):
             return value
-        found = {key: self._walked(item, location, root) for key, item in value.items()}
+        found = {
+            key: item if key in DATA and key != "examples" else self._walked(item, location, root)
+            for key, item in value.items()
+        }
         if isinstance(value.get("$ref"), str):
             reference = self._moved(value["$ref"], location, root)
             if reference is None:
@@ -180,16 +188,17 @@ class _Bundle:
         """Return a reference as one within the whole document; None if its file cannot be read."""
         file, _, pointer = reference.partition("#")
         if not file:
-            return f"{root}{pointer}"
+            return f"{root}{self._pointer(location, pointer)}"
         target = urljoin(location, file) if is_url(location) else normpath(Path(location).parent / file)
         if is_url(location) and urlsplit(target).netloc != urlsplit(location).netloc:
             self.unresolved.append(f"{reference}: another server's file is not fetched")
             return None
         if target == (self.source if is_url(self.source) else normpath(self.source)):
-            return f"#{pointer}"
+            return f"#{self._pointer(self.source, pointer)}"
         if target not in self.numbers:
             if len(self.numbers) >= _MOST_FILES or is_url(target) != is_url(location):
-                self.unresolved.append(f"{reference}: it is not fetched")
+                reason = "a URL in a file" if is_url(target) else f"the limit is {_MOST_FILES:,} files"
+                self.unresolved.append(f"{reference}: it is not read ({reason})")
                 return None
             number = self.numbers[target] = str(len(self.numbers))
             try:
@@ -198,10 +207,15 @@ class _Bundle:
                 self.unresolved.append(f"{reference}: {error}")
             else:
                 self.files[number] = {}
+                self.anchors[target] = make_plain(other, target)
                 self.files[number] = self._walked(other, target, f"#/{FILES}/{number}")
         if self.numbers[target] not in self.files:
             return None
-        return f"#/{FILES}/{self.numbers[target]}{pointer}"
+        return f"#/{FILES}/{self.numbers[target]}{self._pointer(target, pointer)}"
+
+    def _pointer(self, location: str, fragment: str) -> str:
+        """Return a fragment as a JSON pointer: one that is an anchor's name is looked up in its file."""
+        return self.anchors.get(location, {}).get(fragment, fragment)
 
 
 def _base_url(source: str, document: Schema) -> tuple[str, tuple[str, ...]]:

@@ -10,8 +10,7 @@ from typing import Any
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed, resolved, shape_of
 from conformance.documents.openapi import METHODS
 from conformance.documents.resources import PARAMETER
-
-_DEPTH = 40
+from conformance.documents.schema_places import DATA
 
 
 def invalid(original: Schema) -> list[str]:
@@ -103,25 +102,19 @@ def _every_schema(document: Schema) -> Iterator[tuple[str, Schema]]:
 def unresolved(document: Schema) -> list[str]:
     """Return the references within the document that lead nowhere."""
     found: dict[str, None] = {}
-
-    def walk(value: Any, depth: int) -> None:
-        if depth > _DEPTH:
-            return
+    waiting: list[Any] = [document]
+    while waiting:
+        value = waiting.pop()
         if isinstance(value, list):
-            for item in value:
-                walk(item, depth + 1)
+            waiting += reversed(value)
         elif isinstance(value, dict):
             reference = value.get("$ref")
             if isinstance(reference, str) and reference.startswith("#"):
                 try:
-                    pointed(document, reference if reference != "#" else "#/")
+                    pointed(document, reference)
                 except UnresolvedError:
                     found[reference] = None
-            for key, item in value.items():
-                if key not in {"example", "examples", "default", "enum", "const"}:
-                    walk(item, depth + 1)
-
-    walk(document, 0)
+            waiting += [item for key, item in reversed(value.items()) if key == "examples" or key not in DATA]
     return list(found)
 
 

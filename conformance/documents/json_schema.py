@@ -2,13 +2,15 @@
 
 ``jsonschema_rs`` accepts valid values fast (1 ms for a plan of a thousand poses, where ``jsonschema`` takes 300 ms).
 ``jsonschema`` validates the others, because it names each violation with its place.
+
+Over 300 lines because lazy references belong to both: copying a schema makes them, and validating follows them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from functools import cache, cached_property
+from collections.abc import Callable, Iterator
+from functools import cache, cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, Final, cast
 from urllib.parse import unquote
 
@@ -21,6 +23,23 @@ if TYPE_CHECKING:
     from jsonschema.exceptions import ValidationError
 
 Schema = dict[str, Any]
+# So many nodes of a document, and references one behind the other, are copied before the others stay lazy references.
+_MOST_NODES: Final = 10_000
+_DEEPEST: Final = 8
+_SCHEME: Final = "roaas-lazy:"
+_LAZY: Final[list[tuple[Schema, str]]] = []
+_LAZY_NUMBERS: Final[dict[tuple[int, str], int]] = {}
+_VALUES: Final = frozenset({"example", "examples", "default", "enum", "const"})
+_CONSTRAINTS: Final = frozenset(
+    {
+        "type", "enum", "const", "properties", "required", "items", "prefixItems", "additionalProperties", "allOf",
+        "anyOf", "oneOf", "not", "minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum", "multipleOf", "pattern",
+        "format", "minLength", "maxLength", "minItems", "maxItems", "uniqueItems", "minProperties", "maxProperties",
+        "if", "then", "else", "contains", "patternProperties", "dependentSchemas", "dependentRequired",
+    }
+)  # fmt: skip
+_SCHEMA_WORDS: Final = _CONSTRAINTS - {"required"} | {"$ref"}
+_OTHERS: Final = frozenset({"in", "content", "responses", "schema"})
 _encode: Final = msgspec.json.Encoder().encode
 # An integer that is no double has 309 digits or more; to find so many in a row, each digit is taken for a 0.
 _AS_ZERO: Final = bytes.maketrans(b"123456789", b"0" * 9)
@@ -37,6 +56,8 @@ def pointed(document: Schema, reference: str) -> Any:
     Raises:
         UnresolvedError: the reference is not local, or has no target.
     """
+    if reference == "#":
+        return document
     if not reference.startswith("#/"):
         raise UnresolvedError(f"$ref {reference!r} is not local")
     value: Any = document
@@ -49,26 +70,107 @@ def pointed(document: Schema, reference: str) -> Any:
     return value
 
 
-def resolved(document: Schema, value: Any, trail: tuple[str, ...] = ()) -> Any:
-    """Return a copy of ``value`` with every ``$ref`` replaced by its target.
+def resolved(document: Schema, value: Any) -> Any:
+    """Return a copy of ``value`` with each ``$ref`` replaced by its target.
 
-    A schema that contains itself is replaced by ``{}`` the second time, so values are validated to that depth.
+    A schema inside itself, or far down, stays a reference: to a lazily read schema, which `whole` and `Shape` follow.
 
     Raises:
         UnresolvedError: a reference has no target.
     """
-    if isinstance(value, list):
-        return [resolved(document, item, trail) for item in value]
-    if not isinstance(value, dict):
-        return value
-    if isinstance(value.get("$ref"), str):
-        reference = value["$ref"]
-        if reference in trail:
-            return {}
-        target = resolved(document, pointed(document, reference), (*trail, reference))
-        beside = {key: resolved(document, item, trail) for key, item in value.items() if key != "$ref"}
-        return {**target, **beside} if isinstance(target, dict) else target
-    return {key: resolved(document, item, trail) for key, item in value.items()}
+    return _Resolver(document).copy(value, ())
+
+
+class _Resolver:
+    """Copies parts of a document, with the targets of references in their places as far as a budget reaches."""
+
+    def __init__(self, document: Schema, deepest: int = _DEEPEST) -> None:
+        self._document = document
+        self._deepest = deepest
+        self._nodes = 0
+        self._alone = str(document.get("openapi", "")).startswith("3.0")
+
+    def copy(self, value: Any, trail: tuple[str, ...]) -> Any:
+        self._nodes += 1
+        if isinstance(value, list):
+            return [self.copy(item, trail) for item in value]
+        if not isinstance(value, dict):
+            return value
+        if isinstance(value.get("$ref"), str):
+            return self._referred(value, value["$ref"], trail)
+        return {key: self.copy(item, trail) for key, item in value.items()}
+
+    def _referred(self, value: Schema, reference: str, trail: tuple[str, ...]) -> Any:
+        found = pointed(self._document, reference)
+        # OpenAPI 3.0 ignores what stands beside a $ref; `nullable` is taken as its author means it.
+        beside = {
+            key: self.copy(item, trail)
+            for key, item in value.items()
+            if key != "$ref" and not (self._alone and key in _CONSTRAINTS)
+        }
+        if reference in trail or (isinstance(found, dict) and self._is_far(found, trail)):
+            return {**beside, "$ref": lazy_reference(self._document, reference)}
+        target = self.copy(found, (*trail, reference))
+        if not isinstance(target, dict):
+            return target
+        if beside.keys() & target.keys() & _CONSTRAINTS:
+            return {"allOf": [target, beside]}
+        return {**target, **beside}
+
+    def _is_far(self, target: Schema, trail: tuple[str, ...]) -> bool:
+        is_schema = not _SCHEMA_WORDS.isdisjoint(target) and _OTHERS.isdisjoint(target)
+        return is_schema and (self._nodes > _MOST_NODES or len(trail) > self._deepest)
+
+
+def lazy_reference(document: Schema, reference: str) -> str:
+    """Return the URI of a part of a document that is resolved where it is needed."""
+    key = id(document), reference
+    if key not in _LAZY_NUMBERS:
+        _LAZY_NUMBERS[key] = len(_LAZY)
+        _LAZY.append((document, reference))
+    return f"{_SCHEME}/{_LAZY_NUMBERS[key]}"
+
+
+def changed_alike(schema: Schema, change: str) -> Schema:
+    """Return a changed schema in which a lazy reference leads to a schema that is changed alike.
+
+    Args:
+        schema: the schema after the change.
+        change: the key of the change in `CHANGES`.
+    """
+    reference = schema.get("$ref")
+    if not isinstance(reference, str) or not reference.startswith(_SCHEME) or reference.endswith(f",{change}"):
+        return schema
+    return {**schema, "$ref": f"{reference},{change}"}
+
+
+@lru_cache(maxsize=4096)
+def _lazy(uri: str) -> Any:
+    """Return the schema of a lazy reference.
+
+    Raises:
+        UnresolvedError: it is another URI. Nothing is fetched for a schema.
+    """
+    if not uri.startswith(f"{_SCHEME}/"):
+        raise UnresolvedError(f"$ref {uri!r} is not local")
+    number, *changes = uri.removeprefix(f"{_SCHEME}/").split(",")
+    document, reference = _LAZY[int(number)]
+    schema = _Resolver(document, deepest=0).copy(pointed(document, reference), (reference,))
+    for change in changes:
+        schema = CHANGES[change](schema)
+    return schema
+
+
+def whole(schema: Schema) -> Schema:
+    """Return a schema with the words that its lazy reference leads to; one without such a reference as it is."""
+    reference = schema.get("$ref")
+    seen: set[str] = set()
+    while isinstance(reference, str) and reference.startswith(_SCHEME) and reference not in seen:
+        seen.add(reference)
+        target = _lazy(reference)
+        schema = {**target, **{key: item for key, item in schema.items() if key != "$ref"}}
+        reference = schema.get("$ref")
+    return schema
 
 
 def modern(schema: Any) -> Any:
@@ -77,7 +179,7 @@ def modern(schema: Any) -> Any:
         return [modern(item) for item in schema]
     if not isinstance(schema, dict):
         return schema
-    result = {key: modern(item) for key, item in schema.items()}
+    result = {key: item if key in _VALUES else modern(item) for key, item in schema.items()}
     if isinstance(result.get("nullable"), bool) and result.pop("nullable"):
         result = _with_null(result)
     if (
@@ -90,7 +192,11 @@ def modern(schema: Any) -> Any:
     for bound, exclusive in (("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum")):
         if isinstance(result.get(exclusive), bool) and result.pop(exclusive) and bound in result:
             result[exclusive] = result.pop(bound)
-    return result
+    if isinstance(result.get("items"), list):  # a tuple, before 2020-12
+        result["prefixItems"] = result.pop("items")
+        if "additionalItems" in result:
+            result["items"] = result.pop("additionalItems")
+    return changed_alike(result, "modern")
 
 
 def _with_null(schema: Schema) -> Schema:
@@ -108,15 +214,21 @@ def opened(schema: Any) -> Any:
         return [opened(item) for item in schema]
     if not isinstance(schema, dict):
         return schema
-    return {
-        key: opened(item)
+    found = {
+        key: item if key in _VALUES else opened(item)
         for key, item in schema.items()
         if not (key in {"additionalProperties", "unevaluatedProperties"} and item is False)
     }
+    return changed_alike(found, "opened")
+
+
+#: The changes that a schema behind a lazy reference may undergo, by name.
+CHANGES: Final[dict[str, Callable[[Any], Any]]] = {"modern": modern, "opened": opened}
 
 
 def types_of(schema: Schema) -> tuple[str, ...]:
     """Return the JSON types in a schema's ``type``; empty without it."""
+    schema = whole(schema)
     given = schema.get("type", ())
     if isinstance(given, str):
         return (given,)
@@ -134,6 +246,7 @@ def kind_of(schema: Schema) -> str:
 
 def kinds_of(schema: Schema) -> frozenset[str]:
     """Return the JSON types that a value may have in any alternative, null aside; empty if not restricted."""
+    schema = whole(schema)
     named = types_of(schema)
     if not named and ("enum" in schema or "const" in schema):
         named = tuple(_type_of(value) for value in schema.get("enum", [schema.get("const")]))
@@ -176,12 +289,52 @@ def _naming() -> Any:
     return cast("Any", extend)(Draft202012Validator, type_checker=types)
 
 
+def bundled(schema: Schema) -> Schema:
+    """Return a schema with what its lazy references lead to below ``$defs``; one without any as it is."""
+    found: dict[str, Any] = {}
+
+    def local(value: Any) -> Any:
+        if isinstance(value, list):
+            return [local(item) for item in value]
+        if not isinstance(value, dict):
+            return value
+        result = {key: local(item) for key, item in value.items()}
+        uri = value.get("$ref")
+        if isinstance(uri, str) and uri.startswith(_SCHEME):
+            name = uri.removeprefix(f"{_SCHEME}/")
+            if name not in found:
+                found[name] = {}
+                waiting.append(uri)
+            result["$ref"] = f"#/$defs/{name}"
+        return result
+
+    waiting: list[str] = []
+    result: Schema = local(schema)
+    while waiting:
+        uri = waiting.pop()
+        found[uri.removeprefix(f"{_SCHEME}/")] = local(_lazy(uri))
+    return {**result, "$defs": found} if found else schema
+
+
+def _refuse(uri: str) -> Any:
+    raise UnresolvedError(f"$ref {uri!r} is not local")
+
+
+def validator_of(schema: Schema, **options: Any) -> Any:
+    """Return jsonschema-rs's validator for a schema; it follows lazy references, and fetches nothing.
+
+    Raises:
+        ValueError: it is no JSON Schema.
+    """
+    return jsonschema_rs.validator_for(bundled(schema), retriever=_refuse, **options)
+
+
 class Shape:
     """A schema without references, for validating values. Numbers must be finite doubles."""
 
     def __init__(self, schema: Schema) -> None:
         self.schema = schema
-        self._quick = jsonschema_rs.validator_for(schema)
+        self._quick = validator_of(schema)
 
     def problem(self, value: Any, where: str = "") -> str:
         """Return the first violation in ``value``, with its place below ``where``; empty if the value is valid."""
@@ -210,7 +363,7 @@ class Shape:
 
     @cached_property
     def _validator(self) -> Any:
-        return _naming()(self.schema)
+        return _naming()(bundled(self.schema))
 
     def _first_error(self, value: Any) -> ValidationError | None:
         from jsonschema.exceptions import best_match  # noqa: PLC0415 - as above

@@ -1,12 +1,12 @@
 """The operations of a contract, from its OpenAPI description."""
 
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
-from conformance.documents.json_schema import Schema, UnresolvedError, modern, opened, resolved
+from conformance.documents.json_schema import CHANGES, Schema, UnresolvedError, changed_alike, modern, opened, resolved
 from conformance.documents.parameters import (
     Encoding,
     Parameter,
@@ -215,7 +215,7 @@ def _without(schema: Any, mark: str) -> Any:
         return [_without(item, mark) for item in schema]
     if not isinstance(schema, dict):
         return schema
-    result = {key: _without(item, mark) for key, item in schema.items()}
+    result = changed_alike({key: _without(item, mark) for key, item in schema.items()}, mark)
     properties, required = result.get("properties"), result.get("required")
     if isinstance(properties, dict) and isinstance(required, list):
         marked = _marked(properties, mark)
@@ -224,6 +224,9 @@ def _without(schema: Any, mark: str) -> Any:
         # A device ignores such a member of a request, whatever its value.
         result["properties"] = {**properties, **{name: {"readOnly": True} for name in _marked(properties, mark)}}
     return result
+
+
+CHANGES.update(readOnly=partial(_without, mark="readOnly"), writeOnly=partial(_without, mark="writeOnly"))
 
 
 def _marked(properties: dict[str, Any], mark: str) -> set[str]:

@@ -8,7 +8,7 @@ import yaml
 from lxml import etree
 
 from conformance.documents import xml
-from conformance.documents.json_schema import Schema, as_double, kind_of, types_of
+from conformance.documents.json_schema import Schema, as_double, kind_of, types_of, whole
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, is_xml
 
@@ -209,6 +209,7 @@ def projected(value: Any, schema: Schema) -> Any:
 
 def flat(schema: Schema) -> Schema:
     """Return a schema with the properties of its allOf, or of its first alternative, merged into it."""
+    schema = whole(schema)
     if _COMBINING.isdisjoint(schema):
         return schema
     parts = [*schema.get("allOf", ()), *schema.get("oneOf", ())[:1], *schema.get("anyOf", ())[:1]]

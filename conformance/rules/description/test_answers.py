@@ -7,12 +7,10 @@ from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from typing import Any
 
-import jsonschema_rs
-
 from conformance.api.rest.statuses import CRASHES
 from conformance.api.rest.variations import Kind
 from conformance.documents.field_reading import parts_of
-from conformance.documents.json_schema import Schema, kinds_of, shape_of
+from conformance.documents.json_schema import Schema, kinds_of, shape_of, validator_of
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.rules.told_once import Fault, told_once, without_numbers
@@ -202,7 +200,7 @@ def _text(schema: Schema) -> str:
 
 @lru_cache(maxsize=256)
 def _formatted(key: int, text: str) -> Any:  # noqa: ARG001 - the text keeps the key from meaning another schema
-    return jsonschema_rs.validator_for(_SCHEMAS[key], validate_formats=True)
+    return validator_of(_SCHEMAS[key], validate_formats=True)
 
 
 _SCHEMAS: dict[int, Schema] = {}

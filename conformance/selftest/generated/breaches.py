@@ -10,7 +10,7 @@ from typing import Any
 
 import jsonschema_rs
 
-from conformance.documents.json_schema import Schema
+from conformance.documents.json_schema import Schema, validator_of
 from conformance.documents.openapi import Operation, is_json
 from conformance.mutation.messages import Response
 
@@ -26,7 +26,7 @@ def valid(schema: Schema, value: Any) -> bool:
     known = _VALIDATORS.get(id(schema))
     if known is None or known[0] is not schema:
         try:
-            validator = jsonschema_rs.validator_for(schema, validate_formats=True)
+            validator = validator_of(schema, validate_formats=True)
         except (ValueError, jsonschema_rs.ValidationError):
             validator = None
         known = _VALIDATORS[id(schema)] = schema, validator

@@ -1,0 +1,141 @@
+"""Where the schemas of an OpenAPI document are, and the names by which they refer to each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Final
+from urllib.parse import unquote, urldefrag, urljoin
+
+#: Where the contents of other files stand in a description that has been made one document.
+FILES: Final = "x-roaas-files"
+_ONE: Final = frozenset(
+    {
+        "items", "additionalItems", "unevaluatedItems", "contains", "additionalProperties", "unevaluatedProperties",
+        "propertyNames", "not", "if", "then", "else", "contentSchema",
+    }
+)  # fmt: skip
+_NAMED: Final = frozenset({"properties", "patternProperties", "dependentSchemas", "$defs", "definitions"})
+_SEVERAL: Final = frozenset({"allOf", "anyOf", "oneOf", "prefixItems"})
+_WORDS: Final = frozenset({*_ONE, *_NAMED, *_SEVERAL, "type", "enum", "const", "$id", "$schema", "$anchor"})
+# What an author writes as a value: nothing in it is a schema or a reference.
+DATA: Final = frozenset({"example", "examples", "default", "enum", "const", "value", "dataValue"})
+_UNBOUND: Final = frozenset({"additionalProperties", "unevaluatedProperties"})
+# Objects of OpenAPI that are no schema, although some of their words are a schema's too.
+_NO_SCHEMA: Final = frozenset({"openapi", "swagger", "in", "content", "responses", "paths", "schema", "url"})
+
+Holder = dict[str, Any] | list[Any]
+
+
+def schema_places(document: Any) -> Iterator[tuple[Holder, Any, str]]:
+    """Yield the place of each schema, outer ones first: its holder, its key there, and its JSON pointer."""
+    waiting: list[tuple[Holder, Any, str, bool]] = [([document], 0, "", _is_schema(document))]
+    while waiting:
+        holder, key, pointer, is_schema = waiting.pop()
+        if is_schema:
+            yield holder, key, pointer
+        value = holder[key]  # the caller may have replaced it
+        if isinstance(value, list) and not is_schema:
+            waiting += [(value, i, f"{pointer}/{i}", False) for i in range(len(value))]
+        for name in value if isinstance(value, dict) else ():
+            below = f"{pointer}/{str(name).replace('~', '~0').replace('/', '~1')}"
+            waiting += _inner(value, name, below) if is_schema else _outer(value, name, below)
+
+
+def _is_schema(value: Any) -> bool:
+    return isinstance(value, dict) and not _WORDS.isdisjoint(value) and _NO_SCHEMA.isdisjoint(value)
+
+
+def _inner(schema: dict[str, Any], name: str, pointer: str) -> list[tuple[Holder, Any, str, bool]]:
+    """Return the places of the schemas under one word of a schema."""
+    part = schema[name]
+    if name in _ONE and isinstance(part, dict | bool):
+        return [(schema, name, pointer, True)]
+    if name in _NAMED and isinstance(part, dict):
+        return [(part, key, f"{pointer}/{key.replace('~', '~0').replace('/', '~1')}", True) for key in part]
+    if (name in _SEVERAL or name == "items") and isinstance(part, list):
+        return [(part, i, f"{pointer}/{i}", True) for i in range(len(part))]
+    return []
+
+
+def _outer(value: dict[str, Any], name: str, pointer: str) -> list[tuple[Holder, Any, str, bool]]:
+    """Return the places under one word of an object that is no schema."""
+    part = value[name]
+    if name in {"schema", "itemSchema"}:
+        return [(value, name, pointer, True)]
+    if name in {"schemas", "definitions"} and isinstance(part, dict):
+        return [(part, key, f"{pointer}/{key.replace('~', '~0').replace('/', '~1')}", True) for key in part]
+    if name == FILES:
+        return [(part, key, f"{pointer}/{key}", _is_schema(part[key])) for key in part]
+    if name in DATA - {"examples"} or not isinstance(part, dict | list):
+        return []
+    return [(value, name, pointer, False)]
+
+
+def make_plain(document: Any, location: str) -> dict[str, str]:  # noqa: C901 - one loop over schemas
+    """Change a document so that its schemas are objects, and refer to each other by JSON pointers alone.
+
+    ``true`` becomes ``{}``, ``false`` becomes ``{"not": {}}``. References by ``$id``, ``$anchor`` and
+    ``$dynamicAnchor`` become references by pointer. A ``$dynamicRef`` that may mean several schemas is dropped: any
+    value passes there.
+
+    Args:
+        document: changed in place.
+        location: its URL or path.
+
+    Returns:
+        The pointer of each anchor that other files may refer to.
+    """
+    base = urljoin(location, document.get("$self", "")) if isinstance(document, dict) else location
+    bases = {"": base}
+    anchors: dict[tuple[str, str], str] = {}
+    dynamic: dict[str, list[str]] = {}
+    roots = {base: ""}
+    placed = []
+    for holder, key, pointer in schema_places(document):
+        schema = holder[key]
+        if isinstance(schema, bool):
+            if not (isinstance(holder, dict) and key in _UNBOUND and _is_schema(holder)):
+                holder[key] = {} if schema else {"not": {}}
+            continue
+        if not isinstance(schema, dict):
+            continue
+        own = _base_of(pointer, bases)
+        schema.pop("$schema", None)
+        if isinstance(given := schema.pop("$id", None), str):
+            bases[pointer] = own = urljoin(own, urldefrag(given)[0])
+            roots[own] = pointer
+        for word in ("$anchor", "$dynamicAnchor"):
+            if isinstance(name := schema.pop(word, None), str):
+                anchors[own, name] = pointer
+                if word == "$dynamicAnchor":
+                    dynamic.setdefault(name, []).append(pointer)
+        placed.append((schema, own))
+    for schema, own in placed:
+        wanted = schema.pop("$dynamicRef", None)
+        if isinstance(wanted, str):
+            named = dynamic.get(urldefrag(wanted)[1], [])
+            if len(named) < 2:  # noqa: PLR2004 - of several, the caller decides
+                schema["$ref"] = f"#{named[0]}" if named else wanted
+        if isinstance(schema.get("$ref"), str):
+            schema["$ref"] = _by_pointer(schema["$ref"], own, roots, anchors)
+    return {name: pointer for (uri, name), pointer in anchors.items() if uri == base}
+
+
+def _base_of(pointer: str, bases: dict[str, str]) -> str:
+    """Return the base URI of a place: that of the nearest schema around it with an ``$id``."""
+    if len(bases) == 1:
+        return bases[""]
+    while pointer not in bases:
+        pointer = pointer.rpartition("/")[0]
+    return bases[pointer]
+
+
+def _by_pointer(reference: str, base: str, roots: dict[str, str], anchors: dict[tuple[str, str], str]) -> str:
+    """Return a reference to a schema of the same document as a JSON pointer; another one as it is."""
+    uri, fragment = urldefrag(urljoin(base, reference)) if not reference.startswith("#") else (base, reference[1:])
+    if uri not in roots:
+        return reference
+    if fragment and not fragment.startswith("/"):
+        found = anchors.get((uri, unquote(fragment)))
+        return reference if found is None else f"#{found}"
+    return f"#{roots[uri]}{fragment}"
