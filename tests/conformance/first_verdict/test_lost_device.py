@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from small_device import Outcome, certified
 
-_ARM = Path(__file__).with_name("arm.py")
+_ARM = Path(__file__).with_name("arm_server.py")
 
 
 @contextmanager

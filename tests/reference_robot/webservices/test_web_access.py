@@ -228,7 +228,7 @@ def assert_only_tls_from_1_2(rest: str, certificate: Path) -> None:
 
 def assert_certified_over_https(served, certificate: Path) -> None:
     """Have the suite judge what depends on TLS, tokens and addresses: raw sockets, zeep, a WSDL's own address."""
-    asked = ("http/authentication", "http/pipelining", "describe/wsdl-address", "soap-subscribers/interop")
+    asked = ("http/authentication", "web-server/pipelining", "describe/wsdl-address", "soap-subscribers/interop")
     services = [f"{url}?wsdl" for url in (served.publishers, served.subscribers)]
     named = {
         "requirements": asked,
