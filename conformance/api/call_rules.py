@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from fnmatch import fnmatchcase
 from typing import Final
 
 from conformance.documents.openapi import Operation
+from conformance.statement.motion_map import shape_of
 
 # Words in a path or operationId that say that a call may do harm, whatever its method.
 _HARMFUL: Final = frozenset(
@@ -36,6 +37,7 @@ class Reason(StrEnum):
     READS = "by its name it only reads"
     ALLOWED = "--call allows it"
     CHANGES = "it may change something: --call allows it"
+    MAPPED = "the motion map names it"
     MOVES = "it moves the device: --allow-motion allows it"
     NEVER = "--never excludes it"
     EXCLUDED = "the description excludes it (x-roaas-never)"
@@ -44,7 +46,7 @@ class Reason(StrEnum):
     @property
     def may(self) -> bool:
         """Whether the operation is called."""
-        return self in {Reason.SAFE, Reason.READS, Reason.ALLOWED}
+        return self in {Reason.SAFE, Reason.READS, Reason.ALLOWED, Reason.MAPPED}
 
 
 @dataclass(frozen=True)
@@ -106,13 +108,22 @@ def harmful_words(operation: Operation) -> list[str]:
     return sorted(words & (_HARMFUL | _SEVERAL))
 
 
-def told(rules: CallRules, operations: Sequence[Operation]) -> list[str]:
-    """Return in lines what a run calls and what not, and why."""
+def told(rules: CallRules, operations: Sequence[Operation], mapped: Collection[str] = ()) -> list[str]:
+    """Return in lines what a run calls and what not, and why.
+
+    Args:
+        rules: what the user says.
+        operations: of the description.
+        mapped: the calls that a motion map sends in this run.
+    """
     by_reason: dict[Reason, list[str]] = {}
+    shapes = set(map(shape_of, mapped))
     for operation in operations:
-        by_reason.setdefault(rules.decide(operation), []).append(operation.label)
+        reason = rules.decide(operation)
+        sent = shape_of(operation.label) in shapes and not reason.may and reason not in {Reason.NEVER, Reason.EXCLUDED}
+        by_reason.setdefault(Reason.MAPPED if sent else reason, []).append(operation.label)
     called = [label for reason, labels in by_reason.items() if reason.may for label in labels]
-    changing = by_reason.get(Reason.ALLOWED, [])
+    changing = by_reason.get(Reason.ALLOWED, []) + by_reason.get(Reason.MAPPED, [])
     kept = len(operations) - len(called)
     lines = [
         f"Calls {len(called)} of {len(operations)} operations ({len(changing)} change state); {kept} are not called."

@@ -250,7 +250,8 @@ def _certify(
     run.prepare = door.prepare if door else None  # there is none where the command runs without roaas.py
     notes = (*options.get("remarks", ()), *_notes(run))
     command = command_without_folders(sys.argv[1:], ("--call", "--never"))
-    robot, calls = RobotUnderTest(run, connection), tuple(told(*_rules(run))) if contract.described else ()
+    moves = run.statement.motion_map.calls if run.allow_motion and run.statement.motion_map else ()
+    robot, calls = RobotUnderTest(run, connection), tuple(told(*_rules(run), moves)) if contract.described else ()
     progress, bar = None if options["progress"] == "none" else sys.stderr, options["progress"] == "auto"
     said: dict[str, Any] = {"progress": progress, "bar": bar, "notes": notes, "announced": calls}
     return judge(robot, options["out"], command=command, baseline=baseline, **said)

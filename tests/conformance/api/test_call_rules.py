@@ -61,6 +61,13 @@ def test_a_run_says_what_it_calls_and_why():
     assert CallRules(("/move/*", "/gone")).unused([_GOTO]) == ["/gone"]
 
 
+def test_what_the_motion_map_sends_is_called():
+    moves = Operation("", "PUT", "/goal/{east}")
+    lines = told(CallRules((), ("/never",)), [moves, Operation("", "PUT", "/never")], ["PUT /goal/{x}", "PUT /never"])
+    assert lines[0] == "Calls 1 of 2 operations (1 change state); 1 are not called."
+    assert lines[1] == "  Calls 1, because the motion map names it: PUT /goal/{east}"
+
+
 def test_what_is_held_back_for_its_name_is_told_with_the_option_that_names_it():
     (line,) = told(CallRules(("*",)), [Operation("", "GET", "/lua/firmware")])[1:]
     assert line.endswith("allows it, as in --call 'GET /lua/firmware': GET /lua/firmware")

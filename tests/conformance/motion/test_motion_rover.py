@@ -11,3 +11,7 @@ def test_a_right_rover_that_clamps_and_takes_one_move_at_a_time_is_not_blamed(tm
     undeclared = {"unauthorised-still", "action-runs", "action-succeeds", "action-canceled"}
     missing = {f"motion/{name}" for name in undeclared}
     assert {id_ for id_, verdict in judged.items() if verdict != "pass"} == missing, done.stdout
+    calls = (
+        "Calls 4, because the motion map names it: PUT /goal/{x}/{y}, DELETE /goal, PUT /velocity, PUT /gripper/{state}"
+    )
+    assert calls in done.stderr
