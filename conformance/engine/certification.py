@@ -187,7 +187,7 @@ def _leave_out(seen: Iterable[Evidence]) -> None:
     """Leave out what no permitted request shows: an API that is judged by its description has claimed nothing else."""
     for evidence in seen:
         evidence.parts = {part: cases for part, cases in evidence.parts.items() if cases}
-        if not (evidence.cases or evidence.errors or evidence.because or evidence.unclaimed):
+        if not (evidence.cases or evidence.errors or evidence.because or evidence.unclaimed or evidence.unseen):
             evidence.unclaimed = (evidence.skips or ["nothing that may be called shows it"])[0]
 
 

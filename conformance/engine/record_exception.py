@@ -3,7 +3,7 @@
 import traceback
 from collections.abc import Callable
 
-from conformance.scenarios.scenario import NoOccasionError, NotDeclaredError, NotPossibleError
+from conformance.scenarios.scenario import NoOccasionError, NotDeclaredError, NotPossibleError, NotSeenError
 from conformance.transport.exchange import NoAnswerError, NotPermittedError
 from conformance.verdict.evidence import HarnessError, RefutedError
 from conformance.verdict.finding import Finding
@@ -26,6 +26,7 @@ def record_exception(
         # A note is the reason of a skip where nothing was judged, and changes nothing where other checks have judged.
         tell = run.judge.note if isinstance(error, NoOccasionError) else run.judge.skip
         tell = run.judge.unclaimed if isinstance(error, NotDeclaredError) else tell
+        tell = run.judge.not_seen if isinstance(error, NotSeenError) else tell
         for id_ in ids:
             tell(id_, str(error))
         return

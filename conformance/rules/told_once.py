@@ -6,8 +6,9 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
+from conformance.api.rest.statuses import HELD, held_text
 from conformance.api.rest.variations import Kind
-from conformance.scenarios.rule import Case
+from conformance.scenarios.rule import Case, NotSeen
 from conformance.scenarios.survey import Probe
 from conformance.verdict.finding import Showing
 
@@ -67,6 +68,16 @@ def told_once(
             subject=probe.operation,
             operations=tuple(showing.values()),
         )
+
+
+def held_back(probes: Iterable[Probe]) -> Iterator[NotSeen]:
+    """Yield the operations of which a device shows nothing, because its state allowed none of these requests."""
+    statuses: dict[str, set[int]] = {}
+    for probe in probes:
+        statuses.setdefault(probe.operation, set()).add(probe.status)
+    held = {label: found for label, found in statuses.items() if found <= HELD}
+    if held:
+        yield NotSeen(held_text(held, set().union(*held.values())))
 
 
 def _oddness(kind: Kind) -> int:

@@ -9,10 +9,11 @@ from urllib.parse import urlsplit
 from conformance.api.rest.applicable import allowed
 from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.statuses import HELD, held_text
 from conformance.api.rest.values import IDS, Values
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, operations_of
-from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.scenario import NotPossibleError, NotSeenError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange, NoAnswerError
 
@@ -44,12 +45,14 @@ class Life:
 def lifecycles(api: RestInterface, values: Values) -> tuple[Life, ...]:
     """Create a thing with each POST of a collection, read it, delete it, and read it again."""
     operations = {item.label: item for item in operations_of(api.run.contract) if allowed(api, item)}
-    lives = []
+    lives, held = [], dict[str, int]()
     for create in operations.values():
         readers = [item for item in operations.values() if item.method == "GET" and _is_item_of(item, create)]
         if create.method == "POST" and readers:
-            life = _live(api, values, create, readers[0], operations.get(f"DELETE {readers[0].template}"))
+            life = _live(api, values, create, readers[0], operations.get(f"DELETE {readers[0].template}"), held)
             lives += [life] if life is not None else []
+    if held and not lives:
+        raise NotSeenError(held_text(held, set(held.values())))
     if not lives:
         raise NotPossibleError("no POST that may be called creates a thing that a GET reads")
     return tuple(lives)
@@ -62,11 +65,21 @@ def _is_item_of(reader: Operation, create: Operation) -> bool:
 
 
 def _live(
-    api: RestInterface, values: Values, create: Operation, read: Operation, delete: Operation | None
+    api: RestInterface,
+    values: Values,
+    create: Operation,
+    read: Operation,
+    delete: Operation | None,
+    held: dict[str, int],
 ) -> Life | None:
-    """Return what became of one thing; None if it was not created, or has no identifier."""
+    """Return what became of one thing; None if it was not created, or has no identifier.
+
+    If the device's state did not allow it, the status is noted in ``held``.
+    """
     try:
         created = written(create, usual_inputs(create, values)[0]).send(api)
+        if created.response.status in HELD:
+            held[create.label] = created.response.status
         path = _path_of(created, create, read) if created.response.status == _CREATED else ""
         if not path:
             return None

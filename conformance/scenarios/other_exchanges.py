@@ -8,6 +8,7 @@ from typing import Final
 from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.request_context import RequestContext
+from conformance.api.rest.statuses import HELD, held_text
 from conformance.api.rest.validity import VALID, validity
 from conformance.api.rest.variations import Kind
 from conformance.contract.described import SOAP
@@ -76,6 +77,9 @@ class OtherExchanges(Listener):
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)
 def others(api: RestInterface, other_exchanges: OtherExchanges) -> Survey:
     """Return what other checks have sent and received until the end of the run."""
+    held = {label: status for label, status in api.usual_status.items() if status in HELD}
+    if not api.working and held:
+        raise NoOccasionError(held_text(held, set(held.values())))
     if not api.working and SOAP not in api.run.contract.classes:
         raise NotPossibleError("no request was answered 2xx; if the device asks for credentials, give them")
     if not other_exchanges.probes:

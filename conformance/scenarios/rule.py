@@ -42,6 +42,13 @@ class NotTested:
 
 
 @dataclass(frozen=True)
+class NotSeen:
+    """Outcome of a rule: the device's state kept it from showing something; ``reason`` says what."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
 class NotClaimed:
     """Outcome of a rule: the requirement does not apply to this device; ``reason`` says why."""
 
@@ -55,7 +62,7 @@ class Note:
     remark: str
 
 
-Outcome = Case | NotTested | NotClaimed | Note
+Outcome = Case | NotTested | NotSeen | NotClaimed | Note
 
 
 @dataclass(frozen=True)
@@ -144,6 +151,8 @@ def record(judge: Judge, requirement: str, outcomes: Iterable[Outcome]) -> None:
                 )
             case NotTested():
                 judge.skip(requirement, one.reason)
+            case NotSeen():
+                judge.not_seen(requirement, one.reason)
             case NotClaimed():
                 judge.unclaimed(requirement, one.reason)
             case Note():

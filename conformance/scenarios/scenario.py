@@ -16,6 +16,10 @@ class NoOccasionError(NotPossibleError):
     """Raised when the device gave no occasion, such as a goal in reach. What other checks judged stays judged."""
 
 
+class NotSeenError(NotPossibleError):
+    """Raised when the device's state did not allow what the scenario needs. Its rules have then seen nothing."""
+
+
 class NotDeclaredError(NotPossibleError):
     """Raised when the statement does not say what the scenario needs. What no other check judges is not claimed."""
 

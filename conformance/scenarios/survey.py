@@ -20,6 +20,7 @@ from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.invalid_variations import invalid_variations
+from conformance.api.rest.statuses import HELD
 from conformance.api.rest.validity import UNCLEAR, Validity, validity
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import (
@@ -130,6 +131,11 @@ class Survey:
     def of(self, operation: str, *kinds: Kind) -> list[Probe]:
         """Return the probes of one operation, of these kinds or of all."""
         return [one for one in self.probes if one.operation == operation and (not kinds or one.kind in kinds)]
+
+    def held(self, label: str) -> bool:
+        """Return whether the device's state kept it from acting on each usual request of an operation."""
+        statuses = {one.status for one in self.of(label, Kind.USUAL) if not one.invents}
+        return bool(statuses) and statuses <= HELD and not any(one.ok for one in self.of(label))
 
     def lacks(self, operation: Operation) -> bool:
         """Return whether the device answered each usual request as if it did not have the operation.
@@ -264,6 +270,7 @@ class Surveyor:
         for inputs in tried[:4]:
             self.usual.setdefault(operation.label, inputs)
             probe = self.send(operation, Variation(Kind.USUAL, "", "", inputs))
+            self.api.usual_status[operation.label] = probe.status
             if probe.ok and probe.exchange is not None:
                 self.usual[operation.label] = inputs
                 if operation.label not in self.given_up:

@@ -49,6 +49,7 @@ class Evidence:
         skips: reasons why a mandatory case could not be judged.
         errors: reasons why judging was aborted.
         notes: remarks that change no verdict.
+        unseen: what the device's state kept it from showing.
         checks: names of the checks that judged it.
         unclaimed: why it does not apply to a robot for which no classes were named.
         because: the finding of another requirement that prevented the test, or None.
@@ -61,9 +62,15 @@ class Evidence:
     skips: list[str] = field(default_factory=list)
     errors: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    unseen: list[str] = field(default_factory=list)
     checks: set[str] = field(default_factory=set)
     unclaimed: str = ""
     because: Finding | None = None
+
+    @property
+    def is_unseen(self) -> bool:
+        """Return whether the device's state is why nothing was judged."""
+        return bool(self.unseen) and not (self.cases or self.errors or self.because)
 
     @property
     def failures(self) -> int:
@@ -282,6 +289,10 @@ class Judge:
     def note(self, requirement: str, remark: str) -> None:
         """Add a remark that changes no verdict."""
         self._say(requirement, remark, lambda evidence: evidence.notes)
+
+    def not_seen(self, requirement: str, reason: str) -> None:
+        """Record what the device's state kept it from showing; if nothing else is judged, that is the verdict."""
+        self._say(requirement, reason, lambda evidence: evidence.unseen)
 
     def unclaimed(self, requirement: str, reason: str) -> None:
         """Record why a requirement does not apply: no address was given for the interface that it needs."""

@@ -101,8 +101,10 @@ def verdict_of(
         return verdict(Value.NOT_CLAIMED, f"class {requirement.class_} is not claimed")
     if evidence.unclaimed and not evidence.cases:
         return verdict(Value.NOT_CLAIMED, evidence.unclaimed)
-    if Prerequisite.SEEN in requirement.needs and not evidence.cases and not evidence.errors:
-        return verdict(Value.SKIP, NOT_SEEN)
+    unseen = [f"not seen: {one}" for one in evidence.unseen]
+    optional = Prerequisite.SEEN in requirement.needs
+    if evidence.is_unseen or (optional and not evidence.cases and not evidence.errors):
+        return verdict(Value.SKIP, "; ".join(unseen) or NOT_SEEN)
     if evidence.findings:
         first = next(iter(evidence.findings.values()))
         more = f" (and {len(evidence.findings) - 1} more)" if len(evidence.findings) > 1 else ""
@@ -122,7 +124,7 @@ def verdict_of(
     ):
         if reasons:
             return verdict(value, "; ".join(reasons))
-    return verdict(Value.PASS, "; ".join(evidence.notes))
+    return verdict(Value.PASS, "; ".join((*evidence.notes, *unseen)))
 
 
 def score(verdicts: Iterable[Verdict], requirements: Container[str], name: str) -> list[Verdict]:
@@ -165,7 +167,7 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
         item
         for item in verdicts
         if (item.value is Value.ERROR and item.requirement.level is not Level.MAY)
-        or (item.value is Value.SKIP and _holds_back(item.requirement))
+        or (item.value is Value.SKIP and not item.evidence.is_unseen and _holds_back(item.requirement))
     ]
     if unjudged:
         first = unjudged[0]

@@ -27,6 +27,7 @@ class RestInterface:
         waits: how many more deferred reads may be repeated.
         working: requests that the survey of a described API found to be answered 2xx, by operation.
         first: the usual exchange of each of these operations at the beginning of the run.
+        usual_status: status of the survey's last usual request to each operation; 0 without a response.
         streams: operations whose responses do not end.
         slow: operations that once took more than a second to respond.
         stop_device: stops a device with a motion map; None: it has none, or was not moved.
@@ -44,6 +45,7 @@ class RestInterface:
     waits: int = 5
     working: dict[str, Any] = field(default_factory=dict)
     first: dict[str, Exchange] = field(default_factory=dict)
+    usual_status: dict[str, int] = field(default_factory=dict)
     streams: set[str] = field(default_factory=set)
     slow: set[str] = field(default_factory=set)
     stop_device: Callable[[], Any] | None = None

@@ -1,16 +1,31 @@
 """Whether a request was refused, accepted or cut off, by the status of its response."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from http import HTTPStatus
+from typing import Final
 
 from conformance.contract.sizes import LIMIT_OCTETS
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Unanswered
 
 #: By these a server says that it, or one behind it, has failed; 503 says that it cannot now, 501 that it never can.
 CRASHES = frozenset({500, 502, 504})
+#: By these a device says that its present state keeps it from acting, whatever the request contains: a conflict, a
+#: condition, a lock, a rate, no room (RFC 9110 15.5.10, 15.5.13; RFC 4918 11.3, 11.5; RFC 6585 3, 4).
+HELD: Final = frozenset({409, 412, 423, 428, 429, 503, 507})
+# As many operations are named in one sentence; the table of the operations has all.
+_NAMED = 4
 # Statuses that refuse a request for another reason than its content.
 _TRIES = 3
 _NO_REFUSALS = frozenset({401, 405, 406, 408, 429})
+
+
+def held_text(labels: Collection[str], statuses: Collection[int]) -> str:
+    """Return in words that the device's state did not allow some operations."""
+    named, more = list(labels)[:_NAMED], len(labels) - _NAMED
+    whose, were = ("its", "was") if len(labels) == 1 else ("their", "were")
+    others = f" and {more} more operation{'s' if more > 1 else ''}" if more > 0 else ""
+    only = " or ".join(map(str, sorted(statuses)))
+    return f"{', '.join(named)}{others} {were} answered only {only}: {whose} state did not allow it"
 
 
 def is_refusal(exchange: Exchange) -> bool:

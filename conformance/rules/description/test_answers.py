@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache
 from typing import Any
 
@@ -13,9 +13,9 @@ from conformance.documents.field_reading import parts_of
 from conformance.documents.json_schema import Schema, kinds_of, shape_of, validator_of
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, is_json, operations_of
-from conformance.rules.told_once import Fault, told_once, without_numbers
+from conformance.rules.told_once import Fault, held_back, told_once, without_numbers
 from conformance.scenarios.other_exchanges import others
-from conformance.scenarios.rule import Outcome, rule
+from conformance.scenarios.rule import NotSeen, Outcome, rule
 from conformance.scenarios.survey import Probe, Survey, generated_requests, survey
 from conformance.transport.exchange import Response
 from conformance.verdict.run import Run
@@ -84,6 +84,17 @@ def _is_unreadable(probe: Probe) -> bool:
     return bool(request.body and read_json(request.body).unreadable)
 
 
+def _successes_unseen(trace: Survey, run: Run, declares: Callable[[Operation, str], object]) -> Iterator[NotSeen]:
+    """Yield the operations whose success the device's state did not allow, if a success declares what is judged."""
+    held = [
+        operation.label
+        for operation in operations_of(run.contract)
+        if any(key.startswith("2") and declares(operation, key) for key in operation.responses)
+        and trace.held(operation.label)
+    ]
+    yield from held_back(one for label in held for one in trace.of(label, Kind.USUAL) if not one.invents)
+
+
 @rule("description/status-declared", on=_ON)
 def status_declared(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether each status is declared for its operation; a crash is another requirement's affair."""
@@ -123,6 +134,7 @@ def media_type(trace: Survey, run: Run) -> Iterable[Outcome]:
         found = f"status {answer.status} with {answer.media_type or 'no Content-Type'}"
         return Fault(f"{answer.status} {answer.media_type}", found, f"a body as {' or '.join(content)}")
 
+    yield from _successes_unseen(trace, run, lambda operation, key: operation.responses[key])
     yield from told_once((one for one in trace.probes if id(one) in judged), "a declared media type", fault)
 
 
@@ -144,6 +156,7 @@ def body_schema(trace: Survey, run: Run) -> Iterable[Outcome]:
         cause = f"{answer.status} {without_numbers(wrong)}"
         return Fault(cause, f"status {answer.status} with {wrong}") if wrong else None
 
+    yield from _successes_unseen(trace, run, lambda operation, key: any(map(is_json, operation.responses[key])))
     yield from told_once(
         (one for one in trace.probes if id(one) in judged), "JSON that is valid by the declared schema", fault
     )
@@ -163,6 +176,7 @@ def formats(trace: Survey, run: Run) -> Iterable[Outcome]:
         wrong, wanted = _unformatted(schema, answer)
         return Fault(wanted, wrong) if wrong else None
 
+    yield from _successes_unseen(trace, run, lambda operation, key: '"format"' in _text(operation.responses[key]))
     yield from told_once((one for one in trace.probes if id(one) in judged), "strings of the declared format", fault)
 
 
@@ -240,6 +254,7 @@ def headers(trace: Survey, run: Run) -> Iterable[Outcome]:
                 return Fault(f"{name} {wrong}", f"{name}: {value[:80]}, in which {wrong}")
         return None
 
+    yield from _successes_unseen(trace, run, lambda operation, key: operation.headers.get(key))
     yield from told_once((one for one in trace.probes if id(one) in judged), "the declared headers", fault)
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
+from conformance.api.rest.statuses import HELD
 from conformance.api.rest.validity import INVALID, VALID
 from conformance.api.rest.variations import Kind
 from conformance.documents.openapi import operations_of
-from conformance.rules.told_once import Fault, told_once, without_numbers
+from conformance.rules.told_once import Fault, held_back, told_once, without_numbers
 from conformance.scenarios.rule import Outcome, rule
 from conformance.scenarios.survey import Probe, Survey, generated_requests, survey
 from conformance.transport.exchange import Exchange
@@ -54,7 +55,9 @@ def invalid_refused(trace: Survey) -> Iterable[Outcome]:
             cause = f"{probe.operation} {without_numbers(probe.place) if probe.says else _place_in(why)}"
         return Fault(cause, f"status {probe.status}" + (f", although {why}" if why else ""))
 
-    yield from told_once(sure, "status 4xx for a request that the description forbids", fault)
+    yield from held_back(sure)
+    acted = [one for one in sure if one.status not in HELD]
+    yield from told_once(acted, "status 4xx for a request that the description forbids", fault)
 
 
 def _place_in(why: str) -> str:
@@ -85,7 +88,9 @@ def required(trace: Survey) -> Iterable[Outcome]:
     def fault(probe: Probe) -> Fault | None:
         return Fault(f"{probe.operation} {probe.place}", f"status {probe.status}") if probe.ok else None
 
-    yield from told_once(probes, "status 4xx for a request without something that is required", fault)
+    yield from held_back(probes)
+    acted = [one for one in probes if one.status not in HELD]
+    yield from told_once(acted, "status 4xx for a request without something that is required", fault)
 
 
 @rule("description/optional", on=(survey,))
@@ -105,7 +110,9 @@ def optional(trace: Survey) -> Iterable[Outcome]:
             found = f"status {probe.status} without {with_it.place}, and status {with_it.status} with it"
             return Fault(f"{probe.operation} {with_it.place}", found)
 
-        yield from told_once(least[:1], "a request with nothing optional accepted", fault)
+        seen = [] if {one.status for one in least} <= HELD else least
+        yield from told_once(seen[:1], "a request with nothing optional accepted", fault)
+    yield from held_back(one for one in trace.probes if one.kind is Kind.USUAL)
 
 
 @rule("description/enums", on=(survey,))
@@ -133,6 +140,7 @@ def valid_accepted(trace: Survey) -> Iterable[Outcome]:
     # An operation that never accepts anything may need a state; which status it has then, another rule judges.
     works = {one.operation for one in trace.probes if one.ok}
     generated = [one for one in trace.probes if one.kind is Kind.GENERATED and one.operation in works]
+    generated = [one for one in generated if one.status not in HELD]
 
     def fault(probe: Probe) -> Fault | None:
         if probe.status not in _REFUSED or probe.exchange is None:
@@ -140,6 +148,7 @@ def valid_accepted(trace: Survey) -> Iterable[Outcome]:
         return Fault(f"{probe.operation} {probe.status}", _refusal(probe.exchange))
 
     valid = [one for one in generated if one.validity == VALID and not one.invents]
+    yield from held_back(one for one in trace.probes if one.kind is Kind.GENERATED and one.validity == VALID)
     yield from told_once(valid, "a request that the description allows accepted", fault)
 
 
@@ -148,13 +157,14 @@ def _accepted(trace: Survey, kinds: tuple[Kind, ...], expected: str, *, anyway: 
     works = {one.operation for one in trace.probes if one.kind is Kind.USUAL and one.ok}
     sent = [one for one in trace.probes if one.kind in kinds and one.exchange and one.validity != INVALID]
     # Nobody but the device knows which ids and cursors there are.
-    probes = [one for one in sent if (anyway or one.operation in works) and not one.invents]
+    probes = [one for one in sent if (anyway or one.operation in works) and not one.invents and one.status not in HELD]
 
     def fault(probe: Probe) -> Fault | None:
         if probe.status not in _REFUSED:
             return None
         return Fault(f"{probe.operation} {without_numbers(probe.place)}", _refusal(probe.exchange))
 
+    yield from held_back(sent)
     yield from told_once(probes, expected, fault)
 
 

@@ -12,6 +12,7 @@ from conformance.documents.json_schema import shape_of
 from conformance.rules.description import test_answers as answers
 from conformance.rules.description import test_requests as requests
 from conformance.rules.robustness import test_robustness as robustness
+from conformance.scenarios.rule import NotSeen
 from conformance.scenarios.survey import Probe, Survey
 from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
 from conformance.verdict.run import Run
@@ -270,3 +271,40 @@ def test_latency_of_an_operation_that_grows(run):
     trace = Survey((*grows, *steady), (5.0,) * 90, _OK.exchange)
     (found,) = _failed(robustness.steady_latency, trace, run)
     assert found.subject == _LABEL
+
+
+@pytest.mark.parametrize("status", [409, 412, 423, 428, 429, 503, 507])
+@pytest.mark.parametrize(
+    ("rule", "kind"),
+    [
+        (requests.invalid_refused, Kind.INVALID),
+        (requests.required, Kind.MISSING),
+        (requests.examples, Kind.EXAMPLE),
+        (requests.enums, Kind.ENUM),
+        (requests.optional, Kind.USUAL),
+        (answers.headers, Kind.USUAL),
+        (answers.formats, Kind.USUAL),
+    ],
+)
+def test_what_the_state_did_not_allow_is_neither_met_nor_broken(rule, kind, status, run):
+    probes = [_probe(status, kind=one) for one in dict.fromkeys((Kind.USUAL, kind))]
+    said = rule.outcomes(Survey(tuple(probes)), {"run": run}.__getitem__)
+    assert said == [NotSeen(f"GET /a/{{id}} was answered only {status}: its state did not allow it")]
+
+
+def test_a_state_that_changed_during_the_run_hides_nothing(run):
+    probes = [_probe(200), _probe(200, kind=Kind.INVALID), _probe(409, kind=Kind.INVALID), _probe(409, kind=Kind.AGAIN)]
+    found = _failed(requests.invalid_refused, Survey(tuple(probes)), run)
+    assert [one.exchange.response.status for one in found] == [200]
+
+
+def test_operations_that_the_state_did_not_allow_are_told_in_one_sentence(run):
+    labels = [f"POST /{name}" for name in "abcdef"]
+    probes = [_probe(409 if one < "POST /d" else 423, operation=one) for one in labels]
+    said = requests.optional.outcomes(Survey(tuple(probes)), {"run": run}.__getitem__)
+    assert said == [
+        NotSeen(
+            "POST /a, POST /b, POST /c, POST /d and 2 more operations were answered only 409 or 423: "
+            "their state did not allow it"
+        )
+    ]

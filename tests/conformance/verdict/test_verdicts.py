@@ -170,3 +170,19 @@ def test_a_class_whose_effects_nobody_saw_on_ros_is_a_black_box():
 
     assert seen(probe=False) == {"d": "black box", "e": "black box"}
     assert seen(probe=True) == {"d": "seen on ROS", "e": "seen on ROS"}
+
+
+def test_what_the_state_did_not_allow_is_not_tested_and_holds_no_class_back():
+    unseen, seen = _evidence(), _evidence(cases=1)
+    for evidence in (unseen, seen):
+        evidence.unseen.append("POST /start was answered only 409: its state did not allow it")
+    verdicts = [verdict_of(_requirement(name=name), one, _CLAIMS) for name, one in (("a", unseen), ("b", seen))]
+    assert [one.value for one in verdicts] == ["skip", "pass"]
+    assert all(one.reason.startswith("not seen: POST /start") for one in verdicts)
+    assert class_verdicts(verdicts, _CLAIMS)["http"][0] == "pass"
+
+
+def test_a_class_of_which_nothing_was_seen_is_inconclusive():
+    unseen = _evidence()
+    unseen.unseen.append("POST /start was answered only 409: its state did not allow it")
+    assert class_verdicts([verdict_of(_requirement(), unseen, _CLAIMS)], _CLAIMS)["http"][0] == "inconclusive"
