@@ -84,6 +84,9 @@ _FILE = click.Path(exists=True, dir_okay=False)
     default="",
     help="Command that restarts a device that stopped responding, so that the run can go on.",
 )
+@click.option(
+    "--wait", "wait_s", type=_POSITIVE, metavar="S", help="Wait so long for a device that is lost.  [default: 20 or 60]"
+)
 @click.option("--ca-file", type=_FILE, help="Certificate authorities (PEM) to trust for HTTPS instead of the system's.")
 @click.option(
     "--ros-domain-id",
@@ -246,7 +249,7 @@ def _certify(
         raise StatementError(str(error)) from error
     run = _run(chosen, options, contract)
     run.requirement_set, run.given = requirements, given
-    run.restart_command = options["restart_command"]
+    run.restart_command, run.wait_s = options["restart_command"], options["wait_s"]
     run.prepare = door.prepare if door else None  # there is none where the command runs without roaas.py
     notes = (*options.get("remarks", ()), *_notes(run))
     command = command_without_folders(sys.argv[1:], ("--call", "--never"))

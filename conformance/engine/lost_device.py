@@ -26,7 +26,7 @@ from conformance.verdict.run import Run
 _CRASH: Final = "robustness/no-crash"
 _HANG: Final = "robustness/no-hang"
 _SOAP: Final = "soap/answered"
-# How long a lost device is waited for: one that a supervisor restarts, and one that the user's command restarts, s.
+# How long a lost device is waited for by default: one that a supervisor restarts, and one that a command restarts, s.
 _RETURN_S: Final = 20.0
 _RESTART_S: Final = 60.0
 # How many requests look for the smallest one, and for how long, s; and how many requests before it are sent with it.
@@ -92,6 +92,8 @@ class LostDevice:
             self._tell(f"the device stopped responding after {_named(sent[-1])}; waiting for it to come back")
         self._is_back = self._comes_back()
         if not requirement:
+            if not self._is_back:
+                run.aborted = "the robot stopped responding"
             return self._is_back
         run.losses += 1
         found = self._found(sent)
@@ -119,7 +121,7 @@ class LostDevice:
         """Restart the device by the user's command, if there is one; return whether it responds again."""
         command = self._run.restart_command
         if not command:
-            return self._responds(_RETURN_S)
+            return self._responds(self._return_s)
         quiet = subprocess.DEVNULL
         try:
             # The user's own command, which may become the device's process.
@@ -128,10 +130,15 @@ class LostDevice:
             )
         except (OSError, ValueError) as error:
             self._tell(f"--restart-command could not be started: {error}")
-            return self._responds(_RETURN_S)
+            return self._responds(self._return_s)
         # A device that hangs still listens until the command ends it.
         time.sleep(_DYING_S)
-        return self._responds(_RESTART_S)
+        return self._responds(self._return_s)
+
+    @property
+    def _return_s(self) -> float:
+        """How long the device is waited for, s."""
+        return self._run.wait_s or (_RESTART_S if self._run.restart_command else _RETURN_S)
 
     def _found(self, sent: Sequence[Request]) -> _Found:
         """Return the smallest sequence of requests after which the device is lost again."""
@@ -221,8 +228,7 @@ class LostDevice:
             named = ", ".join(map(_named, found.requests[:-1]))
             return f"It does so after {named}, and did it again when these requests were repeated"
         if not self._is_back:
-            waited = _RESTART_S if self._run.restart_command else _RETURN_S
-            return f"The device did not come back within {waited:g} s, so nothing more was sent.{newest}"
+            return f"The device did not come back within {self._return_s:g} s, so nothing more was sent.{newest}"
         return f"The device came back, and did not do it again for the same request.{newest}"
 
 

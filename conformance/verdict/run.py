@@ -57,6 +57,7 @@ class Run:
         interrupted: whether the user interrupted the run.
         losses: how often the device stopped responding.
         restart_command: command that restarts a device that stopped responding, or empty.
+        wait_s: how long a device that stopped responding is waited for, s; None: as the restart command has it.
         refused: how the device refused the run's credentials, so that nothing, or not all, was judged; or empty.
         unreachable: why an interface was not reachable at the start.
         tally: the generated cases of all explorations, and those that time did not allow.
@@ -76,6 +77,7 @@ class Run:
     interrupted: bool = False
     losses: int = 0
     restart_command: str = ""
+    wait_s: float | None = None
     refused: str = ""
     unreachable: dict[Interface, str] = field(default_factory=dict)
     tally: Tally = field(default_factory=Tally)
