@@ -59,7 +59,11 @@ class Permission:
         Args:
             method: HTTP method.
             url: absolute URL with the request target as sent.
+
+        Raises:
+            TimeIsOverError: the time of the run is over.
         """
+        self._run.limit.check()
         if self._run.contract.described:
             # Which operation a message is for, its scenario has decided by the same rules.
             posts = method == "POST" and _place(url) in self._reading

@@ -28,7 +28,7 @@ from conformance.documents.description import DescriptionError
 from conformance.documents.openapi import operations_of
 from conformance.engine.describing import UnreachableError
 from conformance.statement.statement import Statement, StatementError
-from conformance.verdict.effort import EFFORTS, Effort
+from conformance.verdict.effort import DEEP_MINUTES, EFFORTS, Effort
 
 if TYPE_CHECKING:
     from conformance.documents.openapi import Operation
@@ -66,7 +66,7 @@ _FILE = click.Path(exists=True, dir_okay=False)
     "--allow-motion", is_flag=True, help="Allow the suite to move the robot; most of the contract needs that."
 )
 @click.option("--effort", type=click.Choice(EFFORTS), default="standard", help="How many cases to test.")
-@click.option("--minutes", type=click.FloatRange(min=1), default=10.0, help="Approximate duration of --effort deep.")
+@click.option("--minutes", type=_POSITIVE, metavar="M", help="Send requests for about M minutes, the usual ones first.")
 @click.option(
     "--seed",
     type=click.IntRange(min=0),
@@ -263,6 +263,7 @@ def _certify(
 def _run(chosen: Statement, options: dict[str, Any], contract: Contract) -> Run:
     """Return the run that the options describe."""
     from conformance.verdict.run import Run, seed_of_nonce  # noqa: PLC0415 - see _certify
+    from conformance.verdict.time_limit import TimeLimit  # noqa: PLC0415 - as above
 
     known = {name for item in contract.ledger.values() for name in item.classes}
     return Run(
@@ -271,7 +272,8 @@ def _run(chosen: Statement, options: dict[str, Any], contract: Contract) -> Run:
         claims=tuple(name for name in chosen.claimed(contract) if name in known),
         allow_motion=options["allow_motion"],
         seed=options["seed"] if options["nonce"] is None else seed_of_nonce(options["nonce"]),
-        effort=Effort(options["effort"], minutes=options["minutes"]),
+        effort=Effort(options["effort"], minutes=options["minutes"] or DEEP_MINUTES),
+        limit=TimeLimit(options["minutes"]),
     )
 
 

@@ -16,6 +16,7 @@ from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
 from conformance.fleet.fleet_file import TIME_LIMIT_S, FleetError, load_fleet, refuse_same_identity
 from conformance.fleet.member_run import MemberResult, Outcome
+from conformance.verdict.effort import DEEP_MINUTES
 
 PARALLEL = 4
 # Options that hold for each robot of a fleet; what else there is belongs to one robot, and into the file.
@@ -43,7 +44,8 @@ def certify_fleet(path: Path, options: dict[str, Any]) -> CommandResult:
             refuse_same_identity(path, members)
     except (FleetError, ContractError) as error:
         raise click.UsageError(str(error)) from error
-    limit_s = TIME_LIMIT_S + (options["minutes"] * 60 if options["effort"] == "deep" else 0)
+    deep_s = 60 * DEEP_MINUTES if options["effort"] == "deep" else 0
+    limit_s = TIME_LIMIT_S + (60 * options["minutes"] if options["minutes"] else deep_s)
     runs = [
         MemberRun(
             member,

@@ -59,7 +59,7 @@ def print_summary(outcome: Certification) -> None:
                 _print_cause(cause, requirement, outcome.path.parent)
             else:
                 _print_line(cause, requirement)
-    _print_suite_errors(document.get("suite_errors", ()))
+    _print_unjudged(document)
     if "web_server" in document:
         click.echo(f"\nThe web server\n  {inert(document['web_server']['text'])}")
     if document["causes"]:
@@ -80,13 +80,16 @@ def print_summary(outcome: Certification) -> None:
     )
 
 
-def _print_suite_errors(faults: Sequence[Mapping[str, Any]]) -> None:
-    """Print what could not be judged because of an error in the suite."""
+def _print_unjudged(document: Mapping[str, Any]) -> None:
+    """Print what could not be judged because of an error in the suite, and what ``--minutes`` left out."""
+    faults: Sequence[Mapping[str, Any]] = document.get("suite_errors", ())
     if faults:
         count = len({id_ for fault in faults for id_ in fault["requirements"]})
         click.echo(f"\n{count} requirements could not be judged because of an error in the suite:")
     for fault in faults:
         click.echo(f"  {inert(fault['text'])}")
+    if "left_out" in document:
+        click.echo(f"\nNot everything was tried\n  {inert(document['left_out']['text'])}")
 
 
 def _print_unshown(rows: list[dict[str, Any]]) -> None:

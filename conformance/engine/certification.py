@@ -18,7 +18,7 @@ from conformance.engine.interruption import remembered
 from conformance.engine.planning import pytest_options
 from conformance.engine.progress import Progress
 from conformance.engine.resending import look_again, mask
-from conformance.engine.result import RESULT_NAME, result_document, write_result
+from conformance.engine.result import RESULT_NAME, left_out, result_document, write_result
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.scenario import Recordings
 from conformance.scenarios.stored import write_traces
@@ -86,6 +86,7 @@ def certify(
     recordings = Recordings()
     try:
         with remembered(run):
+            run.limit.begin()
             robot.connect(progress)
             reached = robot.reached
             if reached:
@@ -93,6 +94,7 @@ def certify(
                 if progress is not None:
                     progress.writelines(f"{note}\n" for note in (*notes, *announced))
                 run.interrupted |= _run_checks(robot, Progress(robot, progress, bar=bar), remarks, recordings)
+                run.limit.end()
                 if not (run.interrupted or run.aborted):
                     look_again(run, robot.connection, robot.rest)
                     # The last request may have been the one too many.
@@ -110,8 +112,10 @@ def certify(
     if run.refused:
         remarks.insert(0, run.refused)
         robot.refusals.withdraw()
+    robot.note_uncalled()
     remarks += run.remarks
     seen, causes = draw_verdicts(run)
+    remarks += [one["text"] for one in left_out(robot).values()]
     mask((cause.finding for cause in causes), robot.connection.credentials)
     if run.requirement_set is not None and run.scored is not None:
         seen = score(seen, run.scored, f"requirement set {run.requirement_set.name}")
@@ -119,7 +123,7 @@ def certify(
     # A baseline makes a run green, not a robot conformant: the classes fail all the same.
     classes, accepted = (withheld(_deciding(one, run.claims, run.beside), run.refused) for one in (seen, verdicts))
     failed = overall(classes) is Overall.NOT_CONFORMANT
-    if not run.enough:
+    if not run.enough and run.less:
         remarks.append(f"Nothing can be said of a robot {run.less}: the verdict is inconclusive unless it failed.")
     document = result_document(
         robot,

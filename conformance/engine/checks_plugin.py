@@ -29,7 +29,7 @@ from conformance.verdict.run import Run
 
 _NO_ADDRESS = "the robot's {} interface has no address"
 _Interface = TypeVar("_Interface")
-# On a check that is skipped because an earlier check has failed for what it met.
+# On a check whose reason to be skipped is recorded already, such as an earlier check that failed for what it met.
 _TOLD_BEFORE: pytest.StashKey[bool] = pytest.StashKey()
 
 
@@ -141,6 +141,11 @@ class ChecksPlugin:
             raise KeyboardInterrupt
         if run.aborted and not self._is_recorded(item):
             pytest.skip(run.aborted)
+        if not self._is_recorded(item) and run.limit.over:
+            item.stash[_TOLD_BEFORE] = True
+            for id_ in self.ids_of(item):
+                run.out_of_time(id_)
+            pytest.skip(run.limit.reason)
         if item.get_closest_marker("motion") and not run.allow_motion:
             pytest.skip("it moves the robot, and --allow-motion was not given")
         for mark in item.iter_markers("needs"):
@@ -176,7 +181,8 @@ class ChecksPlugin:
         judge = robot.run.judge
         judged = judge.counts(ids)
         try:
-            result: object = yield
+            with robot.run.limit.lifted(when=item.get_closest_marker("motion") is not None):
+                result: object = yield
         except Exception as error:  # noqa: BLE001 - whatever a robot makes of a check has to become a verdict
             record_exception(robot.run, robot.alive, ids, judged, error)
             result = None
@@ -222,6 +228,8 @@ class ChecksPlugin:
 
     def pytest_sessionfinish(self) -> None:
         """Stop the robot at the end of the session, also after Ctrl-C."""
+        if self._connected is not None:
+            self._connected.run.limit.end()
         if self._connected is not None and self._connected.rest is not None:
             from conformance.api.rest.stops import send_stops  # noqa: PLC0415 - see pytest_collect_file()
 

@@ -8,6 +8,7 @@ from conformance.transport.exchange import NoAnswerError, NotPermittedError
 from conformance.verdict.evidence import HarnessError, RefutedError
 from conformance.verdict.finding import Finding
 from conformance.verdict.run import Run
+from conformance.verdict.time_limit import TimeIsOverError
 
 
 def record_exception(
@@ -19,6 +20,10 @@ def record_exception(
     check.
     """
     if isinstance(error, RefutedError):
+        return
+    if isinstance(error, TimeIsOverError):
+        for id_ in ids:
+            run.out_of_time(id_)
         return
     # A description may be such that no valid request can be made from it.
     unmade = isinstance(error, HarnessError) and run.contract.described

@@ -12,6 +12,7 @@ from msgspec import to_builtins
 from conformance.commandline.atomic_write import write_atomically
 from conformance.commandline.without_folders import without_folders
 from conformance.contract.interfaces import Interface
+from conformance.documents.openapi import operations_of
 from conformance.engine.resending import written
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.engine.suite import contract_digests, installed, suite_digest, suite_version
@@ -106,6 +107,7 @@ def result_document(
         "contract_sections": {anchor: section._asdict() for anchor, section in run.contract.cited_sections.items()},
         "notes": notes,
         **_faults(run),
+        **left_out(robot),
         **_api(robot, causes),
         **_beside(robot, aside),
     }
@@ -115,6 +117,29 @@ def _faults(run: Run) -> dict[str, Any]:
     """Return what could not be judged because of an error in the suite, under its key; empty if there was none."""
     faults = [{"text": text, "requirements": sorted(ids)} for text, ids in run.judge.faults.items()]
     return {"suite_errors": faults} if faults else {}
+
+
+def left_out(robot: RobotUnderTest) -> dict[str, Any]:
+    """Return what ``--minutes`` left out, under its key; empty if nothing."""
+    run, limit = robot.run, robot.run.limit
+    if not limit.is_struck:
+        return {}
+    unjudged = [
+        id_
+        for id_, evidence in run.judge.evidence.items()
+        if limit.reason in {*evidence.notes, *evidence.unseen}
+        and not evidence.cases
+        and run.contract.ledger[id_].binds(run.claims)
+    ]
+    return {
+        "left_out": {
+            "minutes": limit.minutes,
+            "text": limit.left_out(len(operations_of(run.contract)), unjudged),
+            "operations": list(limit.uncalled),
+            "fewer": limit.fewer,
+            "requirements": unjudged,
+        }
+    }
 
 
 def _beside(robot: RobotUnderTest, aside: list[Verdict]) -> dict[str, Any]:

@@ -205,8 +205,11 @@ class RobotUnderTest:
         """Return whether the run can go on: the device responds, or does so again after it was lost."""
         if self.run.aborted:
             return False
-        if self._responds(self._grace_s):
-            return True
+        with self.run.limit.lifted():
+            return self._responds(self._grace_s) or self._comes_back()
+
+    def _comes_back(self) -> bool:
+        """Return whether a device that was lost is back, after recording the loss."""
         lost = LostDevice(self.run, self.connection, self._responds, self._operation_of, self._tell)
         goes_on = lost.handle(tuple(self.connection.recent))
         self.connection.recent.clear()
@@ -214,6 +217,11 @@ class RobotUnderTest:
             client.close()
             client.forget_hangs()
         return goes_on
+
+    def note_uncalled(self) -> None:
+        """Keep which operations were not called for want of time."""
+        if self.run.limit.is_struck and self.log and self.rest:
+            self.run.limit.uncalled = tuple(self.log.uncalled(self.rest.call_rules))
 
     @property
     def _grace_s(self) -> float:

@@ -49,7 +49,10 @@ def lifecycles(api: RestInterface, values: Values) -> tuple[Life, ...]:
     for create in operations.values():
         readers = [item for item in operations.values() if item.method == "GET" and _is_item_of(item, create)]
         if create.method == "POST" and readers:
-            life = _live(api, values, create, readers[0], operations.get(f"DELETE {readers[0].template}"), held)
+            api.run.limit.check()
+            # What was created is deleted.
+            with api.run.limit.lifted():
+                life = _live(api, values, create, readers[0], operations.get(f"DELETE {readers[0].template}"), held)
             lives += [life] if life is not None else []
     if held and not lives:
         raise NotSeenError(held_text(held, set(held.values())))

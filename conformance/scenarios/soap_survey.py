@@ -1,4 +1,7 @@
-"""Call each operation of a WSDL that may be called: rightly, with one thing wrong, and rightly again."""
+"""Call each operation of a WSDL that may be called: rightly, with one thing wrong, and rightly again.
+
+Over 300 lines because the caller, its probes and the messages that it sends are one survey.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +26,10 @@ from conformance.documents.xsd_shapes import Element
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of, values_in
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.scenarios.survey import SURVEY_SHARE
 from conformance.transport.exchange import Exchange, NoAnswerError, Unanswered
 from conformance.verdict.run import Run
+from conformance.verdict.time_limit import TimeIsOverError
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -147,13 +152,15 @@ class _Caller:
         """Send octets to a port.
 
         Raises:
-            PartialTraceError: the device does not respond any more.
+            PartialTraceError: the device does not respond any more, or the time is over.
         """
         path, fields = target_of(port), fields_of(port, operation)
         probe = SoapProbe(label_of(port, operation), kind, says, port.envelope, operation.response)
         losses = self.api.run.losses
         try:
             probe = replace(probe, exchange=self.api.client.send("POST", path, headers=fields, body=octets))
+        except TimeIsOverError as none:
+            raise PartialTraceError(tuple(self.probes)) from none
         except NoAnswerError as none:
             goes_on = self.api.alive()
             probe = replace(probe, unanswered=none.unanswered)
@@ -186,37 +193,46 @@ def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
         raise NotPossibleError("the device has no WSDL")
     found, caller = messages.found, _Caller(api, messages)
     described = {item.label: api.call_rules.decide(item) for item in operations_of(api.run.contract)}
+    steps: dict[str, Iterator[None]] = {}
     # What one operation answers, another asks for: those that ask for nothing that must be known come first.
     for port, operation in sorted(each(found.ports), key=lambda one: caller.asks(one[1])):
         rule = described[label_of(port, operation)]
         why = operation.remark or ("" if rule.may else str(rule))
         why = why or ("" if port.url.startswith(base_of(found)) else f"its port is at another server, {port.url}")
-        try:
-            if not why:
-                _explore(caller, port, operation)
-        except NotPossibleError as error:
-            why = str(error)
         if why:
             caller.left_out.append((label_of(port, operation), why))
+        else:
+            steps[label_of(port, operation)] = _explore(caller, port, operation)
+    api.run.limit.in_turns(steps, SURVEY_SHARE)
     if not caller.probes:
         told = "; ".join(f"{label.rpartition('/')[2]}: {why}" for label, why in caller.left_out)
         raise NotPossibleError(f"no operation could be called. {told or 'The WSDL describes none'}")
     return tuple(caller.probes)
 
 
-def _explore(caller: _Caller, port: SoapPort, operation: SoapOperation) -> None:
-    """Send the messages of one operation."""
+def _explore(caller: _Caller, port: SoapPort, operation: SoapOperation) -> Iterator[None]:
+    """Send the messages of one operation; yield after the usual one and after each group of others."""
+    try:
+        yield from _groups(caller, port, operation)
+    except NotPossibleError as error:
+        caller.left_out.append((label_of(port, operation), str(error)))
+
+
+def _groups(caller: _Caller, port: SoapPort, operation: SoapOperation) -> Iterator[None]:
     declared, node, kind = _usual(caller, port, operation)
+    yield
     effort = caller.api.run.effort
     for _ in range(0 if effort.name == "quick" else _USUAL - 1):
         if label_of(port, operation) not in caller.lost:
             message = caller.messages.message(port, operation, node)
             caller.send(port, operation, kind, "a valid message", message)
+    yield
     until = time.monotonic() + _BUDGET_S
     invalid = list(_invalid(caller.messages.found, declared, node)) if declared and node else []
     for says, wrong in effort.draw(invalid, _MOST, f"{caller.api.run.seed}/{label_of(port, operation)}"):
         if time.monotonic() < until and label_of(port, operation) not in caller.lost:
             caller.send(port, operation, Kind.INVALID, says, caller.messages.message(port, operation, wrong))
+    yield
     for kind, says, octets in _odd(caller, port, operation, node):
         if time.monotonic() < until and label_of(port, operation) not in caller.lost:
             caller.send(port, operation, kind, says, octets)

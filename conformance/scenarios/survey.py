@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -38,6 +38,7 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, NotPermittedError, Unanswered
 from conformance.verdict.effort import Effort
 from conformance.verdict.explorer import Explorer
+from conformance.verdict.time_limit import TimeIsOverError
 
 # At standard effort, of one operation: valid, invalid and odd requests; and at least so many of each at quick.
 _MOST: Final = {"valid": 60, "invalid": 60, "odd": 40}
@@ -65,6 +66,10 @@ _COVERAGE: Final = 150
 # As many times an exploration's time one operation may take: one that answers slowly must not take the whole run.
 _BUDGETS: Final = 3
 _FUZZED: Final = 40
+# With a limit in time: the survey's others than the usual requests end at the first share of it, so that what every web
+# API is bound by is tried; the generated requests end at the second.
+SURVEY_SHARE: Final = 0.5
+_GENERATED_SHARE: Final = 0.85
 
 
 @dataclass(frozen=True)
@@ -182,6 +187,11 @@ class Surveyor:
     given_up: set[str] = field(default_factory=set)
     elsewhere: dict[str, Exchange] = field(default_factory=dict)
 
+    @property
+    def trace(self) -> Survey:
+        """What was recorded so far."""
+        return Survey(tuple(self.probes), elsewhere=self.elsewhere)
+
     def send(self, operation: Operation, variation: Variation, request: GeneratedRequest | None = None) -> Probe:
         """Send one request and record it.
 
@@ -194,8 +204,8 @@ class Surveyor:
             # A device may treat the first request on a connection in another way than those after it.
             fresh = variation.kind is Kind.USUAL or len(self.probes) % _FRESH == 0
             exchange = self._recorded(request, fresh=fresh)
-        except NotPossibleError as refused:
-            raise PartialTraceError(Survey(tuple(self.probes))) from refused
+        except (NotPossibleError, TimeIsOverError) as refused:
+            raise PartialTraceError(self.trace) from refused
         except NoAnswerError as none:
             if none.kind in {NoAnswer.TIMEOUT, NoAnswer.CIRCUIT_OPEN}:
                 self.given_up.add(operation.label)
@@ -209,7 +219,7 @@ class Surveyor:
                 self.given_up.add(operation.label)
                 self.api.streams.add(operation.label)
             if not goes_on:
-                raise PartialTraceError(Survey(tuple(self.probes))) from none
+                raise PartialTraceError(self.trace) from none
             return probe
         self.record(replace(probe, exchange=exchange))
         if exchange.response.cut:
@@ -261,7 +271,7 @@ class Surveyor:
             return
         path = f"{operation.template.partition('{')[0].rstrip('/').rpartition('/')[0]}/{UNKNOWN}"
         path = f"{path}/{UNKNOWN}" if known_path(self.api.run.contract, path) else path
-        with suppress(NoAnswerError):
+        with self.api.run.limit.lifted(), suppress(NoAnswerError):
             self.elsewhere[operation.label] = self.api.client.send("GET", path)
 
     def begin(self, operation: Operation) -> None:
@@ -294,7 +304,23 @@ class Surveyor:
             self.api.working[operation.label] = Call(operation, texts)
             self.api.first.setdefault(operation.label, exchange)
 
-    def vary(self, operation: Operation, effort: Effort, seed: int) -> None:
+    def explore(self, operation: Operation) -> Iterator[None]:
+        """Send the usual request of an operation, and others group by group; yield after each group."""
+        run = self.api.run
+        try:
+            self.begin(operation)
+            if run.limit.bounded:
+                self.look_elsewhere(operation)
+            yield
+            if operation.label not in self.given_up:
+                yield from self.vary(operation, run.effort, run.seed)
+        except (NoAnswerError, NotPossibleError, NotPermittedError, PartialTraceError):
+            raise
+        except Exception as error:  # noqa: BLE001 - one schema that cannot be read leaves the others to be judged
+            run.judge.fault(operation.label, error)
+            self.given_up.add(operation.label)
+
+    def vary(self, operation: Operation, effort: Effort, seed: int) -> Iterator[None]:
         """Send requests that differ from the usual one in one thing, and then the usual one again."""
         usual = self.usual[operation.label]
         valid = list(valid_variations(operation, usual, self.values))
@@ -305,12 +331,16 @@ class Surveyor:
             "invalid": list(invalid_variations(operation, usual)),
             "odd": list(odd_variations(operation, usual)),
         }
-        until = time.monotonic() + _BUDGETS * effort.budget_s
-        self._time(operation, usual, effort, until)
+        left = _BUDGETS * effort.budget_s
+        self._time(operation, usual, effort, time.monotonic() + left)
         for name, variations in groups.items():
+            began = time.monotonic()
+            until = began + left
             standard = max(_MOST[name], round(_LEAST[name] / effort.factor))
             standard //= _SLOW_SHARE if operation.label in self.api.slow else 1
-            for one in effort.draw(variations, standard, f"{seed}/{name} {operation.label}"):
+            drawn = effort.draw(variations, standard, f"{seed}/{name} {operation.label}")
+            self.api.run.tally.planned += len(drawn)
+            for one in drawn:
                 if operation.label in self.given_up:
                     return
                 if time.monotonic() > until:
@@ -318,6 +348,8 @@ class Surveyor:
                 else:
                     self.send(operation, one)
             self._time(operation, usual, effort, until)
+            left -= time.monotonic() - began
+            yield
         self.send(operation, Variation(Kind.AGAIN, "", "", usual))
 
     def create_and_delete(self, operations: Sequence[Operation]) -> None:
@@ -363,18 +395,13 @@ def survey(api: RestInterface, values: Values) -> Survey:
         raise NotPossibleError("no operation of the description may be called")
     surveyor = Surveyor(api, values)
     api.values = values
-    for operation in sorted(operations, key=order_of):
-        try:
-            surveyor.begin(operation)
-            if operation.label not in surveyor.given_up:
-                surveyor.vary(operation, run.effort, run.seed)
-        except (NoAnswerError, NotPossibleError, NotPermittedError, PartialTraceError):
-            raise
-        except Exception as error:  # noqa: BLE001 - one schema that cannot be read leaves the others to be judged
-            run.judge.fault(operation.label, error)
-            surveyor.given_up.add(operation.label)
-    surveyor.create_and_delete(operations)
-    for operation in operations:
+    steps = {operation.label: surveyor.explore(operation) for operation in sorted(operations, key=order_of)}
+    # What DELETE deletes, the others still need.
+    behind = {operation.label for operation in operations if operation.method == "DELETE"}
+    is_complete = run.limit.in_turns(steps, SURVEY_SHARE, behind)
+    if is_complete:
+        surveyor.create_and_delete(operations)
+    for operation in operations if is_complete else ():
         if operation.method == "GET" and operation.parameter("path") and operation.label not in surveyor.given_up:
             # What was created meanwhile has an id now.
             surveyor.begin(operation)
@@ -396,6 +423,8 @@ def _repeated(surveyor: Surveyor, operations: list[Operation]) -> Survey:
         operation = next(item for item in operations if item.label == label)
         request = written(operation, surveyor.usual[label])
         for _ in range(max(_FEWEST_REPEATS, surveyor.api.run.effort.cases(_REPEATS))):
+            if surveyor.api.run.limit.is_past(SURVEY_SHARE):
+                break
             try:
                 last = request.send(surveyor.api)
             except NoAnswerError as none:
@@ -428,10 +457,18 @@ def generated_requests(api: RestInterface, values: Values, explore: Explorer) ->
         operation = operations.get(target.label)
         if operation is None:
             continue
+        if run.limit.is_past(_GENERATED_SHARE):
+            run.limit.shortened.add(target.label)
+            continue
         cases = list(target.covering())
         until = time.monotonic() + _BUDGETS * run.effort.budget_s
         count = _COVERAGE // (_SLOW_SHARE if operation.label in api.slow else 1)
-        for case in run.effort.draw(cases, count, f"{run.seed}/coverage {target.label}"):
+        drawn = run.effort.draw(cases, count, f"{run.seed}/coverage {target.label}")
+        run.tally.planned += len(drawn)
+        for case in drawn:
+            if run.limit.is_past(_GENERATED_SHARE):
+                run.limit.shortened.add(target.label)
+                break
             if time.monotonic() > until:
                 surveyor.cut_short(f"generated requests of {target.label}")
                 continue
@@ -452,6 +489,10 @@ def _send_case(surveyor: Surveyor, operation: Operation, case: Any) -> None:
 
     request, headers = as_request(case), own_headers(case)
     if request is None or headers is None or operation.label in surveyor.given_up:
+        return
+    limit = surveyor.api.run.limit
+    if limit.is_past(_GENERATED_SHARE):
+        limit.shortened.add(operation.label)
         return
     # A method that the description does not have may act on the device.
     if request.method not in {operation.method, "OPTIONS"}:

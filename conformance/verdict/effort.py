@@ -11,6 +11,8 @@ from typing import TypeVar
 
 _Item = TypeVar("_Item")
 EFFORTS = ("quick", "standard", "deep")
+#: Approximate duration of a deep run that names none, min.
+DEEP_MINUTES = 10.0
 _FACTORS = {"quick": 0.1, "standard": 1.0}
 _BUDGETS_S = {"quick": 2.0, "standard": 10.0}
 _FEWEST = 3
@@ -98,7 +100,7 @@ class Effort:
 
     name: str = "standard"
     usual_ms: float = 1.0
-    minutes: float = 10.0
+    minutes: float = DEEP_MINUTES
     speed: Speed = SPEEDS[0]
 
     def seen(self, usual_ms: float, shortest_ms: float | None = None) -> Effort:

@@ -19,6 +19,7 @@ from hypothesis.stateful import RuleBasedStateMachine, run_state_machine_as_test
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.effort import Tally
 from conformance.verdict.evidence import RefutedError
+from conformance.verdict.time_limit import TimeIsOverError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,10 +65,11 @@ class Explorer:
 
         Raises:
             NoAnswerError: the robot did not respond.
+            TimeIsOverError: the time of the run is over.
         """
         until = time.monotonic() + self._effort.longest_s
         self._tally.planned += self._effort.cases(cases)
-        silence: list[NoAnswerError] = []
+        silence: list[NoAnswerError | TimeIsOverError] = []
         refuted: list[bool] = []
 
         def bounded(value: Any) -> None:
@@ -80,7 +82,7 @@ class Explorer:
                 return
             try:
                 try_case(value)
-            except NoAnswerError as none:
+            except (NoAnswerError, TimeIsOverError) as none:
                 silence.append(none)
             except RefutedError:
                 refuted.append(True)

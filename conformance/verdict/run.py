@@ -11,6 +11,7 @@ from conformance.contract.requirement_sets import RequirementSet
 from conformance.statement.statement import Statement, empty_statement
 from conformance.verdict.effort import Effort, Tally
 from conformance.verdict.evidence import Judge
+from conformance.verdict.time_limit import TimeLimit
 
 # Less than this much was left out for want of time: a verdict says so in the notes, and not in its first line.
 _NEXT_TO_ALL = 0.99
@@ -61,6 +62,7 @@ class Run:
         refused: how the device refused the run's credentials, so that nothing, or not all, was judged; or empty.
         unreachable: why an interface was not reachable at the start.
         tally: the generated cases of all explorations, and those that time did not allow.
+        limit: the time that the run may take, and what it left out.
         prepare: loads what is needed after the run; called while a check waits for the robot.
     """
 
@@ -81,10 +83,16 @@ class Run:
     refused: str = ""
     unreachable: dict[Interface, str] = field(default_factory=dict)
     tally: Tally = field(default_factory=Tally)
+    limit: TimeLimit = field(default_factory=TimeLimit)
     prepare: Callable[[], object] | None = None
 
     def __post_init__(self) -> None:
         self.judge = Judge(self.contract.ledger)
+
+    def out_of_time(self, requirement: str) -> None:
+        """Record that the time was over before a case of a requirement was tried."""
+        say = self.judge.not_seen if self.contract.described else self.judge.note
+        say(requirement, self.limit.reason)
 
     @property
     def scored(self) -> frozenset[str] | None:
@@ -119,9 +127,10 @@ class Run:
         """Whether so many cases were tried that a verdict can rest on them.
 
         An exploration has up to 100 cases, and at least three. A fault that every fifth value shows is missed by three
-        cases more often than not (0.8 ** 3 = 0.51), and found by four.
+        cases more often than not (0.8 ** 3 = 0.51), and found by four. Nothing rests on operations that were not called
+        for want of time.
         """
-        return self.share >= _FEWEST_SHARE
+        return self.share >= _FEWEST_SHARE and not self.limit.uncalled
 
     @property
     def remarks(self) -> tuple[str, ...]:

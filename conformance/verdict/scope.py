@@ -37,6 +37,7 @@ def verdict_line(run: Run, value: Overall, verdicts: Iterable[Verdict]) -> str:
         return "inconclusive, because the device refused the credentials"
     if run.contract.described:
         said = _OF_DESCRIBED[value]
+        said = f"{said}, as far as --minutes {run.limit.minutes:g} allowed" if run.limit.is_struck else said
         return f"{said}, {run.less}" if run.less else said
     contract = f" (contract {run.contract.label})" if run.contract.label else ""
     said = f"{_WORDS[value]} {claimed(run.contract, run.claims)}{contract}, {view_of(verdicts)}"

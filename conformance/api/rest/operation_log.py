@@ -145,6 +145,11 @@ class OperationLog(Listener):
         own = resource.operations.get("GET" if request.method == "HEAD" else request.method)
         return {own.label} if own else {item.label for item in resource.operations.values()}
 
+    def uncalled(self, rules: CallRules) -> list[str]:
+        """Return the labels of the operations that may be called and were sent nothing."""
+        operations = operations_of(self._contract)
+        return [one.label for one in operations if rules.decide(one).may and not self._records[one.label].sent]
+
     def _has_sent(self, operation: Operation, name: str) -> bool:
         return bool({name, name.lower()} & self._records[operation.label].parameters)
 

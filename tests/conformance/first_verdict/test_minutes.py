@@ -1,0 +1,65 @@
+"""``--minutes`` bounds a run; what it left out is named, and is neither passed nor an error."""
+
+import asyncio
+import time
+from pathlib import Path
+
+from aiohttp import web
+from small_device import answers, certified, constant, described, reading, small_device
+
+_COUNT = 60
+_MINUTES = 0.1
+_SCHEMA = {"type": "object", "required": ["value"], "properties": {"value": {"type": "integer"}}}
+
+
+async def _slow(_: web.Request) -> web.Response:
+    await asyncio.sleep(0.06)
+    return web.json_response({"value": 1})
+
+
+def test_many_slow_operations_are_each_called_before_any_is_varied(tmp_path: Path) -> None:
+    paths = {f"/value{number}": reading(_SCHEMA) for number in range(_COUNT)}
+    routes = {path: {"GET": _slow} for path in paths}
+    with small_device(described(paths), routes) as url:
+        began = time.monotonic()
+        done = certified(url, tmp_path, "--minutes", _MINUTES, effort="standard")
+        took_s = time.monotonic() - began
+    # Starting the command takes time as well.
+    assert took_s < 60 * _MINUTES + 10 + 5
+    left = done.result["left_out"]
+    assert left["operations"] == []
+    assert len(left["fewer"]) == _COUNT
+    verdicts = {one["id"]: one["verdict"] for one in done.result["requirements"]}
+    assert left["requirements"]
+    assert {verdicts[id_] for id_ in left["requirements"] if id_ in verdicts} == {"skip"}
+    assert done.blamed == {}
+    assert "suite_errors" not in done.result
+    for text in (done.text, (tmp_path / "certificate.html").read_text(), (tmp_path / "certificate.md").read_text()):
+        assert f"--minutes {_MINUTES}: {_COUNT} operations got fewer requests" in text
+
+
+def test_operations_that_were_not_called_are_named(tmp_path: Path) -> None:
+    paths = {f"/value{number}": reading(_SCHEMA) for number in range(200)}
+    routes = {path: {"GET": _slow} for path in paths}
+    with small_device(described(paths), routes) as url:
+        done = certified(url, tmp_path, "--minutes", _MINUTES)
+    left = done.result["left_out"]
+    assert 50 < len(left["operations"]) < 150
+    assert f"--minutes {_MINUTES}: {len(left['operations'])} of 200 operations were not called: GET /value" in done.text
+    assert done.exit_code == 4
+    assert done.blamed == {}
+
+
+def test_a_run_within_its_time_leaves_nothing_out_and_finds_the_same(tmp_path: Path) -> None:
+    paths = {
+        "/good": reading(_SCHEMA),
+        "/bad": reading({"type": "object", "required": ["missing"]}),
+        "/text": {"get": {"responses": {"200": answers({"type": "string"})}}},
+    }
+    routes = {"/good": constant({"value": 1}), "/bad": constant({}), "/text": constant("a")}
+    with small_device(described(paths), routes) as url:
+        free = certified(url, tmp_path / "free")
+        bounded = certified(url, tmp_path / "bounded", "--minutes", 5)
+    assert "left_out" not in bounded.result
+    assert bounded.exit_code == free.exit_code == 1
+    assert bounded.blamed == free.blamed
