@@ -17,7 +17,7 @@ pytestmark = pytest.mark.needs("rest")
 # How long a robot may take to refuse octets that are no request before it counts as waiting for more of them, s.
 _THINK_S = 3.0
 _IN_ALL = 56
-_LENGTHS = "web-server/content-length-conflict"
+_HOST, _LENGTHS, _FORM = "web-server/host-invalid", "web-server/content-length-conflict", "web-server/target-form"
 _GARBAGE = (
     b"ROBOT\r\n\r\n",
     b"\x00\x01\x02\x03\xff\xfe\r\n\r\n",
@@ -92,11 +92,30 @@ def test_fields_that_have_to_be_refused(api: RestInterface, rest: HttpClient, ju
         (_LENGTHS, True, raw.head(rest, "GET", path, "Content-Length: 5", "Content-Length: 0")),
     ):
         judge.at_risk = (id_,)
-        attempt, came = _ask_by_hand(api, octets)
-        if not came.octets and not came.closed:
-            # A response may be held up by the network for longer than a robot may take.
-            attempt, came = _ask_by_hand(api, octets, api.client.connection.timeout_s)
-        expect(judge, id_, attempt).status(400, closed=closing)
+        expect(judge, id_, _ask_patiently(api, octets)).status(400, closed=closing)
+
+
+@pytest.mark.phase("input")
+@pytest.mark.requirement(_HOST)
+def test_hosts_that_are_none(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
+    """Send Host values with a slash and with a space, which no host has; the robot must reject them (RFC 9112 3.2)."""
+    judge.at_risk = (_HOST,)
+    path = _first(api).path
+    for host in (f"{rest.authority}/x", f"{rest.authority} x"):
+        attempt = _ask_patiently(api, raw.head(rest, "GET", path, f"Host: {host}", host=False))
+        expect(judge, _HOST, attempt).status(400, when=f"Host is {host!r}")
+
+
+@pytest.mark.phase("input")
+@pytest.mark.requirement(_FORM)
+def test_targets_of_another_methods_form(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
+    """Send GET with the targets of CONNECT and OPTIONS, and with a relative path (RFC 9112 3, 3.2.3, 3.2.4)."""
+    judge.at_risk = (_FORM,)
+    line, fields = raw.head(rest, "GET", _first(api).path).split(b"\r\n", 1)
+    relative = line.split(b" ")[1].removeprefix(b"/")
+    for target in (rest.authority.encode(), b"*", *([relative] if relative else ())):
+        attempt = _ask_patiently(api, b"GET %b HTTP/1.1\r\n%b" % (target, fields))
+        expect(judge, _FORM, attempt).status("4xx", "3xx", 501, 505, closed=True)
 
 
 @pytest.mark.phase("input")
@@ -108,6 +127,14 @@ def test_octets_that_are_no_request(api: RestInterface, judge: Judge) -> None:
         attempt, _ = _ask_by_hand(api, octets)
         expect(judge, "web-server/malformed-request", attempt).status("4xx", 505, closed=True)
     _first(api).send(api)
+
+
+def _ask_patiently(api: RestInterface, octets: bytes) -> Attempt:
+    """Send bytes as `_ask_by_hand` does, twice where the network may hold a response up for longer than a robot may."""
+    attempt, came = _ask_by_hand(api, octets)
+    if not came.octets and not came.closed:
+        attempt, _ = _ask_by_hand(api, octets, api.client.connection.timeout_s)
+    return attempt
 
 
 def _ask_by_hand(api: RestInterface, octets: bytes, most_s: float = _THINK_S) -> tuple[Attempt, raw.RawAnswer]:
