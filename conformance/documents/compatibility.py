@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 from urllib.parse import urlsplit
 
 from conformance.documents.json_schema import Schema
-from conformance.documents.openapi import METHODS
+from conformance.documents.openapi import methods_of
 from conformance.documents.operation_compatibility import Described, Documents, Found, operation_changes
 from conformance.documents.resources import PARAMETER
 from conformance.documents.security_compatibility import security_changes
@@ -90,7 +90,7 @@ def _operations(document: Schema, section: str) -> dict[_Key, Described]:
         if not isinstance(given, dict):
             raise TypeError(f"the path {path} has no object")
         item = whole.followed(given)
-        for method, operation in _methods(item):
+        for method, operation in methods_of(item).items():
             servers = operation.get("servers") or item.get("servers") or document.get("servers")
             bases = [_base(server) for server in servers or [Schema()]] if section == "paths" else [""]
             for base in bases:
@@ -105,14 +105,8 @@ def _callbacks(described: Described) -> dict[_Key, Described]:
         for expression, given in described.followed(callback).items()
         if not str(expression).startswith("x-")
         for item in (described.followed(given),)
-        for method, operation in _methods(item)
+        for method, operation in methods_of(item).items()
     }
-
-
-def _methods(item: Schema) -> Iterator[tuple[str, Any]]:
-    """Yield the operations of a path item by method; the last two are OpenAPI 3.2's."""
-    yield from ((method.upper(), item[method]) for method in (*METHODS, "query") if method in item)
-    yield from item.get("additionalOperations", {}).items()
 
 
 def _base(server: Schema) -> str:

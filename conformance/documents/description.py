@@ -13,14 +13,14 @@ from urllib.parse import urljoin, urlsplit
 
 from conformance.contract.document_text import parsed
 from conformance.documents.description_faults import unresolved
-from conformance.documents.json_schema import Schema, UnresolvedError, pointed
+from conformance.documents.json_schema import Schema, UnresolvedError
 from conformance.documents.overlay import OverlayError, overlaid
 from conformance.documents.schema_places import DATA, FILES, make_plain
+from conformance.documents.schema_words import in_one_version
+from conformance.documents.sent_parameters import not_called, with_sent
 from conformance.documents.swagger import as_openapi_3
 
 _MOST_FILES: Final = 5_000
-# Other keywords of OpenAPI 3 describe these, so header parameters of these names are ignored (OpenAPI 3.1, 4.8.12.2).
-_IGNORED: Final = frozenset({"accept", "content-type", "authorization"})
 _VARIABLE: Final = re.compile(r"\{([^{}]+)\}")
 # Returns the content of a URL or file.
 Load = Callable[[str], bytes]
@@ -40,7 +40,8 @@ class Description:
         original: as it was read.
         base_url: absolute URL below which the operations are; empty if the description does not say it.
         unresolved: each reference to another file that leads nowhere, with the reason.
-        remarks: what a reader of the result should know about it.
+        remarks: what a reader of the result should know about its server.
+        not_called: each operation that the suite cannot call, with the reason.
     """
 
     source: str
@@ -49,6 +50,7 @@ class Description:
     base_url: str
     unresolved: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+    not_called: tuple[str, ...] = ()
 
 
 def read_description(source: str, load: Load, overlays: Iterable[str] = ()) -> Description:
@@ -89,9 +91,12 @@ def _description(source: str, load: Load, overlays: Iterable[str]) -> Descriptio
         raise DescriptionError(f"{source} describes no operation: it has no 'paths'")
     broken = unresolved(document)
     document = _without(document, frozenset(broken)) if broken else document
-    document = document if version.startswith("2.") else _without_ignored(document, document)
+    uncalled: tuple[str, ...] = ()
+    if not version.startswith("2."):
+        uncalled, document = not_called(document), with_sent(document, document)
+    document = in_one_version(document)
     base_url, remarks = _base_url(source, document)
-    return Description(source, document, original, base_url, (*bundle.unresolved, *broken), remarks)
+    return Description(source, document, original, base_url, (*bundle.unresolved, *broken), remarks, uncalled)
 
 
 def _without(value: Any, broken: frozenset[str]) -> Any:
@@ -101,24 +106,6 @@ def _without(value: Any, broken: frozenset[str]) -> Any:
     if not isinstance(value, dict):
         return value
     return {key: {} if _refers(item, broken) else _without(item, broken) for key, item in value.items()}
-
-
-def _without_ignored(value: Any, document: Schema) -> Any:
-    """Return a part of an OpenAPI 3 document without the header parameters that the specification ignores."""
-    if isinstance(value, list):
-        return [_without_ignored(item, document) for item in value]
-    if not isinstance(value, dict):
-        return value
-    found = {key: _without_ignored(item, document) for key, item in value.items()}
-    if isinstance(value.get("parameters"), list):
-        found["parameters"] = [one for one in found["parameters"] if not _is_ignored(one, document)]
-    return found
-
-
-def _is_ignored(given: Any, document: Schema) -> bool:
-    parameter = pointed(document, given["$ref"]) if _is_reference(given) else given
-    is_header = isinstance(parameter, dict) and parameter.get("in") == "header"
-    return is_header and str(parameter.get("name")).lower() in _IGNORED
 
 
 def _is_reference(value: Any) -> bool:

@@ -8,9 +8,10 @@ from functools import lru_cache
 from typing import Any
 
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed, resolved, shape_of
-from conformance.documents.openapi import METHODS
+from conformance.documents.openapi import methods_of
 from conformance.documents.resources import PARAMETER
 from conformance.documents.schema_places import DATA
+from conformance.documents.schema_words import foreign_words, without_foreign_words
 
 
 def invalid(original: Schema) -> list[str]:
@@ -19,11 +20,11 @@ def invalid(original: Schema) -> list[str]:
     The schemas of the OpenAPI Initiative come from Schemathesis, which is a dependency anyway.
     """
     version = str(original.get("openapi") or original.get("swagger") or "")[:3]
-    faults = []
-    for error in _validator(version).iter_errors(original):
+    foreign, faults = foreign_words(original), []
+    for error in _validator(version).iter_errors(without_foreign_words(original)):
         where = "/".join(str(part) for part in error.instance_path)
         faults.append(f"/{where}: {error.message[:160]}")
-    return [*sorted(set(faults), key=len)[:20], *_path_parameters(original), *_schemas(original)]
+    return [*foreign, *sorted(set(faults), key=len)[:20], *_path_parameters(original), *_schemas(original)]
 
 
 @lru_cache(maxsize=4)
@@ -43,10 +44,10 @@ def _operations(document: Schema) -> Iterator[tuple[str, str, Schema, list[Any]]
             whole = resolved(document, item)
         except UnresolvedError:
             continue
-        for method in METHODS if isinstance(whole, dict) else ():
-            if isinstance(whole.get(method), dict):
+        for method, operation in methods_of(whole).items() if isinstance(whole, dict) else ():
+            if isinstance(operation, dict):
                 shared = whole.get("parameters", [])
-                yield path, method.upper(), whole[method], shared if isinstance(shared, list) else []
+                yield path, method, operation, shared if isinstance(shared, list) else []
 
 
 def _path_parameters(document: Schema) -> Iterator[str]:

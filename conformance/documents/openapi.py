@@ -16,8 +16,8 @@ from conformance.documents.parameters import (
     read_parameter,
 )
 
-METHODS = ("get", "put", "post", "delete", "patch", "head", "options", "trace")
-SAFE = frozenset({"GET", "HEAD", "OPTIONS", "TRACE"})
+_METHODS = ("get", "put", "post", "delete", "patch", "head", "options", "trace", "query")
+SAFE = frozenset({"GET", "HEAD", "OPTIONS", "TRACE", "QUERY"})
 
 
 @dataclass(frozen=True)
@@ -156,11 +156,27 @@ def read_operations(document: Schema, *, closed: bool = False) -> list[Operation
         whole = resolved(document, item)
         shared = whole.get("parameters", [])
         found += [
-            _operation(path, name.upper(), {"security": security, **whole[name]}, shared, closed=closed)
-            for name in METHODS
-            if name in whole
+            _operation(path, method, {"security": security, **given}, shared, closed=closed)
+            for method, given in methods_of(whole).items()
         ]
     return found
+
+
+def methods_of(item: Schema) -> dict[str, Any]:
+    """Return the operations of a path item by method, those in ``additionalOperations`` too (OpenAPI 3.2, 4.9)."""
+    more = item.get("additionalOperations")
+    return {name.upper(): item[name] for name in _METHODS if name in item} | (more if isinstance(more, dict) else {})
+
+
+def with_methods(item: Any, changed: dict[str, Any]) -> Any:
+    """Return a path item with other operations in the places of some, by method as `methods_of` has them."""
+    if not changed:
+        return item
+    own = {name: changed[name.upper()] for name in _METHODS if name in item and name.upper() in changed}
+    more = item.get("additionalOperations")
+    if isinstance(more, dict):
+        own["additionalOperations"] = {method: changed.get(method, one) for method, one in more.items()}
+    return {**item, **own}
 
 
 def _operation(

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 from typing import Any, Final
 
 from conformance.documents.json_schema import Schema, UnresolvedError, pointed
-from conformance.documents.openapi import METHODS, Operation
+from conformance.documents.openapi import Operation, methods_of, with_methods
 
 #: Where a credential goes, and its name there; names of headers are in lower case.
 Place = tuple[str, str]
@@ -65,21 +65,22 @@ def without_credentials(document: Schema, given: Collection[Place] = ()) -> Sche
         return document
     shared = document.get("security", [])
 
-    def kept(parameters: Any, taken: Collection[Place]) -> Any:
-        return [one for one in parameters if _place(document, one) not in taken]
+    def kept(given: Any, taken: Collection[Place]) -> Any:
+        if not isinstance(given, dict) or not isinstance(given.get("parameters"), list):
+            return given
+        return {**given, "parameters": [one for one in given["parameters"] if _place(document, one) not in taken]}
 
     found = {}
     for path, item in paths.items():
-        changed = dict(item) if isinstance(item, dict) else item
-        operations = [name for name in METHODS if isinstance(item, dict) and isinstance(item.get(name), dict)]
-        taken = {name: {*given, *_places(schemes, item[name].get("security", shared))} for name in operations}
-        for name in operations:
-            if isinstance(item[name].get("parameters"), list):
-                changed[name] = {**item[name], "parameters": kept(item[name]["parameters"], taken[name])}
-        if operations and isinstance(item.get("parameters"), list):
-            # What its operations share is no parameter where all of them take it for a credential.
-            changed["parameters"] = kept(item["parameters"], set.intersection(*taken.values()))
-        found[path] = changed
+        operations = methods_of(item) if isinstance(item, dict) else {}
+        taken = {
+            method: {*given, *_places(schemes, one.get("security", shared))}
+            for method, one in operations.items()
+            if isinstance(one, dict)
+        }
+        # What its operations share is no parameter where all of them take it for a credential.
+        changed = kept(item, set.intersection(*taken.values())) if taken else item
+        found[path] = with_methods(changed, {method: kept(operations[method], taken[method]) for method in taken})
     return {**document, "paths": found}
 
 

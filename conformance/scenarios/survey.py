@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import unquote
 
 from conformance.api.rest.applicable import allowed
@@ -39,6 +39,9 @@ from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswer
 from conformance.verdict.effort import Effort
 from conformance.verdict.explorer import Explorer
 from conformance.verdict.time_limit import TimeIsOverError
+
+if TYPE_CHECKING:
+    from conformance.api.rest.generated import Target
 
 # At standard effort, of one operation: valid, invalid and odd requests; and at least so many of each at quick.
 _MOST: Final = {"valid": 60, "invalid": 60, "odd": 40}
@@ -460,27 +463,39 @@ def generated_requests(api: RestInterface, values: Values, explore: Explorer) ->
         if run.limit.is_past(_GENERATED_SHARE):
             run.limit.shortened.add(target.label)
             continue
-        cases = list(target.covering())
-        until = time.monotonic() + _BUDGETS * run.effort.budget_s
-        count = _COVERAGE // (_SLOW_SHARE if operation.label in api.slow else 1)
-        drawn = run.effort.draw(cases, count, f"{run.seed}/coverage {target.label}")
-        run.tally.planned += len(drawn)
-        for case in drawn:
-            if run.limit.is_past(_GENERATED_SHARE):
-                run.limit.shortened.add(target.label)
-                break
-            if time.monotonic() > until:
-                surveyor.cut_short(f"generated requests of {target.label}")
-                continue
-            _send_case(surveyor, operation, case)
-        if run.effort.name == "quick" or run.effort.slow or not target.has_input:
+        try:
+            _send_generated(surveyor, operation, target, explore)
+        except NOT_GENERATED:
             continue
-        for negative in (True, False):
-            try:
-                explore(target.fuzzed(negative=negative), partial(_send_case, surveyor, operation), cases=_FUZZED)
-            except NOT_GENERATED:
-                continue
+        except (NoAnswerError, NotPossibleError, NotPermittedError, PartialTraceError):
+            raise
+        except Exception as error:  # noqa: BLE001 - as in survey(): others are generated
+            run.judge.fault(f"generated requests of {operation.label}", error)
     return Survey(tuple(surveyor.probes))
+
+
+def _send_generated(surveyor: Surveyor, operation: Operation, target: Target, explore: Explorer) -> None:
+    """Send the generated requests of one operation."""
+    from conformance.api.rest.generated import NOT_GENERATED  # noqa: PLC0415 - see generated_requests()
+
+    run = surveyor.api.run
+    until = time.monotonic() + _BUDGETS * run.effort.budget_s
+    count = _COVERAGE // (_SLOW_SHARE if operation.label in surveyor.api.slow else 1)
+    drawn = run.effort.draw(list(target.covering()), count, f"{run.seed}/coverage {target.label}")
+    run.tally.planned += len(drawn)
+    for case in drawn:
+        if run.limit.is_past(_GENERATED_SHARE):
+            run.limit.shortened.add(target.label)
+            break
+        if time.monotonic() > until:
+            surveyor.cut_short(f"generated requests of {target.label}")
+            continue
+        _send_case(surveyor, operation, case)
+    if run.effort.name == "quick" or run.effort.slow or not target.has_input:
+        return
+    for negative in (True, False):
+        with suppress(*NOT_GENERATED):
+            explore(target.fuzzed(negative=negative), partial(_send_case, surveyor, operation), cases=_FUZZED)
 
 
 def _send_case(surveyor: Surveyor, operation: Operation, case: Any) -> None:
