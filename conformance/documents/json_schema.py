@@ -9,7 +9,9 @@ Over 300 lines because lazy references belong to both: copying a schema makes th
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cache, cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, Final, cast
 from urllib.parse import unquote
@@ -17,6 +19,7 @@ from urllib.parse import unquote
 import jsonschema_rs
 import msgspec
 
+from conformance.documents import patterns
 from conformance.documents.json_text import shown
 
 if TYPE_CHECKING:
@@ -285,8 +288,41 @@ def _naming() -> Any:
     from jsonschema.validators import extend  # noqa: PLC0415
 
     types = Draft202012Validator.TYPE_CHECKER.redefine("number", lambda _, value: is_number(value))
+    keywords = {
+        "pattern": _pattern,
+        "patternProperties": _members,
+        "additionalProperties": _further,
+        "unevaluatedProperties": _unevaluated,
+    }
     # jsonschema gives extend() no types.
-    return cast("Any", extend)(Draft202012Validator, type_checker=types)
+    return cast("Any", extend)(Draft202012Validator, validators=keywords, type_checker=types)
+
+
+def _pattern(_: Any, pattern: str, instance: Any, __: Schema) -> Iterator[ValidationError]:
+    from jsonschema.exceptions import ValidationError  # noqa: PLC0415 - as above
+
+    if isinstance(instance, str) and not patterns.matches(pattern, instance):
+        yield ValidationError(f"{instance!r} does not match {pattern!r}")
+
+
+def _members(validator: Any, named: Schema, instance: Any, _: Schema) -> Iterator[ValidationError]:
+    for pattern, schema in named.items() if isinstance(instance, dict) else ():
+        for name, value in instance.items():
+            if patterns.matches(pattern, name):
+                yield from validator.descend(value, schema, path=name, schema_path=pattern)
+
+
+def _further(validator: Any, schema: Any, instance: Any, beside: Schema) -> Iterator[ValidationError]:
+    from jsonschema.exceptions import ValidationError  # noqa: PLC0415 - as above
+
+    named = beside.get("patternProperties", {})
+    for name in instance if isinstance(instance, dict) else ():
+        if name in beside.get("properties", {}) or any(patterns.matches(pattern, name) for pattern in named):
+            continue
+        if schema is False:
+            yield ValidationError(f"Additional properties are not allowed ({name!r} was unexpected)")
+        else:
+            yield from validator.descend(instance[name], schema, path=name)
 
 
 def bundled(schema: Schema) -> Schema:
@@ -316,17 +352,77 @@ def bundled(schema: Schema) -> Schema:
     return {**result, "$defs": found} if found else schema
 
 
-def _refuse(uri: str) -> Any:
-    raise UnresolvedError(f"$ref {uri!r} is not local")
+def _unevaluated(validator: Any, schema: Any, instance: Any, beside: Schema) -> Iterator[ValidationError]:
+    """Judge as jsonschema does, if Python reads the patterns of names too; else members pass."""
+    from jsonschema import Draft202012Validator  # noqa: PLC0415 - as above
+
+    with suppress(re.error):
+        yield from Draft202012Validator.VALIDATORS["unevaluatedProperties"](validator, schema, instance, beside)
+
+
+class _Pattern:
+    """The keyword ``pattern`` for jsonschema-rs, by ECMA-262."""
+
+    def __init__(self, _: Schema, pattern: str, __: list[Any]) -> None:
+        self._pattern = pattern
+
+    def validate(self, instance: Any) -> None:
+        if isinstance(instance, str) and not patterns.matches(self._pattern, instance):
+            raise ValueError(f"{instance!r} does not match {self._pattern!r}")
+
+
+def _patterns_in(schema: Any, *, names: bool) -> Iterator[str]:
+    """Yield the patterns of texts in a schema, or those of the names of members."""
+    if isinstance(schema, list):
+        for item in schema:
+            yield from _patterns_in(item, names=names)
+    for key, item in schema.items() if isinstance(schema, dict) else ():
+        if key == "pattern" and isinstance(item, str) and not names:
+            yield item
+        elif key not in _VALUES:
+            yield from item if names and key == "patternProperties" and isinstance(item, dict) else ()
+            yield from _patterns_in(item, names=names)
+
+
+def _without_names(schema: Any) -> Any:
+    """Return a schema that allows any member wherever patterns say what members it has."""
+    if isinstance(schema, list):
+        return [_without_names(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    left_out = {"patternProperties", "additionalProperties", "unevaluatedProperties"}
+    left_out = left_out if isinstance(schema.get("patternProperties"), dict) else set()
+    return {
+        key: item if key in _VALUES else _without_names(item) for key, item in schema.items() if key not in left_out
+    }
+
+
+def _are_plain(found: Iterator[str]) -> bool:
+    """Return whether jsonschema-rs reads patterns as ECMA-262 does.
+
+    Raises:
+        PatternError: one of them is no regular expression.
+    """
+    others = [one for one in found if not patterns.is_plain(one)]
+    for one in others:
+        patterns.check(one)
+    return not others
 
 
 def validator_of(schema: Schema, **options: Any) -> Any:
     """Return jsonschema-rs's validator for a schema; it follows lazy references, and fetches nothing.
 
+    If patterns that it does not read as ECMA-262 does name members, members pass that the schema refuses.
+
     Raises:
         ValueError: it is no JSON Schema.
     """
-    return jsonschema_rs.validator_for(bundled(schema), retriever=_refuse, **options)
+    whole = bundled(schema)
+    if not _are_plain(_patterns_in(whole, names=True)):
+        whole = _without_names(whole)
+    if not _are_plain(_patterns_in(whole, names=False)):
+        options["keywords"] = {"pattern": _Pattern}
+    return jsonschema_rs.validator_for(whole, offline=True, **options)
 
 
 class Shape:
@@ -335,6 +431,8 @@ class Shape:
     def __init__(self, schema: Schema) -> None:
         self.schema = schema
         self._quick = validator_of(schema)
+        # By such names, jsonschema-rs allows too much.
+        self._is_exact = _are_plain(_patterns_in(bundled(schema), names=True))
 
     def problem(self, value: Any, where: str = "") -> str:
         """Return the first violation in ``value``, with its place below ``where``; empty if the value is valid."""
@@ -373,7 +471,7 @@ class Shape:
 
     def _passes(self, value: Any) -> bool:
         try:
-            return bool(self._quick.is_valid(value)) and _all_finite(value)
+            return self._is_exact and bool(self._quick.is_valid(value)) and _all_finite(value)
         except (ValueError, TypeError, OverflowError):
             return False  # a number that it does not take (an Infinity): the other one judges that
 

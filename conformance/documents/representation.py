@@ -3,7 +3,6 @@
 import re
 from typing import Any
 
-import jsonschema_rs
 import yaml
 from lxml import etree
 
@@ -230,22 +229,6 @@ def flat(schema: Schema) -> Schema:
         if not result["properties"]:
             del result["properties"]
     return result
-
-
-_FORMATTED: dict[int, tuple[Schema, Any]] = {}
-
-
-def has_formats(schema: Schema, value: Any) -> bool:
-    """Return whether each string in a value has the ``format`` of its schema; formats that nobody knows hold."""
-    kept = _FORMATTED.get(id(schema))
-    if kept is None or kept[0] is not schema:
-        named = "'format'" in str(schema)
-        validator = jsonschema_rs.validator_for(schema, validate_formats=True) if named else None
-        kept = _FORMATTED[id(schema)] = schema, validator
-    try:
-        return kept[1] is None or bool(kept[1].is_valid(value))
-    except (ValueError, TypeError, OverflowError, RecursionError):
-        return False  # a value that this validator does not take
 
 
 def discriminator_of(schema: Schema) -> tuple[str, tuple[str, ...]]:

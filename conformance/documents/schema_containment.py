@@ -47,7 +47,9 @@ def witness(inner: Placed, outer: Placed, barred: frozenset[str] | None) -> str 
     """Return a value of the inner schema that is none of the outer, as JSON: the shortest found, or None."""
     small, large = _pair(inner, outer, barred)
     try:
-        allows, refuses = (jsonschema_rs.validator_for(schema, validate_formats=True) for schema in (small, large))
+        allows, refuses = (
+            jsonschema_rs.validator_for(schema, validate_formats=True, offline=True) for schema in (small, large)
+        )
         values = Witnesses((small, large))
     except _UNUSABLE:
         return None
@@ -81,7 +83,7 @@ def are_apart(schemas: list[Placed]) -> bool:
 
 
 def _options() -> dict[str, Any]:
-    return {"draft": jsonschema_rs.Draft202012, "validate_formats": True}
+    return {"draft": jsonschema_rs.Draft202012, "validate_formats": True, "offline": True}
 
 
 def introduced(inner: Placed, outer: Placed) -> frozenset[str]:

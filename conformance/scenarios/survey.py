@@ -32,6 +32,7 @@ from conformance.api.rest.variations import (
     valid_variations,
 )
 from conformance.documents.openapi import Operation, operations_of
+from conformance.documents.patterns import SlowPatternError
 from conformance.documents.resources import known_path
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -239,6 +240,8 @@ class Surveyor:
         said = validity(
             self.api.run.contract, request.method, request.target, request.content_type, request.body, request.headers
         )
+        if said.slow:
+            self.api.run.judge.fault(operation.label, SlowPatternError(said.slow))
         own = said if said.operation == operation else Validity(UNCLEAR)
         invents = self.values.invents(operation, request)
         return Probe(

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 from conformance.contract.classes import CauseKind
 from conformance.contract.ledger import Requirement, renamed
+from conformance.documents.patterns import PatternError
 from conformance.transport.exchange import Attempt, NoAnswer, Request, Unanswered
 from conformance.verdict.finding import Finding, Sent, Showing, causes_of, kind_of, likeness, observed_in, subject_of
 
@@ -283,7 +284,8 @@ class Judge:
     def fault(self, what: str, error: Exception, ids: Iterable[str] = ()) -> None:
         """Record an error of the suite that kept it from judging something, such as one operation."""
         said = (str(error).splitlines() or [""])[0][:_FAULT]
-        text = f"{what}: not judged: {type(error).__name__}: {said}"
+        name = "" if isinstance(error, PatternError) else f"{type(error).__name__}: "
+        text = f"{what}: not judged: {name}{said}"
         self.faults.setdefault(text, set()).update(self._renamed.get(id_, id_) for id_ in ids)
 
     def note(self, requirement: str, remark: str) -> None:

@@ -26,6 +26,7 @@ from schemathesis.generation.overrides import Override
 
 from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.contract.pack import Contract
+from conformance.documents.pattern_python import with_python_patterns
 from conformance.transport.exchange import Exchange
 
 #: Raised where no case can be made: schemas allow everything or nothing, or Schemathesis does not know a media type.
@@ -115,7 +116,7 @@ def _loaded(document: dict[str, Any]) -> Any:
     A case that left them out would be judged by a request that was sent with them.
     """
     config = SchemathesisConfig.from_dict({"generation": {"with-security-parameters": False}})
-    return schemathesis.openapi.from_dict(document, config=config)
+    return schemathesis.openapi.from_dict(with_python_patterns(document), config=config)
 
 
 def state_machine(document: dict[str, Any]) -> Any:

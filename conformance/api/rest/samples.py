@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from conformance.documents.json_schema import Schema, kinds_of, shape_of
+from conformance.documents.pattern_python import for_python
 from conformance.documents.representation import discriminator_of, flat
 
 _DEPTH = 6
@@ -144,10 +145,11 @@ def _matching(schema: Schema) -> str:
     from hypothesis.errors import HypothesisException  # noqa: PLC0415 - as above
     from hypothesis.strategies import from_regex  # noqa: PLC0415 - as above
 
+    pattern = for_python(str(schema["pattern"]))
+    if pattern is None:
+        return ""
     try:
         quiet = settings(database=None, derandomize=True, max_examples=200)
-        return find(
-            from_regex(str(schema["pattern"])), lambda text: fits(schema, text) and text.isprintable(), settings=quiet
-        )
+        return find(from_regex(pattern), lambda text: fits(schema, text) and text.isprintable(), settings=quiet)
     except (HypothesisException, re.error, ValueError):
         return ""

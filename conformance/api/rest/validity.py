@@ -11,6 +11,7 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Body, Operation, is_json, is_xml
 from conformance.documents.parameter_reading import INVALID, UNCLEAR, VALID, decoded_path, judged, judged_json
 from conformance.documents.parameters import Parameter
+from conformance.documents.patterns import PatternError, SlowPatternError
 from conformance.documents.representation import UnreadableError, from_element, local_name, parse_xml
 from conformance.documents.resources import is_normal, matching
 from conformance.transport.exchange import media_type_of
@@ -38,12 +39,14 @@ class Validity:
         operation: the one that it is for, or None.
         requirement: name in class strict-input of what asks for its refusal.
         why: what is wrong with it.
+        slow: the pattern that takes too long to judge it; empty for others.
     """
 
     verdict: str
     operation: Operation | None = None
     requirement: str = ""
     why: str = ""
+    slow: str = ""
 
 
 def validity(
@@ -75,8 +78,13 @@ def validity_by(
     operation: Operation, path: str, query: str, content_type: str, body: bytes, headers: Headers | None = None
 ) -> Validity:
     """Return the verdict on a request by the description of its operation alone; the arguments are as in validity()."""
-    found = [*_of_path(operation, path), *_of_query(operation, query), _of_body(operation, content_type, body)]
-    found += _of_headers(operation, headers) if headers is not None else []
+    try:
+        found = [*_of_path(operation, path), *_of_query(operation, query), _of_body(operation, content_type, body)]
+        found += _of_headers(operation, headers) if headers is not None else []
+    except SlowPatternError as error:
+        return Validity(UNCLEAR, operation, slow=str(error))
+    except PatternError:
+        return Validity(UNCLEAR, operation)  # description/file-valid judges the pattern itself
     if any(verdict == UNCLEAR for verdict, _, _ in found):
         return Validity(UNCLEAR, operation)
     wrong = next(((requirement, why) for verdict, requirement, why in found if verdict == INVALID), None)

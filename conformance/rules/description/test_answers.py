@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from functools import lru_cache
 from typing import Any
 
 from conformance.api.rest.statuses import CRASHES
 from conformance.api.rest.variations import Kind
 from conformance.documents.field_reading import parts_of
-from conformance.documents.json_schema import Schema, kinds_of, shape_of, validator_of
+from conformance.documents.json_schema import Schema, kinds_of, shape_of
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, is_json, operations_of
+from conformance.documents.patterns import SlowPatternError
+from conformance.documents.value_formats import wrong_formats
 from conformance.rules.told_once import Fault, held_back, told_once, without_numbers
 from conformance.scenarios.other_exchanges import others
 from conformance.scenarios.rule import NotSeen, Outcome, rule
@@ -32,7 +33,6 @@ _NO_SUCH_THING = frozenset({400, 404, 409, 422})
 # Of these, HTTP knows these only as responses to requests with one of these fields (RFC 9110 13, 14).
 _ASKED_FOR = frozenset({206, 304})
 _ASKING = frozenset({"range", "if-range", "if-match", "if-none-match", "if-modified-since", "if-unmodified-since"})
-_FORMAT = re.compile(r'"format": "([^"]+)"')
 _BAD_REQUEST, _FORBIDDEN, _NOT_FOUND = 400, 403, 404
 _PLAIN = frozenset({Kind.USUAL, Kind.AGAIN, Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL})
 
@@ -148,13 +148,11 @@ def _matches(declared: str, given: str) -> bool:
 @rule("description/body-schema", on=_ON)
 def body_schema(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether each JSON body is valid by the schema that is declared for its status, errors included."""
-    judged = {id(probe): found for probe, found in _with_schema(trace, run)}
+    judged = {id(probe): (answer.status, wrong) for probe, (_, answer), wrong in _with_fault(trace, run)}
 
     def fault(probe: Probe) -> Fault | None:
-        schema, answer = judged[id(probe)]
-        wrong = _wrong(schema, answer)
-        cause = f"{answer.status} {without_numbers(wrong)}"
-        return Fault(cause, f"status {answer.status} with {wrong}") if wrong else None
+        status, wrong = judged[id(probe)]
+        return Fault(f"{status} {without_numbers(wrong)}", f"status {status} with {wrong}") if wrong else None
 
     yield from _successes_unseen(trace, run, lambda operation, key: any(map(is_json, operation.responses[key])))
     yield from told_once(
@@ -164,20 +162,19 @@ def body_schema(trace: Survey, run: Run) -> Iterable[Outcome]:
 
 @rule("description/formats", on=_ON)
 def formats(trace: Survey, run: Run) -> Iterable[Outcome]:
-    """Judge whether strings in responses have the ``format`` that the schema names (date-time, uuid, ...)."""
+    """Judge whether values in responses have the ``format`` that the schema names (date-time, int32, ...)."""
     judged = {
-        id(probe): found
-        for probe, found in _with_schema(trace, run)
-        if '"format"' in _text(found[0]) and not _wrong(*found)
+        id(probe): found for probe, found, wrong in _with_fault(trace, run) if "'format'" in str(found[0]) and not wrong
     }
 
     def fault(probe: Probe) -> Fault | None:
         schema, answer = judged[id(probe)]
-        wrong, wanted = _unformatted(schema, answer)
-        return Fault(wanted, wrong) if wrong else None
+        found = wrong_formats(schema, read_json(answer.body).value)
+        told = "; ".join(f"{shown(value)} at /{place}, which is no {wanted}" for value, place, wanted in found)
+        return Fault(" ".join(sorted({wanted for _, _, wanted in found})), told) if found else None
 
-    yield from _successes_unseen(trace, run, lambda operation, key: '"format"' in _text(operation.responses[key]))
-    yield from told_once((one for one in trace.probes if id(one) in judged), "strings of the declared format", fault)
+    yield from _successes_unseen(trace, run, lambda operation, key: "'format'" in str(operation.responses[key]))
+    yield from told_once((one for one in trace.probes if id(one) in judged), "values of the declared format", fault)
 
 
 def _with_schema(trace: Survey, run: Run) -> Iterator[tuple[Probe, tuple[Schema, Response]]]:
@@ -188,6 +185,15 @@ def _with_schema(trace: Survey, run: Run) -> Iterator[tuple[Probe, tuple[Schema,
         whole = not answer.cut and (answer.body or operation.method != "HEAD")
         if names and whole and answer.status not in _BODILESS and _usable(content[names[0]]):
             yield probe, (content[names[0]], answer)
+
+
+def _with_fault(trace: Survey, run: Run) -> Iterator[tuple[Probe, tuple[Schema, Response], str]]:
+    """Yield what `_with_schema` yields with what is wrong by the schema, or empty."""
+    for probe, (schema, answer) in _with_schema(trace, run):
+        try:
+            yield probe, (schema, answer), _wrong(schema, answer)
+        except SlowPatternError as error:
+            run.judge.fault(probe.operation, error, ("description/body-schema",))
 
 
 def _usable(schema: Schema) -> bool:
@@ -206,32 +212,6 @@ def _wrong(schema: Schema, answer: Response) -> str:
         return f"a body that is not JSON: {text.problem}"
     problem = shape_of(schema).problem(text.value)
     return f"a body in which {problem}" if problem else ""
-
-
-def _text(schema: Schema) -> str:
-    return str(schema).replace("'", '"')
-
-
-@lru_cache(maxsize=256)
-def _formatted(key: int, text: str) -> Any:  # noqa: ARG001 - the text keeps the key from meaning another schema
-    return validator_of(_SCHEMAS[key], validate_formats=True)
-
-
-_SCHEMAS: dict[int, Schema] = {}
-
-
-def _unformatted(schema: Schema, answer: Response) -> tuple[str, str]:
-    """Return the first string that does not have its declared format with its place, and the format; or empty."""
-    _SCHEMAS[id(schema)] = schema
-    error = next(iter(_formatted(id(schema), _text(schema)).iter_errors(read_json(answer.body).value)), None)
-    if error is None:
-        return "", ""
-    place = "/".join("*" if isinstance(part, int) else part for part in error.instance_path)
-    rule: Any = schema
-    for step in error.schema_path[:-1]:
-        rule = rule[step]
-    wanted = " or ".join(sorted(set(_FORMAT.findall(_text(rule))))) or "value of the declared format"
-    return f"{shown(error.instance)} at /{place}, which is no {wanted}", wanted
 
 
 @rule("description/headers", on=_ON)

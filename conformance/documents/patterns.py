@@ -1,0 +1,192 @@
+"""Match the regular expressions of schemas as ECMA-262 defines them, within a bounded time.
+
+Most patterns of descriptions are plain: Rust's engine, which ``jsonschema_rs`` has, reads them as ECMA-262 does, in
+linear time. The others go to ``regress``, which backtracks: in this process if the text is short enough for the
+pattern, and else in a worker process that is ended after a deadline.
+"""
+
+from __future__ import annotations
+
+import atexit
+import json
+import re
+import subprocess
+import sys
+import threading
+from functools import lru_cache
+from typing import Any, Final
+
+import jsonschema_rs
+import regress
+
+# Seconds that one match in the worker may take, and the steps that are tried without it: some hundredths of a second.
+_SECONDS: Final = 2.0
+_MOST_STEPS: Final = 200_000
+# What ECMA-262 and Rust read alike: literals, groups, quantifiers, and classes without brackets or && in them.
+_ESCAPE: Final = r"\\[dDwWntrfv\-.^$*+?()\[\]{}|/\\]"
+_CLASS: Final = rf"\[\^?(?:{_ESCAPE}|[^\\\[\]&~\-]|(?<!-)-(?!-))+\]"
+_PLAIN: Final = re.compile(
+    rf"(?:{_ESCAPE}|{_CLASS}|[^\\\[\](){{}}*+?|.]|\((?:\?:)?(?![?*+])|\)|\|(?![?*+])|(?<![(|^*+?{{])[*+?]|\{{\d{{1,3}}(?:,\d{{0,3}})?\}}\??)*"
+)
+# Letters that mean nothing after a backslash in ECMA-262, although other dialects know some of them.
+_NO_ESCAPE: Final = frozenset("ACEFGHIJKLMNOQRTUVXYZaeghijlmoqyz")
+_SYNTAX: Final = frozenset("^$\\.*+?()[]{}|/")
+_UNICODE_ONLY: Final = re.compile(r"\\(?:[pP]|u)\{")
+_PART: Final = re.compile(r"\\.|\[|\]|.", re.DOTALL)
+_VARIABLE: Final = re.compile(r"[*+?|]|\{\d+,\d*\}|\\[1-9k]")
+_QUANTIFIED_GROUP: Final = re.compile(r"\)(?:[*+]|\{)")
+_WORKER: Final = """
+import json, sys, regress
+for line in sys.stdin:
+    pattern, flags, text = json.loads(line)
+    print(int(regress.Regex(pattern, flags).find(text) is not None), flush=True)
+"""
+
+
+class PatternError(ValueError):
+    """Raised for a pattern that is no regular expression of ECMA-262; the message says why."""
+
+
+class SlowPatternError(PatternError):
+    """Raised for a pattern that takes too long for a text."""
+
+
+def matches(pattern: str, text: str) -> bool:
+    """Return whether a pattern matches anywhere in a text.
+
+    Raises:
+        PatternError: it is no regular expression of ECMA-262.
+        SlowPatternError: it takes too long.
+    """
+    plain = _native(pattern)
+    if plain is not None:
+        return bool(plain.is_valid(text))
+    regex, source, flags = _compiled(pattern)
+    text = text.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
+    if _steps(pattern, len(text)) <= _MOST_STEPS:
+        return regex.find(text) is not None
+    return _matches_in_time(pattern, source, flags, text)
+
+
+def is_plain(pattern: str) -> bool:
+    """Return whether ``jsonschema_rs`` by itself reads a pattern as ECMA-262 does."""
+    return _native(pattern) is not None
+
+
+def check(pattern: str) -> None:
+    """Check a pattern.
+
+    Raises:
+        PatternError: it is no regular expression of ECMA-262.
+    """
+    if not is_plain(pattern):
+        _compiled(pattern)
+
+
+@lru_cache(maxsize=4096)
+def _native(pattern: str) -> Any:
+    if not _PLAIN.fullmatch(pattern):
+        return None
+    try:
+        return jsonschema_rs.validator_for({"pattern": pattern})
+    except ValueError:
+        return None
+
+
+@lru_cache(maxsize=4096)
+def _compiled(pattern: str) -> tuple[regress.Regex, str, str]:
+    r"""Return a pattern compiled, as it is written for that, and the flags.
+
+    JSON Schema asks for the flag u. Authors who do not know of it write ``\-`` outside of classes, which it forbids.
+    """
+    source = _without_needless_escapes(pattern)
+    try:
+        return regress.Regex(source, "u"), source, "u"
+    except regress.RegressError as error:
+        problem = str(error)
+    if not _UNICODE_ONLY.search(source):
+        try:
+            return regress.Regex(source, ""), source, ""
+        except regress.RegressError as error:
+            problem = str(error)
+    raise PatternError(f"the pattern {pattern[:200]!r} is no regular expression of ECMA-262: {problem}")
+
+
+def _without_needless_escapes(pattern: str) -> str:
+    written, in_class = [], False
+    for part in _PART.findall(pattern):
+        if len(part) == 1:
+            in_class = (in_class or part == "[") and part != "]"
+        elif part[1] in _NO_ESCAPE:
+            problem = f"{part} has no meaning"
+            raise PatternError(f"the pattern {pattern[:200]!r} is no regular expression of ECMA-262: {problem}")
+        is_needless = len(part) > 1 and not part[1].isalnum() and part[1] not in _SYNTAX
+        written.append(part[1:] if is_needless and not (in_class and part[1] == "-") else part)
+    return "".join(written)
+
+
+def _steps(pattern: str, length: int) -> float:
+    """Return a bound of the steps that backtracking takes; infinite where a quantifier holds for a group."""
+    if _QUANTIFIED_GROUP.search(pattern):
+        return float("inf")
+    return float(max(length, 2)) ** min(len(_VARIABLE.findall(pattern)) + 1, 100)
+
+
+class _Worker:
+    """A process that matches, and is ended when it takes too long; the next match starts another one."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._process: subprocess.Popen[str] | None = None
+        self._slow: set[str] = set()
+
+    def matches(self, pattern: str, source: str, flags: str, text: str) -> bool:
+        with self._lock:
+            if pattern not in self._slow:
+                reply = self._reply(source, flags, text)
+                if reply:
+                    return reply == "1"
+                self._slow.add(pattern)
+        raise SlowPatternError(f"the pattern {pattern[:200]!r} takes too long")
+
+    def _reply(self, source: str, flags: str, text: str) -> str:
+        """Return what the process says; empty if it said nothing in time."""
+        if self._process is None:
+            self._process = subprocess.Popen(  # noqa: S603 - this module's own program
+                [sys.executable, "-c", _WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            )
+            self._ask(self._process, "", "", "")  # the start is not the pattern's time
+        timer = threading.Timer(_SECONDS, self._process.kill)
+        timer.start()
+        try:
+            reply = self._ask(self._process, source, flags, text)
+        except OSError:
+            reply = ""
+        timer.cancel()
+        if not reply:
+            self.end()
+        return reply
+
+    @staticmethod
+    def _ask(process: subprocess.Popen[str], *question: str) -> str:
+        if process.stdin is None or process.stdout is None:
+            return ""
+        process.stdin.write(json.dumps(question) + "\n")
+        process.stdin.flush()
+        return process.stdout.readline().strip()
+
+    def end(self) -> None:
+        """End the process, if there is one."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate()
+            self._process = None
+
+
+_THE_WORKER: Final = _Worker()
+atexit.register(_THE_WORKER.end)
+
+
+@lru_cache(maxsize=4096)
+def _matches_in_time(pattern: str, source: str, flags: str, text: str) -> bool:
+    return _THE_WORKER.matches(pattern, source, flags, text)
