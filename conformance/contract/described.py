@@ -20,7 +20,9 @@ TITLE: Final = "its own description"
 MOTION: Final = "motion"
 #: The class of a device that is known by its WSDL.
 SOAP: Final = "soap"
-_CLASSES: Final = ("description", "robustness", "http", "web-server")
+#: What a web server does by itself, for a device of either kind.
+WEB_SERVER: Final = "web-server"
+_CLASSES: Final = ("description", "robustness", "http", WEB_SERVER)
 # The class `description` judges these of each operation, and tells what operations have in common once.
 _WITHOUT: Final = ("http/declared-status", "http/declared-body", "http/json-integers", "http/no-traceback")
 # Formats in which one value can be written.

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from conformance.contract.described import MOTION, SOAP, TITLE
+from conformance.contract.described import MOTION, SOAP, TITLE, WEB_SERVER
 from conformance.contract.locating import MANIFEST
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import basic_string
@@ -64,7 +64,7 @@ def write_soap_pack(
         f"title = {basic_string(TITLE)}",
         "closed_answers = true",
         "described = true",
-        *(f'\n[[class]]\nname = "{class_}"' for class_ in (SOAP, *((MOTION,) if moves else ()))),
+        *(f'\n[[class]]\nname = "{class_}"' for class_ in (SOAP, WEB_SERVER, *((MOTION,) if moves else ()))),
     ]
     (folder / MANIFEST).write_text("\n".join(lines) + "\n", encoding="utf-8")
     (folder / "openapi.json").write_text(json.dumps(_operations(found)), encoding="utf-8")
@@ -114,6 +114,14 @@ def label_in(found: SoapDescription, path: str, body: bytes) -> str | None:
 def each(ports: Iterable[SoapPort]) -> Iterable[tuple[SoapPort, SoapOperation]]:
     """Yield each operation with its port."""
     return ((port, operation) for port in ports for operation in port.operations)
+
+
+@lru_cache(maxsize=4)
+def own_wsdl(contract: Contract) -> str:
+    """Return the URL from which a pack's WSDL came; empty where it came from a file, or the pack has none."""
+    path = contract.directory / DOCUMENTS_NAME
+    location = str(json.loads(path.read_text(encoding="utf-8"))["location"]) if path.is_file() else ""
+    return location if urlsplit(location).scheme in {"http", "https"} else ""
 
 
 @lru_cache(maxsize=4)

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from http import HTTPStatus
+from urllib.parse import urlsplit
 
 from conformance.api.rest.calls import Call, example_call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.documents.json_schema import kind_of
 from conformance.documents.openapi import Operation, operations_of
+from conformance.documents.wsdl_pack import own_wsdl
 
 # As many operations of an API show how its server speaks HTTP.
 _DESCRIBED_READS = 8
@@ -17,9 +19,18 @@ NO_MOTION = "it moves the robot, and --allow-motion was not given"
 def reads(api: RestInterface) -> list[Call]:
     """Return a valid request for each read-only operation, the optional ones last; see readable()."""
     found = [item for item in operations_of(api.run.contract) if item.method == "GET" and allowed(api, item)]
+    if own := _wsdl_path(api):
+        return [Call(Operation("the WSDL", "GET", own), {})]
     if api.run.contract.described:
         return _described_reads(api, found)
     return [readable(api, item) for item in sorted(found, key=lambda item: item.optional)]
+
+
+def _wsdl_path(api: RestInterface) -> str:
+    """Return the path below the base URL of the WSDL that a SOAP device serves; empty where it serves none."""
+    url = urlsplit(own_wsdl(api.run.contract))
+    is_own = url.netloc == api.client.authority and url.path.startswith(f"{api.client.prefix}/")
+    return url._replace(scheme="", netloc="").geturl().removeprefix(api.client.prefix) if is_own else ""
 
 
 def _described_reads(api: RestInterface, operations: list[Operation]) -> list[Call]:

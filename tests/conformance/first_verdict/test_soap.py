@@ -36,6 +36,11 @@ def test_a_right_camera_is_not_blamed(tmp_path):
     assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
     called = {one["operation"].rpartition("/")[2] for one in outcome.result["api"]["operations"] if one["requests"]}
     assert called == _OPERATIONS
+    # The server of the WSDL is judged beside the verdict.
+    beside = outcome.result["web_server"]["requirements"]
+    assert {one["verdict"] for one in beside} == {"pass", "fail", "not-claimed"}
+    assert [one["id"] for one in beside if one["verdict"] == "fail"] == ["web-server/host-invalid"]
+    assert "web-server" not in outcome.result["classes"]
 
 
 def test_what_is_wrong_in_one_operation_is_found_there(tmp_path):
