@@ -113,6 +113,7 @@ def certify(
         remarks.insert(0, run.refused)
         robot.refusals.withdraw()
     robot.note_uncalled()
+    run.unshown = robot.nothing_shown
     remarks += run.remarks
     seen, causes = draw_verdicts(run)
     remarks += [one["text"] for one in left_out(robot).values()]
@@ -121,7 +122,9 @@ def certify(
         seen = score(seen, run.scored, f"requirement set {run.requirement_set.name}")
     verdicts = apply_baseline(seen, baseline, dt.datetime.now(dt.UTC).date())
     # A baseline makes a run green, not a robot conformant: the classes fail all the same.
-    classes, accepted = (withheld(_deciding(one, run.claims, run.beside), run.refused) for one in (seen, verdicts))
+    classes, accepted = (
+        withheld(_deciding(one, run.claims, run.beside), run.refused or run.unshown) for one in (seen, verdicts)
+    )
     failed = overall(classes) is Overall.NOT_CONFORMANT
     if not run.enough and run.less:
         remarks.append(f"Nothing can be said of a robot {run.less}: the verdict is inconclusive unless it failed.")

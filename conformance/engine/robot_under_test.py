@@ -201,6 +201,16 @@ class RobotUnderTest:
         """Whether any interface responded at the start, or was lost in one of the first requests."""
         return self.run.losses > 0 or any(self.has(name) and name not in self.run.unreachable for name in Interface)
 
+    @property
+    def nothing_shown(self) -> str:
+        """Why the run shows nothing of a device with a description of its own, or an empty text."""
+        run = self.run
+        # What a web server does by itself needs no operation.
+        alone = all(run.contract.classes[name].beside for name in run.claims)
+        if self.log is None or self.rest is None or alone or run.refused or not self.reached:
+            return ""
+        return self.log.nothing_shown(self.rest.call_rules)
+
     def alive(self) -> bool:
         """Return whether the run can go on: the device responds, or does so again after it was lost."""
         if self.run.aborted:

@@ -60,6 +60,7 @@ class Run:
         restart_command: command that restarts a device that stopped responding, or empty.
         wait_s: how long a device that stopped responding is waited for, s; None: as the restart command has it.
         refused: how the device refused the run's credentials, so that nothing, or not all, was judged; or empty.
+        unshown: why nothing of a device with a description of its own was shown, or empty.
         unreachable: why an interface was not reachable at the start.
         tally: the generated cases of all explorations, and those that time did not allow.
         limit: the time that the run may take, and what it left out.
@@ -81,6 +82,7 @@ class Run:
     restart_command: str = ""
     wait_s: float | None = None
     refused: str = ""
+    unshown: str = ""
     unreachable: dict[Interface, str] = field(default_factory=dict)
     tally: Tally = field(default_factory=Tally)
     limit: TimeLimit = field(default_factory=TimeLimit)

@@ -35,6 +35,8 @@ def verdict_line(run: Run, value: Overall, verdicts: Iterable[Verdict]) -> str:
     """Return the verdict in a line, such as "conformant to full (contract 1.2), seen on ROS"."""
     if run.refused and value is Overall.INCONCLUSIVE:
         return "inconclusive, because the device refused the credentials"
+    if run.unshown and value is Overall.INCONCLUSIVE:
+        return f"inconclusive, because {run.unshown}"
     if run.contract.described:
         said = _OF_DESCRIBED[value]
         said = f"{said}, as far as --minutes {run.limit.minutes:g} allowed" if run.limit.is_struck else said

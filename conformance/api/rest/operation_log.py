@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 from urllib.parse import parse_qsl
 
 from conformance.api.call_rules import CallRules
@@ -20,6 +21,9 @@ from conformance.verdict.finding import Finding
 
 # A body is read for what it shows of its schema up to this size, octets.
 _READ = 100_000
+_ERRORS: Final = 400
+# A fault as the first element of a SOAP Body.
+_FAULT: Final = re.compile(rb"Body[^<>]*>\s*<(?:[\w.-]+:)?Fault[\s/>]")
 
 
 @dataclass
@@ -28,6 +32,7 @@ class _Record:
 
     sent: int = 0
     unanswered: int = 0
+    succeeded: int = 0
     statuses: Counter[int] = field(default_factory=Counter)
     slowest_ms: float = 0.0
     parameters: set[str] = field(default_factory=set)
@@ -60,6 +65,7 @@ class OperationLog(Listener):
         if operation is not None:
             record = self._count(operation, exchange.request)
             record.statuses[exchange.response.status] += 1
+            record.succeeded += exchange.response.status < _ERRORS and not self._is_fault(exchange)
             record.slowest_ms = max(record.slowest_ms, exchange.response.elapsed_ms)
             self._look_into(operation, record, exchange)
 
@@ -68,6 +74,9 @@ class OperationLog(Listener):
         operation = self._operation(request.request)
         if operation is not None:
             self._count(operation, request.request).unanswered += 1
+
+    def _is_fault(self, exchange: Exchange) -> bool:
+        return self._services is not None and _FAULT.search(exchange.response.body) is not None
 
     def _operation(self, request: Request) -> Operation | None:
         if not request.url.startswith(self._base_url) or request.method in {"HEAD", "OPTIONS"}:
@@ -133,6 +142,19 @@ class OperationLog(Listener):
                 ],
             },
         }
+
+    def nothing_shown(self, rules: CallRules) -> str:
+        """Return why the run shows nothing of the device, and what is needed; empty if an operation succeeded."""
+        reasons = {item: rules.decide(item) for item in operations_of(self._contract)}
+        if any(record.succeeded for record in self._records.values()):
+            return ""
+        if any(record.sent for record in self._records.values()):
+            return "no operation succeeded; [values] in a statement names values that the device knows"
+        # HEAD and OPTIONS are not counted: other checks send them as well.
+        if any(reason.may and item.method in {"HEAD", "OPTIONS"} for item, reason in reasons.items()):
+            return ""
+        why = next((f": {item.label}: {reason}" for item, reason in reasons.items() if not reason.may), "")
+        return f"no operation could be called{why}"
 
     def concerned(self, request: Request) -> set[str]:
         """Return the labels of the operations that a request concerns: those of its resource if it has no own one."""
