@@ -12,6 +12,7 @@ from conformance.engine.resending import send_again
 from conformance.engine.smaller_requests import smaller
 from conformance.transport.client import Connection
 from conformance.transport.exchange import (
+    OF_GATEWAY,
     SAFE_METHODS,
     Attempt,
     NoAnswer,
@@ -39,6 +40,9 @@ _DYING_S: Final = 0.3
 _MOST_LOSSES: Final = 5
 # Requests before the last one that the finding names.
 _NAMED: Final = 5
+_HANGS: Final = frozenset({NoAnswer.TIMEOUT, NoAnswer.GATEWAY_TIMEOUT})
+# Only a request that was sent can have been one too many.
+_SUSPECT: Final = frozenset({NoAnswer.CLOSED, NoAnswer.TIMEOUT, *OF_GATEWAY.values()})
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,12 @@ class LostDevice:
             return self._is_back
         run.losses += 1
         found = self._found(sent)
+        if kind in OF_GATEWAY.values() and not found.sure and (self._is_back or kind is NoAnswer.UNAVAILABLE):
+            seen = f"a gateway responded {kind} to {_named(sent[-1])} and to requests after it"
+            why = f"cannot tell: {seen}. {self._told(sent, found)}"
+            run.judge.skip(requirement, why)
+            run.aborted = "" if self._is_back else why
+            return self._is_back
         self._record(requirement, kind, sent, found)
         if self._is_back and run.losses < _MOST_LOSSES:
             self._tell("the device responds again; the run goes on")
@@ -108,7 +118,7 @@ class LostDevice:
     def _requirement(self, kind: NoAnswer | None) -> str:
         """Return the requirement that the loss breaks; empty if the contract has none on that."""
         run, ledger = self._run, self._run.contract.ledger
-        id_ = _HANG if kind is NoAnswer.TIMEOUT else _CRASH
+        id_ = _HANG if kind in _HANGS else _CRASH
         id_ = id_ if id_ in ledger else _SOAP
         if id_ not in ledger:
             return ""
@@ -187,7 +197,7 @@ class LostDevice:
             return False
         finally:
             self._connection.sent += silent.sent
-        closed = isinstance(came, Unanswered) and came.kind in {NoAnswer.CLOSED, NoAnswer.REFUSED}
+        closed = isinstance(came, Unanswered) and came.kind in {NoAnswer.CLOSED, NoAnswer.REFUSED, *OF_GATEWAY.values()}
         if not closed:
             time.sleep(_DYING_S)
         if not closed and self._responds(0.0):
@@ -198,10 +208,12 @@ class LostDevice:
     def _record(self, requirement: str, kind: NoAnswer | None, sent: Sequence[Request], found: _Found) -> None:
         """Record the finding, because of which what cannot be judged any more is not tested."""
         judge, last = self._run.judge, found.requests[-1]
-        problem = {
+        problems: dict[NoAnswer | None, str] = {
             NoAnswer.TIMEOUT: f"no response within {self._connection.timeout_s:g} s",
             None: "no connection after the response to this request",
-        }.get(kind, "the server closed the connection without a response")
+            **{one: f"a gateway responded {one} in the device's place" for one in OF_GATEWAY.values()},
+        }
+        problem = problems.get(kind, "the server closed the connection without a response")
         operation = self._operation_of(last)
         judge.check(
             requirement,
@@ -209,7 +221,7 @@ class LostDevice:
             Unanswered(last, problem, kind or NoAnswer.CLOSED),
             "a response, and a device that responds afterwards",
             found=f"{problem}, and no response to any request since. {self._told(sent, found)}",
-            cause=f"{operation or last.endpoint} {'hang' if kind is NoAnswer.TIMEOUT else 'closed'}",
+            cause=f"{operation or last.endpoint} {'hang' if kind in _HANGS else 'closed'}",
             subject=operation,
             operations=[Showing(operation, 1, last)] if operation else [],
         )
@@ -240,9 +252,7 @@ def _suspects(recent: Sequence[Sending]) -> tuple[list[Request], NoAnswer | None
     first = len(recent)
     while first and recent[first - 1].kind is not None:
         first -= 1
-    unanswered = [
-        index for index in range(first, len(recent)) if recent[index].kind in {NoAnswer.CLOSED, NoAnswer.TIMEOUT}
-    ]
+    unanswered = [index for index in range(first, len(recent)) if recent[index].kind in _SUSPECT]
     end = unanswered[0] if unanswered else first - 1
     if end < 0:
         return [], None

@@ -56,9 +56,12 @@ def _no_answer(
     losses = run.losses
     goes_on = alive()
     if run.losses > losses or (run.aborted and run.judge.ended_by):
-        # The loss is a finding of its own.
+        # The loss is a finding of its own, or a gateway's doing.
         for id_ in open_ids:
-            run.judge.stopped(id_, run.aborted)
+            if run.aborted or run.judge.ended_by:
+                run.judge.stopped(id_, run.aborted)
+            else:
+                run.judge.skip(id_, str(error))
     elif goes_on:
         for id_ in dict.fromkeys(run.contract.renamed.get(id_, id_) for id_ in open_ids):
             run.judge.check(id_, False, error.unanswered, "a response")  # noqa: FBT003 - the condition of check()

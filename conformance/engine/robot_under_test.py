@@ -1,4 +1,7 @@
-"""The robot of a run: opens its interfaces and checks whether they respond."""
+"""The robot of a run: opens its interfaces and checks whether they respond.
+
+Over 300 lines because the interfaces and whether the device behind them responds are one state.
+"""
 
 import statistics
 import threading
@@ -22,7 +25,7 @@ from conformance.engine.lost_device import LostDevice
 from conformance.engine.refused import RefusalListener
 from conformance.engine.resending import Recorder
 from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import NoAnswer, NoAnswerError, Request
+from conformance.transport.exchange import OF_GATEWAY, Exchange, NoAnswer, NoAnswerError, Request
 from conformance.verdict.run import Run
 
 # How long a robot that stopped answering is given to come back before the rest of the run is called off, s.
@@ -101,6 +104,7 @@ class RobotUnderTest:
         if self.run.contract.described:
             # A contract names its streams; of any other API only a response shows that it does not end.
             self.connection.endless = self.connection.resends = True
+            self.connection.is_away = self._is_away
         self._connect_rest()
         self._connect_soap()
         kinds = [one.kind for one in self.connection.recent]
@@ -207,7 +211,8 @@ class RobotUnderTest:
         run = self.run
         # What a web server does by itself needs no operation.
         alone = all(run.contract.classes[name].beside for name in run.claims)
-        if self.log is None or self.rest is None or alone or run.refused or not self.reached:
+        left_out = run.limit.is_struck or bool(run.refused)
+        if self.log is None or self.rest is None or alone or left_out or not self.reached:
             return ""
         return self.log.nothing_shown(self.rest.call_rules)
 
@@ -215,8 +220,11 @@ class RobotUnderTest:
         """Return whether the run can go on: the device responds, or does so again after it was lost."""
         if self.run.aborted:
             return False
+        recent = self.connection.recent
+        # That a gateway had no device for a moment shows nothing yet.
+        behind_gateway = bool(recent) and recent[-1].kind in OF_GATEWAY.values()
         with self.run.limit.lifted():
-            return self._responds(self._grace_s) or self._comes_back()
+            return (not behind_gateway and self._responds(self._grace_s)) or self._comes_back()
 
     def _comes_back(self) -> bool:
         """Return whether a device that was lost is back, after recording the loss."""
@@ -241,7 +249,7 @@ class RobotUnderTest:
         """Return whether the robot responds, on any interface that responded at the start, within so many seconds."""
         until = time.monotonic() + within_s
         # Nothing is judged by these requests, and none of them made the robot stop.
-        silent = replace(self.connection, listeners=[], recent=deque(), sent=0)
+        silent = replace(self.connection, listeners=[], recent=deque(), sent=0, is_away=self._is_of_gateway)
         clients = [(HttpClient(client.base_url, silent), path) for client, path in self._answering()]
         try:
             while not (responds := any(self._answers(client, path) for client, path in clients)):
@@ -259,11 +267,22 @@ class RobotUnderTest:
             try:
                 client.send(method, target, fresh=True, timeout_s=min(self._grace_s, self.connection.timeout_s))
             except NoAnswerError as none:
-                if none.kind is NoAnswer.REFUSED:
+                if none.kind is NoAnswer.REFUSED or none.kind in OF_GATEWAY.values():
                     return False
                 continue
             return True
         return False
+
+    def _is_of_gateway(self, exchange: Exchange) -> bool:
+        """Return whether a response has a status of gateways that the first requests of the run did not get."""
+        looked = self.rest.looked if self.rest else []
+        before = {one.response.status for one in looked}
+        put_off = exchange.response.header("retry-after") is not None
+        return bool(before) and exchange.response.status in OF_GATEWAY.keys() - before and not put_off
+
+    def _is_away(self, exchange: Exchange) -> bool:
+        """Return whether a gateway sent a response in the device's place: it sends the like to what worked before."""
+        return self._is_of_gateway(exchange) and not self._responds(0.0)
 
     def _operation_of(self, request: Request) -> str:
         """Return the label of the described operation that a request is for, or an empty text."""

@@ -16,6 +16,7 @@ from conformance.transport.connections import ClosedError, Connections, NoConnec
 from conformance.transport.credentials import Credentials, bearer
 from conformance.transport.deadline import Deadline
 from conformance.transport.exchange import (
+    OF_GATEWAY,
     SAFE_METHODS,
     Exchange,
     Listener,
@@ -65,6 +66,7 @@ class Connection:
         endless: whether a body that does not end is a response, of which only the beginning is read.
         resends: whether any request is sent again that met the end of a kept connection, also one that may act twice.
         recent: the last requests, in the order in which they were answered or given up.
+        is_away: returns whether a gateway sent a response in the place of a device that is away.
         permit: is called with method and absolute URL before each request; returns an empty text if the request may be
             sent, else why not. By default everything may be sent.
     """
@@ -81,6 +83,7 @@ class Connection:
     endless: bool = False
     resends: bool = False
     recent: deque[Sending] = field(default_factory=lambda: deque(maxlen=_RECENT))
+    is_away: Callable[[Exchange], bool] = lambda _exchange: False
     permit: Permit = lambda _method, _url: ""
     credentials: Credentials = field(default_factory=Credentials)
     certificate: tuple[Path, Path | None] | None = None
@@ -209,17 +212,24 @@ class HttpClient:
             if none.kind is NoAnswer.TIMEOUT:
                 self._hangs[endpoint].append(time.monotonic())
                 self.connection.pace.took(time.monotonic() - started, len(body))
-            unanswered = Unanswered(request, str(none), none.kind)
-            self.connection.recent.append(Sending(request, none.kind))
-            for listener in self.connection.listeners:
-                listener.unanswered(unanswered)
-            raise NoAnswerError(unanswered) from none
+            raise self._unanswered(request, str(none), none.kind) from none
         self.connection.pace.took(response.elapsed_ms / 1000, len(body) + len(response.body))
         exchange = Exchange(request, response)
+        if self.connection.is_away(exchange):
+            problem = f"a gateway responded {response.status} in the device's place"
+            raise self._unanswered(request, problem, OF_GATEWAY[response.status])
         self.connection.recent.append(Sending(request, None))
         for listener in self.connection.listeners:
             listener.answered(exchange)
         return exchange
+
+    def _unanswered(self, request: Request, problem: str, kind: NoAnswer) -> NoAnswerError:
+        """Report a request without a response; return the exception to be raised."""
+        unanswered = Unanswered(request, problem, kind)
+        self.connection.recent.append(Sending(request, kind))
+        for listener in self.connection.listeners:
+            listener.unanswered(unanswered)
+        return NoAnswerError(unanswered)
 
     def forget_hangs(self) -> None:
         """Send again to operations that did not respond."""

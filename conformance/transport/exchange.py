@@ -169,6 +169,14 @@ class NoAnswer(StrEnum):
     MALFORMED = "malformed"
     # The endpoint has hung before, so nothing was sent.
     CIRCUIT_OPEN = "circuit-open"
+    # A gateway responded in the place of a device that is away.
+    BAD_GATEWAY = "502"
+    UNAVAILABLE = "503"
+    GATEWAY_TIMEOUT = "504"
+
+
+#: What each status of a gateway means where the device behind it is away (RFC 9110 15.6.3 to 15.6.5).
+OF_GATEWAY: Final = {502: NoAnswer.BAD_GATEWAY, 503: NoAnswer.UNAVAILABLE, 504: NoAnswer.GATEWAY_TIMEOUT}
 
 
 @dataclass(frozen=True)

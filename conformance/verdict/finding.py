@@ -16,6 +16,9 @@ _KINDS = {
     NoAnswer.TLS: CauseKind.NO_RESPONSE,
     NoAnswer.TIMEOUT: CauseKind.HANG,
     NoAnswer.CIRCUIT_OPEN: CauseKind.HANG,
+    NoAnswer.BAD_GATEWAY: CauseKind.NO_RESPONSE,
+    NoAnswer.UNAVAILABLE: CauseKind.NO_RESPONSE,
+    NoAnswer.GATEWAY_TIMEOUT: CauseKind.HANG,
     NoAnswer.MALFORMED: CauseKind.UNREADABLE,
 }
 # Fields that every request has, or that say nothing about what is special in it.

@@ -1,0 +1,99 @@
+"""A device behind a gateway is blamed where a request makes it go away, and not where it is away for a moment."""
+
+import http.client
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from urllib.parse import urlsplit
+
+import pytest
+from small_device import certified
+from test_lost_device import arm, only_failure
+
+_OWN = {"connection", "content-length", "date", "host", "server", "transfer-encoding"}
+
+
+class _Gateway(BaseHTTPRequestHandler):
+    """Forwards to ``server.device``; where that fails, or while ``server.absent``, responds ``server.status``."""
+
+    protocol_version = "HTTP/1.1"
+
+    def parse_request(self) -> bool:
+        understood = super().parse_request()
+        if understood:
+            setattr(self, f"do_{self.command}", self._forward)
+        return understood
+
+    def _forward(self) -> None:
+        body = self.rfile.read(int(self.headers.get("Content-Length", "0")))
+        fields = {name: value for name, value in self.headers.items() if name.lower() not in _OWN}
+        self.server.count += 1
+        device = http.client.HTTPConnection(self.server.device, timeout=1)
+        try:
+            if self.server.count in self.server.absent:
+                raise ConnectionRefusedError
+            device.request(self.command, self.path, body or None, fields)
+            answer = device.getresponse()
+            status, content, fields = answer.status, answer.read(), answer.getheaders()
+        except (OSError, http.client.HTTPException):
+            status, content, fields = self.server.status, b"<h1>no device</h1>", [("Content-Type", "text/html")]
+        finally:
+            device.close()
+        self.send_response(status)
+        for name, value in fields:
+            if name.lower() not in _OWN:
+                self.send_header(name, value)
+        if status != http.HTTPStatus.NO_CONTENT:
+            self.send_header("Content-Length", str(len(content)))
+        self.end_headers()
+        self.wfile.write(content if self.command != "HEAD" else b"")
+
+    def log_message(self, *_: object) -> None:
+        """Say nothing."""
+
+
+@contextmanager
+def gateway(device: str, status: int, absent: range) -> Iterator[str]:
+    with ThreadingHTTPServer(("127.0.0.1", 0), _Gateway) as server:
+        server.device, server.status, server.absent, server.count = urlsplit(device).netloc, status, absent, 0
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+def judged(how, status, folder, *, restart=False, absent=range(0)):
+    with arm(how, folder) as (device, command), gateway(device, status, absent) as url:
+        more = ("--restart-command", command) if restart else ("--wait", "1")
+        classes = ("--class", "description", "--class", "robustness")
+        return certified(f"{url}/openapi.json", folder / "out", "--timeout", "4", *more, *classes)
+
+
+@pytest.mark.parametrize("absent", [range(0), range(20, 21)])
+def test_a_healthy_device_behind_a_gateway_is_not_blamed(tmp_path, absent):
+    outcome = judged("well", 503, tmp_path, absent=absent)
+    assert "robustness/no-crash" not in outcome.blamed, outcome.text
+
+
+@pytest.mark.parametrize(("how", "status", "requirement"), [("exit", 502, "no-crash"), ("hang", 504, "no-hang")])
+def test_a_device_that_stays_lost_fails_by_the_request_that_did_it(tmp_path, how, status, requirement):
+    outcome = judged(how, status, tmp_path)
+    assert outcome.exit_code == 1
+    failure = only_failure(outcome, f"robustness/{requirement}")
+    assert "/pose?z=" in failure["request"]["url"]
+    assert f"a gateway responded {status} in the device's place" in failure["message"]
+
+
+def test_a_request_that_does_it_again_is_the_devices_fault(tmp_path):
+    outcome = judged("exit", 503, tmp_path, restart=True)
+    assert outcome.exit_code == 1
+    failure = only_failure(outcome, "robustness/no-crash")
+    assert failure["request"]["url"].endswith(("z=1e%2B308", "z=-1e%2B308"))
+    assert "did it again" in failure["message"]
+
+
+@pytest.mark.parametrize("status", [502, 503, 504])
+def test_a_device_that_is_away_for_a_moment_is_inconclusive(tmp_path, status):
+    outcome = judged("well", status, tmp_path, absent=range(30, 36))
+    assert (outcome.exit_code, outcome.blamed) == (4, {}), outcome.text
+    assert f"cannot tell: a gateway responded {status}" in outcome.text
