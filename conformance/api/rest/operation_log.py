@@ -22,6 +22,8 @@ from conformance.verdict.finding import Finding
 # A body is read for what it shows of its schema up to this size, octets.
 _READ = 100_000
 _ERRORS: Final = 400
+# The device's state did not allow the operation, which shows it as well as a success.
+_OF_STATE: Final = frozenset({409, 423})
 # A fault as the first element of a SOAP Body.
 _FAULT: Final = re.compile(rb"Body[^<>]*>\s*<(?:[\w.-]+:)?Fault[\s/>]")
 
@@ -65,7 +67,7 @@ class OperationLog(Listener):
         if operation is not None:
             record = self._count(operation, exchange.request)
             record.statuses[exchange.response.status] += 1
-            record.succeeded += exchange.response.status < _ERRORS and not self._is_fault(exchange)
+            record.succeeded += self._succeeded(exchange)
             record.slowest_ms = max(record.slowest_ms, exchange.response.elapsed_ms)
             self._look_into(operation, record, exchange)
 
@@ -75,8 +77,11 @@ class OperationLog(Listener):
         if operation is not None:
             self._count(operation, request.request).unanswered += 1
 
-    def _is_fault(self, exchange: Exchange) -> bool:
-        return self._services is not None and _FAULT.search(exchange.response.body) is not None
+    def _succeeded(self, exchange: Exchange) -> bool:
+        answer = exchange.response
+        if self._services is not None and _FAULT.search(answer.body):
+            return False
+        return answer.status < _ERRORS or answer.status in _OF_STATE
 
     def _operation(self, request: Request) -> Operation | None:
         if not request.url.startswith(self._base_url) or request.method in {"HEAD", "OPTIONS"}:
