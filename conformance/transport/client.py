@@ -1,4 +1,7 @@
-"""The HTTP client of the suite. Every request has a deadline, is recorded, and is reported to listeners."""
+"""The HTTP client of the suite. Every request has a deadline, is recorded, and is reported to listeners.
+
+Over 300 lines because the client is one class, and the settings that it follows are read together with it.
+"""
 
 import math
 import ssl
