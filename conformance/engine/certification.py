@@ -92,7 +92,7 @@ def certify(
             if reached:
                 # Of a robot that is not there, they would only hide that.
                 if progress is not None:
-                    progress.writelines(f"{note}\n" for note in (*notes, *announced))
+                    progress.writelines(f"{note}\n" for note in filter(None, (*notes, *announced, robot.estimate())))
                 run.interrupted |= _run_checks(robot, Progress(robot, progress, bar=bar), remarks, recordings)
                 run.limit.end()
                 if not (run.interrupted or run.aborted):

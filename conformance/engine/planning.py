@@ -58,4 +58,4 @@ def plan_of(robot: RobotUnderTest) -> list[str]:
     moving = sum(step.moves for step in seen)
     first = f"{len(seen)} checks, {len(scenarios)} scenarios; {moving} checks may move the device."
     motion = "" if robot.run.allow_motion else " They are skipped without --allow-motion."
-    return [first + motion, *told(seen)]
+    return [first + motion, *filter(None, [robot.estimate(measured=False)]), *told(seen)]

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TextIO
 
+from conformance.api.call_rules import CallRules
 from conformance.api.device import Device, device_of
 from conformance.api.interfaces import Interfaces
 from conformance.api.permission import Permission
@@ -21,6 +22,7 @@ from conformance.api.rest.operation_log import OperationLog
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
 from conformance.contract.interfaces import Interface
+from conformance.documents.openapi import operations_of
 from conformance.engine.lost_device import LostDevice
 from conformance.engine.refused import RefusalListener
 from conformance.engine.resending import Recorder
@@ -235,6 +237,19 @@ class RobotUnderTest:
             client.close()
             client.forget_hangs()
         return goes_on
+
+    def estimate(self, *, measured: bool = True) -> str:
+        """Return how many requests the run sends, and how long it takes, if the device is judged by its description."""
+        run = self.run
+        if not run.contract.described:
+            return ""
+        # Imported late: the survey and what it needs cost time that --help need not pay.
+        from conformance.scenarios.estimate import estimate  # noqa: PLC0415
+
+        rules = CallRules(run.statement.calls.allow, run.statement.calls.never, motion=run.allow_motion)
+        operations = [one for one in operations_of(run.contract) if rules.decide(one).may]
+        said = estimate(run, operations).text(run.effort.usual_ms if measured else None)
+        return f"{said} It ends after about {run.limit.minutes:g} minutes." if run.limit.minutes is not None else said
 
     def note_uncalled(self) -> None:
         """Keep which operations were not called for want of time."""

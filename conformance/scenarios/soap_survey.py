@@ -28,6 +28,7 @@ from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, 
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import SURVEY_SHARE
 from conformance.transport.exchange import Exchange, NoAnswerError, Unanswered
+from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 from conformance.verdict.time_limit import TimeIsOverError
 
@@ -43,6 +44,16 @@ _BUDGET_S: Final = 20.0
 _MANY: Final = 1000
 # So many values that the device gave are tried for one operation.
 _TRIED: Final = 3
+# Messages that are wrong whatever the operation is; and invalid ones that a schema of usual size has.
+_WRONG: Final = 6
+_USUALLY_INVALID: Final = 4
+
+
+def requests_of(effort: Effort) -> int:
+    """Return about how many messages an operation is sent."""
+    usual = 1 if effort.name == "quick" else _USUAL
+    # A usual message follows each wrong one.
+    return usual + min(_USUALLY_INVALID, effort.cases(_MOST)) + 2 * _WRONG
 
 
 class NotSoapError(ValueError):

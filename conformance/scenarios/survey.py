@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -64,12 +64,12 @@ _NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
 # What differs between two responses to one request: times, and ids of requests.
 _VARYING: Final = re.compile(r"[0-9a-fA-F]*\d[0-9a-fA-F]*")
 # How often one request is sent again and again; and cases of Schemathesis, as many of each kind, of one operation.
-_REPEATS: Final = 200
-_FEWEST_REPEATS: Final = 60
-_COVERAGE: Final = 150
+REPEATS: Final = 200
+FEWEST_REPEATS: Final = 60
+COVERAGE: Final = 150
 # As many times an exploration's time one operation may take: one that answers slowly must not take the whole run.
 _BUDGETS: Final = 3
-_FUZZED: Final = 40
+FUZZED: Final = 40
 # With a limit in time: the survey's others than the usual requests end at the first share of it, so that what every web
 # API is bound by is tried; the generated requests end at the second.
 SURVEY_SHARE: Final = 0.5
@@ -329,24 +329,14 @@ class Surveyor:
     def vary(self, operation: Operation, effort: Effort, seed: int) -> Iterator[None]:
         """Send requests that differ from the usual one in one thing, and then the usual one again."""
         usual = self.usual[operation.label]
-        valid = list(valid_variations(operation, usual, self.values))
-        if not operation.safe:
-            valid = effort.draw(valid, _ACTING, f"{seed}/valid {operation.label}")
-        groups = {
-            "valid": [*valid, *unknown_variations(operation, usual)],
-            "invalid": list(invalid_variations(operation, usual)),
-            "odd": list(odd_variations(operation, usual)),
-        }
+        groups = drawn(operation, usual, self.values, effort, seed, self.api.slow)
         left = _BUDGETS * effort.budget_s
         self._time(operation, usual, effort, time.monotonic() + left)
-        for name, variations in groups.items():
+        for variations in groups:
             began = time.monotonic()
             until = began + left
-            standard = max(_MOST[name], round(_LEAST[name] / effort.factor))
-            standard //= _SLOW_SHARE if operation.label in self.api.slow else 1
-            drawn = effort.draw(variations, standard, f"{seed}/{name} {operation.label}")
-            self.api.run.tally.planned += len(drawn)
-            for one in drawn:
+            self.api.run.tally.planned += len(variations)
+            for one in variations:
                 if operation.label in self.given_up:
                     return
                 if time.monotonic() > until:
@@ -383,6 +373,33 @@ class Surveyor:
         for _ in range(0 if effort.name == "quick" or operation.method == "DELETE" else TIMED):
             if operation.label not in self.given_up and time.monotonic() < until:
                 self.send(operation, Variation(Kind.AGAIN, "", "", usual))
+
+
+def drawn(
+    operation: Operation, usual: Inputs, values: Values, effort: Effort, seed: int, slow: Container[str] = ()
+) -> Iterator[list[Variation]]:
+    """Yield the valid, the invalid and the odd requests that are sent to an operation.
+
+    Args:
+        operation: the operation.
+        usual: values of its usual request.
+        values: those that the device gave.
+        effort: how many are drawn.
+        seed: of the run.
+        slow: labels of operations that get fewer; looked into when a group is drawn.
+    """
+    valid = list(valid_variations(operation, usual, values))
+    if not operation.safe:
+        valid = effort.draw(valid, _ACTING, f"{seed}/valid {operation.label}")
+    groups = {
+        "valid": [*valid, *unknown_variations(operation, usual)],
+        "invalid": list(invalid_variations(operation, usual)),
+        "odd": list(odd_variations(operation, usual)),
+    }
+    for name, variations in groups.items():
+        standard = max(_MOST[name], round(_LEAST[name] / effort.factor))
+        standard //= _SLOW_SHARE if operation.label in slow else 1
+        yield effort.draw(variations, standard, f"{seed}/{name} {operation.label}")
 
 
 def order_of(operation: Operation) -> tuple[int, int]:
@@ -428,7 +445,7 @@ def _repeated(surveyor: Surveyor, operations: list[Operation]) -> Survey:
     for _, label in sorted(quickest)[:1]:
         operation = next(item for item in operations if item.label == label)
         request = written(operation, surveyor.usual[label])
-        for _ in range(max(_FEWEST_REPEATS, surveyor.api.run.effort.cases(_REPEATS))):
+        for _ in range(max(FEWEST_REPEATS, surveyor.api.run.effort.cases(REPEATS))):
             if surveyor.api.run.limit.is_past(SURVEY_SHARE):
                 break
             try:
@@ -483,10 +500,10 @@ def _send_generated(surveyor: Surveyor, operation: Operation, target: Target, ex
 
     run = surveyor.api.run
     until = time.monotonic() + _BUDGETS * run.effort.budget_s
-    count = _COVERAGE // (_SLOW_SHARE if operation.label in surveyor.api.slow else 1)
-    drawn = run.effort.draw(list(target.covering()), count, f"{run.seed}/coverage {target.label}")
-    run.tally.planned += len(drawn)
-    for case in drawn:
+    count = COVERAGE // (_SLOW_SHARE if operation.label in surveyor.api.slow else 1)
+    chosen = run.effort.draw(list(target.covering()), count, f"{run.seed}/coverage {target.label}")
+    run.tally.planned += len(chosen)
+    for case in chosen:
         if run.limit.is_past(_GENERATED_SHARE):
             run.limit.shortened.add(target.label)
             break
@@ -498,7 +515,7 @@ def _send_generated(surveyor: Surveyor, operation: Operation, target: Target, ex
         return
     for negative in (True, False):
         with suppress(*NOT_GENERATED):
-            explore(target.fuzzed(negative=negative), partial(_send_case, surveyor, operation), cases=_FUZZED)
+            explore(target.fuzzed(negative=negative), partial(_send_case, surveyor, operation), cases=FUZZED)
 
 
 def _send_case(surveyor: Surveyor, operation: Operation, case: Any) -> None:

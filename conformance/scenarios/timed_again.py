@@ -10,7 +10,7 @@ from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.verdict.time_limit import TimeIsOverError
 
 # Each is sent so often: the quickest of them waited for nobody else.
-_TIMED: Final = 5
+TIMED_AGAIN: Final = 5
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def timed_again(api: RestInterface) -> tuple[TimedAgain, ...]:
         if not label.startswith("GET ") or label in api.streams:
             continue
         try:
-            exchanges = [call.send(api) for _ in range(_TIMED)]
+            exchanges = [call.send(api) for _ in range(TIMED_AGAIN)]
         except (NoAnswerError, TimeIsOverError):
             continue  # what does not respond, other rules tell
         times = tuple(one.response.elapsed_ms for one in exchanges)

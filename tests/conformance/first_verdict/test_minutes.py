@@ -1,6 +1,7 @@
 """``--minutes`` bounds a run; what it left out is named, and is neither passed nor an error."""
 
 import asyncio
+import re
 import time
 from pathlib import Path
 
@@ -61,5 +62,9 @@ def test_a_run_within_its_time_leaves_nothing_out_and_finds_the_same(tmp_path: P
         free = certified(url, tmp_path / "free")
         bounded = certified(url, tmp_path / "bounded", "--minutes", 5)
     assert "left_out" not in bounded.result
+    told = re.search(r"This run sends about ([\d,]+) requests and takes about .* \(the device answers in", free.text)
+    assert told is not None
+    assert free.result["requests"] / 1.5 < int(told[1].replace(",", "")) < free.result["requests"] * 1.5
+    assert "It ends after about 5 minutes." in bounded.text
     assert bounded.exit_code == free.exit_code == 1
     assert bounded.blamed == free.blamed

@@ -1,0 +1,136 @@
+"""How many requests a run of a described device sends, and how long it takes: known before the first check.
+
+What the survey sends is counted, as the same functions draw it. What the checks of HTTP send hardly depends on the
+description; their counts are constants, measured with devices of 1, 20 and 188 operations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from conformance.api.rest.inputs import usual_inputs
+from conformance.api.rest.values import Values
+from conformance.contract.described import SOAP
+from conformance.documents.openapi import Operation
+from conformance.scenarios.soap_survey import requests_of
+from conformance.scenarios.survey import COVERAGE, FEWEST_REPEATS, FUZZED, REPEATS, TIMED, drawn
+from conformance.scenarios.timed_again import TIMED_AGAIN
+from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
+
+# Of the cases that Schemathesis is asked for, it makes about this share: some are alike, some cannot be sent. It covers
+# an operation by about so many cases for each parameter or member of the body, and one without any by so many.
+_MADE: Final = 0.7
+_COVERING: Final = 15
+_WITHOUT_INPUT: Final = 3
+# The checks of HTTP use up to so many operations, each with about so many requests; and each operation is sent OPTIONS.
+_READS: Final = 8
+_EACH_READ: Final = 18
+_HTTP: Final = 90
+_HTTP_SLOW: Final = 40
+# For each of those, so many reads use one connection at standard, at least so many in all, and so many with a slow
+# device; and several clients at once read so often at standard.
+_ON_ONE_CONNECTION: Final = 60
+_LEAST_ON_ONE: Final = 120
+_FEWEST: Final = 3
+_AT_ONCE: Final = 325
+# The first requests, which measure how fast the device answers; of a device without any to read, too.
+_FIRST: Final = 12
+# The time of the suite for a request, and for one that Hypothesis draws, ms; and for its start, s.
+_OWN_MS: Final = 0.5
+_DRAWN_MS: Final = 5.5
+_START_S: Final = 0.5
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a run takes.
+
+    Attributes:
+        requests: how many are sent.
+        drawn: how many of them Hypothesis draws.
+        at_once: how many of them are sent by several clients at once.
+    """
+
+    requests: int
+    drawn: int = 0
+    at_once: int = 0
+
+    def seconds(self, usual_ms: float) -> float:
+        """Return how long the run takes where the device needs so many milliseconds for an answer, s."""
+        in_turn = self.requests - self.at_once * (1 - 1 / _READS)
+        return _START_S + (in_turn * (usual_ms + _OWN_MS) + self.drawn * _DRAWN_MS) / 1000
+
+    def text(self, usual_ms: float | None = None) -> str:
+        """Return the estimate as a sentence; without a time if the time of an answer is not known."""
+        requests = f"{_rounded(self.requests)} requests"
+        if usual_ms is None:
+            return f"This run sends about {requests}; how long that takes depends on the device's response time."
+        seconds = self.seconds(usual_ms)
+        long = f"{_rounded(seconds)} s" if seconds < 100 else f"{_rounded(seconds / 60)} minutes"  # noqa: PLR2004 - in one place
+        return f"This run sends about {requests} and takes about {long} (the device answers in {usual_ms:.1f} ms)."
+
+
+def estimate(run: Run, operations: Sequence[Operation]) -> Estimate:
+    """Return what a run takes.
+
+    Args:
+        run: the data of the run; its effort knows how fast the device answers, or assumes that it is fast.
+        operations: those that may be called.
+    """
+    effort = run.effort
+    if SOAP in run.contract.classes:
+        return Estimate(_FIRST + len(operations) * requests_of(effort))
+    surveyed = covering = fuzzed = 0
+    if {"description", "robustness"} & set(run.claims):
+        reads = [one for one in operations if one.method == "GET"]
+        surveyed = sum(_surveyed(one, effort, run.seed) for one in operations) + TIMED_AGAIN * len(reads)
+        surveyed += max(FEWEST_REPEATS, effort.cases(REPEATS)) if reads else 0
+        generated = [_generated(one, effort) for one in operations]
+        covering, fuzzed = sum(one[0] for one in generated), sum(one[1] for one in generated)
+    http, at_once = _http(operations, effort) if "http" in run.claims else (0, 0)
+    return Estimate(_FIRST + surveyed + covering + fuzzed + http, fuzzed, at_once)
+
+
+def _surveyed(operation: Operation, effort: Effort, seed: int) -> int:
+    """Return how many requests of an operation the survey sends."""
+    values = Values()
+    try:
+        groups = list(drawn(operation, usual_inputs(operation, values)[0], values, effort, seed))
+    except Exception:  # noqa: BLE001 - the survey tells what cannot be read
+        return 1
+    timed = 0 if effort.name == "quick" or operation.method == "DELETE" else TIMED * (1 + len(groups))
+    return 2 + timed + sum(map(len, groups))
+
+
+def _generated(operation: Operation, effort: Effort) -> tuple[int, int]:
+    """Return how many requests of an operation Schemathesis makes to cover it, and how many Hypothesis draws."""
+    inputs = len(operation.parameters) + sum(_members(body.schema) for body in operation.bodies.values())
+    if not inputs:
+        return _WITHOUT_INPUT, 0
+    fuzzed = 0 if effort.name == "quick" or effort.slow else 2 * effort.cases(FUZZED)
+    return round(_MADE * min(effort.cases(COVERAGE), _COVERING * inputs)), round(_MADE * fuzzed)
+
+
+def _members(schema: object) -> int:
+    members = schema.get("properties") if isinstance(schema, dict) else None
+    return max(1, len(members)) if isinstance(members, dict) else 1
+
+
+def _http(operations: Iterable[Operation], effort: Effort) -> tuple[int, int]:
+    """Return how many requests the checks of HTTP send, and how many of them several clients at once."""
+    operations = list(operations)
+    reads = min(_READS, sum(one.method == "GET" for one in operations))
+    if not reads:
+        return len(operations), 0
+    on_one = _FEWEST * reads if effort.slow else max(_LEAST_ON_ONE, reads * effort.cases(_ON_ONE_CONNECTION))
+    at_once = effort.cases(_AT_ONCE) + _FEWEST * reads
+    own = _HTTP_SLOW if effort.slow else _HTTP
+    return own + _EACH_READ * reads + len(operations) + on_one + at_once, at_once
+
+
+def _rounded(value: float) -> str:
+    """Return a number with two digits that count."""
+    return f"{float(f'{value:.2g}'):,.0f}" if value >= 1 else f"{value:.1g}"

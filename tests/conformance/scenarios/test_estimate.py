@@ -1,0 +1,81 @@
+"""The estimate is within a factor of 1.5 of what runs of devices of 1, 20 and 188 operations took.
+
+The figures were measured on an idle machine with devices whose every other operation has one integer parameter.
+"""
+
+import json
+
+import pytest
+
+from conformance.documents.openapi import operations_of
+from conformance.engine.describing import described_contract
+from conformance.scenarios.estimate import Estimate, estimate
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import empty_statement
+from conformance.transport.client import Connection
+from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
+
+_COUNT = {"name": "count", "in": "query", "schema": {"type": "integer", "minimum": 1, "maximum": 10}}
+_RESPONSES = {"200": {"description": "ok", "content": {"application/json": {"schema": {"type": "object"}}}}}
+
+
+@pytest.fixture(scope="module")
+def described(tmp_path_factory):
+    def described(count, effort, usual_ms, *claims):
+        paths = {
+            f"/r{number}": {"get": {"parameters": [_COUNT] if number % 2 else [], "responses": _RESPONSES}}
+            for number in range(count)
+        }
+        folder = tmp_path_factory.mktemp("described")
+        source = folder / "device.json"
+        source.write_text(
+            json.dumps({"openapi": "3.0.3", "info": {"title": "d", "version": "1"}, "paths": paths}), encoding="utf-8"
+        )
+        contract, *_ = described_contract(str(source), (), "http://127.0.0.1:9", Endpoints(), Connection(), folder)
+        run = Run(
+            statement=empty_statement(contract),
+            contract=contract,
+            claims=claims or tuple(contract.classes),
+            effort=Effort(effort).seen(usual_ms),
+        )
+        return estimate(run, operations_of(contract))
+
+    return described
+
+
+@pytest.mark.parametrize(
+    ("count", "effort", "usual_ms", "requests", "seconds"),
+    [
+        (1, "quick", 30, 352, 12.0),
+        (1, "quick", 200, 164, 25.5),
+        (1, "standard", 30, 803, 17.8),
+        (1, "standard", 200, 186, 29.7),
+        (20, "quick", 30, 916, 27.6),
+        (20, "quick", 200, 654, 120.8),
+        (20, "standard", 30, 2659, 80.9),
+        (20, "standard", 200, 1107, 217.0),
+        (188, "quick", 0.5, 4558, 3.8),
+        (188, "quick", 30, 4558, 140.4),
+        (188, "quick", 200, 3437, 671.1),
+        (188, "standard", 0.5, 14167, 40.0),
+    ],
+)
+def test_what_was_measured_was_estimated(described, count, effort, usual_ms, requests, seconds):
+    found = described(count, effort, usual_ms)
+    assert requests / 1.5 < found.requests < requests * 1.5
+    assert seconds / 1.5 < found.seconds(usual_ms) < seconds * 1.5
+
+
+def test_a_class_alone_takes_fewer_requests(described):
+    whole = described(20, "quick", 1).requests
+    assert described(20, "quick", 1, "http").requests < whole
+    assert described(20, "quick", 1, "description").requests < whole
+
+
+def test_the_sentence_has_two_digits_and_a_unit():
+    assert Estimate(14155).text(200.0) == (
+        "This run sends about 14,000 requests and takes about 47 minutes (the device answers in 200.0 ms)."
+    )
+    assert "about 350 requests and takes about 11 s" in Estimate(349).text(30.0)
+    assert Estimate(349).text().endswith("depends on the device's response time.")
