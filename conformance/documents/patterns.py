@@ -58,11 +58,12 @@ def matches(pattern: str, text: str) -> bool:
         PatternError: it is no regular expression of ECMA-262.
         SlowPatternError: it takes too long.
     """
+    if not text.isascii():  # JSON can have half a surrogate pair, and the engines cannot
+        text = text.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
     plain = _native(pattern)
     if plain is not None:
         return bool(plain.is_valid(text))
     regex, source, flags = _compiled(pattern)
-    text = text.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
     if _steps(pattern, len(text)) <= _MOST_STEPS:
         return regex.find(text) is not None
     return _matches_in_time(pattern, source, flags, text)
@@ -153,7 +154,11 @@ class _Worker:
         """Return what the process says; empty if it said nothing in time."""
         if self._process is None:
             self._process = subprocess.Popen(  # noqa: S603 - this module's own program
-                [sys.executable, "-c", _WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+                [sys.executable, "-P", "-c", _WORKER],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                text=True,
             )
             self._ask(self._process, "", "", "")  # the start is not the pattern's time
         timer = threading.Timer(_SECONDS, self._process.kill)

@@ -40,6 +40,7 @@ from conformance.documents.patterns import PatternError, SlowPatternError, check
         (r"^(a+)+$", "a" * 50, "a" * 50 + "!"),
         (r"^[+-]?\d+(?:\.\d+)?$", "-1.5", "1."),
         (r"^\p{L}$", "é", "\ud83d"),
+        (r"^a$", "a", "\ud83d"),
     ],
 )
 def test_a_pattern_matches_what_ecma_262_says(pattern, fits, other):
