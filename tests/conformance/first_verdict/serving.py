@@ -7,6 +7,8 @@ It takes waitress, cheroot and others from the environment, Express and Fastify 
 import contextlib
 import itertools
 import json
+import os
+import signal
 import socket
 import subprocess
 import sys
@@ -53,8 +55,8 @@ _LISTENS_S = 30.0
 
 
 @contextlib.contextmanager
-def serving(server: str) -> Iterator[str]:
-    """Start a server, or "nginx before SERVER"; yields its base URL.
+def serving(server: str, *more: str) -> Iterator[str]:
+    """Start a server with more options, or "nginx before SERVER"; yields its base URL.
 
     Raises:
         OSError: it is not installed, or does not listen.
@@ -67,8 +69,9 @@ def serving(server: str) -> Iterator[str]:
         return
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
-    command = [word.format(port=port) for word in COMMANDS[server]]
-    with subprocess.Popen(command, cwd=FOLDER, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+    command = [word.format(port=port) for word in (*COMMANDS[server], *more)]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(command, cwd=FOLDER, start_new_session=True, **quiet) as process:
         try:
             until = time.monotonic() + _LISTENS_S
             while not _listens(port):
@@ -77,7 +80,9 @@ def serving(server: str) -> Iterator[str]:
                 time.sleep(0.02)
             yield f"http://127.0.0.1:{port}"
         finally:
-            process.terminate()
+            # `go run` ends without the program that it started.
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGTERM)
 
 
 def _listens(port: int) -> bool:

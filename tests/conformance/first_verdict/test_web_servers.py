@@ -61,14 +61,18 @@ def test_a_claim_makes_the_web_server_decide(tmp_path):
     assert "web_server" not in other.result
 
 
-def test_the_advice_to_stand_behind_nginx_makes_each_rule_pass(tmp_path):
+@pytest.mark.parametrize(("server", "framework"), [("uvicorn, httptools", "fastapi"), ("gunicorn, sync", "flask")])
+def test_the_advice_makes_each_rule_pass(server, framework, tmp_path):
     topic = topic_of("web-server/host-missing")
     assert topic is not None
     place = re.search(r"`(location .*?)`", topic.fix)
+    command = topic.code[framework].strip().splitlines()[-1]
     assert place is not None
-    with serving("uvicorn, httptools") as server:
-        advised = place[1].replace("http://127.0.0.1:7004", server)
-        with behind_nginx(server, "", tmp_path, place=advised) as url:
+    assert command.split()[0] in server
+    options = re.findall(r"--limit\S+ \S+", command)
+    with serving(server, *" ".join(options).split()) as upstream:
+        advised = place[1].replace("http://127.0.0.1:7004", upstream)
+        with behind_nginx(upstream, "", tmp_path, place=advised) as url:
             claims = ("--class", "web-server", "--class", "http")
-            outcome = certified(f"{url}/openapi.json", tmp_path / "out", *claims)
+            outcome = certified(f"{url}/openapi.json", tmp_path / "out", *claims, *CALL)
     assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
