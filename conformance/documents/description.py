@@ -19,6 +19,7 @@ from conformance.documents.schema_places import DATA, FILES, make_plain
 from conformance.documents.schema_words import in_one_version
 from conformance.documents.sent_parameters import not_called, with_sent
 from conformance.documents.swagger import as_openapi_3
+from conformance.documents.unreadable_parts import without_unreadable
 
 _MOST_FILES: Final = 5_000
 _VARIABLE: Final = re.compile(r"\{([^{}]+)\}")
@@ -41,7 +42,7 @@ class Description:
         base_url: absolute URL below which the operations are; empty if the description does not say it.
         unresolved: each reference to another file that leads nowhere, with the reason.
         remarks: what a reader of the result should know about its server.
-        not_called: each operation that the suite cannot call, with the reason.
+        not_called: what the suite cannot call or read, with the reason.
     """
 
     source: str
@@ -94,9 +95,11 @@ def _description(source: str, load: Load, overlays: Iterable[str]) -> Descriptio
     uncalled: tuple[str, ...] = ()
     if not version.startswith("2."):
         uncalled, document = not_called(document), with_sent(document, document)
-    document = in_one_version(document)
+    document, unread = without_unreadable(in_one_version(document))
     base_url, remarks = _base_url(source, document)
-    return Description(source, document, original, base_url, (*bundle.unresolved, *broken), remarks, uncalled)
+    return Description(
+        source, document, original, base_url, (*bundle.unresolved, *broken), remarks, (*uncalled, *unread)
+    )
 
 
 def _without(value: Any, broken: frozenset[str]) -> Any:

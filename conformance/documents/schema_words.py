@@ -74,6 +74,11 @@ def in_one_version(document: Schema) -> Schema:
     return {**found, "openapi": "3.1.0"} if is_old else found
 
 
+def in_extension(pointer: str) -> bool:
+    """Return whether a place is in a vendor's extension (x-...), which may hold anything."""
+    return _EXTENSION.search(pointer) is not None
+
+
 def _is_old(document: Schema) -> bool:
     return str(document.get("openapi") or document.get("swagger"))[:3] in {"2.0", "3.0"}
 
@@ -84,7 +89,7 @@ def _found(document: Schema) -> Iterator[tuple[Holder, Any, str, str]]:
     others = [] if _is_2020(document.get("jsonSchemaDialect")) else [""]
     for holder, key, pointer in schema_places(document):
         schema = holder[key]
-        if _EXTENSION.search(pointer):
+        if in_extension(pointer):
             continue
         if isinstance(schema, bool) and is_old and key != "additionalProperties":
             yield holder, key, json.dumps(schema), pointer

@@ -1,0 +1,100 @@
+"""What cannot be read in a description is left out of it, so that the rest is judged; `file-valid` judges the file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import deepcopy
+from typing import Any, Final
+
+import jsonschema_rs
+
+from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed, resolved
+from conformance.documents.openapi import methods_of, read_operations
+from conformance.documents.schema_places import schema_places
+from conformance.documents.schema_words import in_extension
+
+_UNREADABLE: Final = (UnresolvedError, AttributeError, TypeError, KeyError, ValueError)
+_META: Final = jsonschema_rs.validator_for({"$ref": "https://json-schema.org/draft/2020-12/schema"})
+
+
+def without_unreadable(document: Schema) -> tuple[Schema, list[str]]:
+    """Return a document without its unreadable schemas and operations, and a line on each.
+
+    Such a schema allows any value, and such an operation is not there.
+    """
+    document, lines = _without_schemas(document)
+    bare = _bare(document)
+    try:
+        read_operations(bare)
+    except _UNREADABLE:
+        found, more = _without_operations(document, bare)
+        return found, [*lines, *more]
+    return document, lines
+
+
+def _bare(value: Any) -> Any:
+    """Return a part of a document without its schemas, which are what takes time to read."""
+    if isinstance(value, list):
+        return [_bare(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    return {key: {} if key in {"schema", "schemas", "itemSchema"} else _bare(item) for key, item in value.items()}
+
+
+def _without_schemas(document: Schema) -> tuple[Schema, list[str]]:
+    if all(not _fault(schema) for schema in _outermost(document)):
+        return document, []
+    found: Schema = deepcopy(document)
+    lines = []
+    # Inner ones first, so that as little as possible is left out.
+    for holder, key, pointer in reversed(list(schema_places(found))):
+        if not in_extension(pointer) and (fault := _fault(holder[key])):
+            holder[key] = {}
+            lines.append(f"{pointer}: not judged: it is no JSON Schema: {fault}")
+    return found, lines[::-1]
+
+
+def _outermost(document: Schema) -> Iterator[Any]:
+    """Yield the schemas of a document that are in no other schema."""
+    around = "#"
+    for holder, key, pointer in schema_places(document):
+        if not pointer.startswith(f"{around}/") and not in_extension(pointer):
+            around = pointer
+            yield holder[key]
+
+
+def _fault(schema: Any) -> str:
+    """Return why a schema is none; empty if it is one."""
+    try:
+        error = next(iter(_META.iter_errors(modern(schema))), None)
+    except _UNREADABLE as broken:
+        return repr(broken)
+    return "" if error is None else error.message.splitlines()[0][:160]
+
+
+def _without_operations(document: Schema, bare: Schema) -> tuple[Schema, list[str]]:
+    lines, paths = [], {}
+    for path, item in document["paths"].items():
+        whole = pointed(document, item["$ref"]) if isinstance(item, dict) and "$ref" in item else item
+        broken = dict(_broken(bare, path)) if isinstance(whole, dict) else {"": "it is no object"}
+        lines += [f"{f'{method} {path}'.strip()}: not judged: {reason}" for method, reason in broken.items()]
+        if not broken:
+            paths[path] = item
+        elif isinstance(whole, dict):
+            more = whole.get("additionalOperations")
+            kept = {key: one for key, one in whole.items() if key.upper() not in broken and one is not more}
+            if isinstance(more, dict):
+                kept["additionalOperations"] = {key: one for key, one in more.items() if key not in broken}
+            paths[path] = kept
+    return {**document, "paths": paths}, lines
+
+
+def _broken(document: Schema, path: str) -> Iterator[tuple[str, str]]:
+    """Yield the method of each operation of a path that cannot be read, and why."""
+    item = resolved(document, document["paths"][path])
+    for method, operation in methods_of(item).items():
+        alone = {"parameters": item.get("parameters", []), "additionalOperations": {method: operation}}
+        try:
+            read_operations({**document, "paths": {path: alone}})
+        except _UNREADABLE as error:
+            yield method, f"{type(error).__name__}: {error}"
