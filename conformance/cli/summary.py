@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -25,7 +24,6 @@ _COLOURS = {"pass": "green", "fail": "red", "inconclusive": "yellow"}
 _MARKS = {"pass": "pass", "fail": "FAIL", "inconclusive": "inconclusive", "not-claimed": "not claimed"}
 # A device that is judged by its own description conforms to no contract.
 _SHOWN_CURL = 2000
-_PARAMETER = re.compile(r"\{([^{}]+)\}")
 _SHOWN_BLOCKED = 5
 # Findings of one requirement that are printed in full; each further one has a line.
 _IN_FULL = 5
@@ -71,6 +69,7 @@ def print_summary(outcome: Certification) -> None:
     told = ", ".join(f"{count} {value}" for value, count in sorted(counts.items()) if count)
     if "api" in document:
         _print_unshown(document["api"]["operations"])
+        _print_left(document["api"].get("left_behind", {}).get("lines", ()))
         called, described = document["api"]["coverage"]["operations"]
         told = f"{called} of {described} operations called; {told}"
     accepted = f", accepted by the baseline until {document['accepted_until']}" if "accepted_until" in document else ""
@@ -100,12 +99,21 @@ def _print_unshown(rows: list[dict[str, Any]]) -> None:
     click.echo(f"\n{counted(len(unshown), 'operation')} never answered 2xx, so little of them was judged:")
     for row in unshown:
         statuses = ", ".join(f"{count} times {code}" for code, count in row["statuses"].items()) or "no response"
-        click.echo(f"  {inert(row['operation'])}: {statuses}")
-    names = sorted({name for row in unshown for name in _PARAMETER.findall(row["operation"])})
+        need = f"; needs {row['needs']}" if "needs" in row else ""
+        click.echo(f"  {inert(row['operation'])}: {statuses}{need}")
+    names = sorted({name for row in unshown for name in row.get("values", ())})
     if names:
         click.echo("  values that the device knows, in a statement, may help:\n    [values]")
         for name in names:
             click.echo(f'    {inert(json.dumps(name, ensure_ascii=False))} = ["…"]')
+
+
+def _print_left(lines: Sequence[str]) -> None:
+    """Print in which state the device was left."""
+    if lines:
+        click.echo("\nLeft behind on the device:")
+    for line in lines:
+        click.echo(f"  {inert(line)}")
 
 
 def _print_line(cause: dict[str, Any], requirement: dict[str, Any]) -> None:

@@ -13,17 +13,14 @@ import msgspec
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.observers import Observer
-from conformance.api.rest.variations import Kind
 from conformance.contract.generic import generic_ledger
 from conformance.contract.pack import Contract
-from conformance.documents.resources import matching
+from conformance.engine.by_description import SECURITY, fails_by_description
 from conformance.engine.certification import certify
 from conformance.engine.connecting import connection_of
 from conformance.engine.refused import is_refused
 from conformance.engine.resending import read_request, send_again
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.scenarios.rule import Case, Rule
-from conformance.scenarios.survey import Probe, Survey
 from conformance.statement.statement import Statement, empty_statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Response, Unanswered
@@ -39,7 +36,6 @@ _ALONE = "from the request alone: give --statement, so that the requirement's ow
 # By these a gateway says that the device is away, or the device that it will not say now.
 _AWAY = frozenset({502, 503, 504})
 _SERVER_ERROR = 500
-_SECURITY = "description/security"
 # As much of the text on a missing response says of which kind it was.
 _ALIKE = 20
 
@@ -198,30 +194,12 @@ def _still_there(
     hidden = status != recorded["status"] and (is_refused(now) or status >= _SERVER_ERROR)
     # Of a long body the result has only the beginning, of which nobody can judge.
     if rest and contract and "body_length" not in recorded:
-        for fails in (_observed_to_fail, _fails_by_description):
+        for fails in (_observed_to_fail, fails_by_description):
             if fails(contract, rest, id_, before):
-                return (None if hidden and id_ != _SECURITY else fails(contract, rest, id_, now)), _BY_JUDGEMENT
+                return (None if hidden and id_ != SECURITY else fails(contract, rest, id_, now)), _BY_JUDGEMENT
     if recorded["status"] >= _SERVER_ERROR:
         return (None if is_refused(now) else status >= _SERVER_ERROR), _BY_STATUS
     return None, ""
-
-
-def _fails_by_description(contract: Contract, base_url: str, requirement: str, exchange: Exchange) -> bool:
-    """Return whether one exchange fails a rule that compares single responses with the description."""
-    # Imported late: the rules of described devices take a tenth of a second.
-    from conformance.rules.description import test_answers, test_security  # noqa: PLC0415
-
-    found = (value for module in (test_answers, test_security) for value in vars(module).values())
-    rule = next((one for one in found if isinstance(one, Rule) and one.requirement == requirement), None)
-    path = exchange.request.url.removeprefix(base_url.rstrip("/")).partition("?")[0]
-    operation = matching(contract, exchange.request.method, path) if rule else None
-    if rule is None or operation is None or not contract.described:
-        return False
-    trace = (
-        (exchange,) if requirement == _SECURITY else Survey((Probe(operation.label, Kind.USUAL, exchange=exchange),))
-    )
-    run = Run(empty_statement(contract), contract)
-    return any(isinstance(one, Case) and not one.holds for one in rule.outcomes(trace, {"run": run}.__getitem__))
 
 
 def _observed_to_fail(contract: Contract, base_url: str, requirement: str, exchange: Exchange) -> bool:

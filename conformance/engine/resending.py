@@ -14,6 +14,7 @@ from urllib.parse import urlsplit
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.stops import send_stops
 from conformance.documents.readable import unreadable
+from conformance.engine.by_description import fails_by_description
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.credentials import Credentials, is_shown
@@ -156,9 +157,9 @@ def is_same(before: Response, came: Attempt) -> bool:
 def look_again(run: Run, connection: Connection, rest: RestInterface | None = None) -> None:
     """Send the request of each finding again, and record how often the failure occurs again.
 
-    If an observer judges the requirement by single responses, its judgement counts; otherwise a response with the same
-    status and media type. An unsafe request is repeated only if the robot may be moved and the response was 5xx, which
-    is wrong in any state of the robot.
+    If an observer or a rule on the description judges the requirement by single responses, its judgement counts;
+    otherwise a response with the same status and media type. An unsafe request is repeated only if the robot may be
+    moved and the response was 5xx, which is wrong in any state of the robot.
 
     Args:
         run: with its findings.
@@ -179,8 +180,11 @@ def look_again(run: Run, connection: Connection, rest: RestInterface | None = No
                 break
             moves |= exchange.request.method not in SAFE_METHODS
             cases = run.judge.cases(finding.requirement)
-            came_back = sum(_fails_again(run, finding, exchange, connection) for _ in range(_TIMES))
-            finding.again = Again(came_back, _TIMES, judged=run.judge.cases(finding.requirement) > cases)
+            base_url = rest.client.base_url if rest is not None and run.contract.described else ""
+            by_rule = fails_by_description(run.contract, base_url, finding.requirement, exchange)
+            base_url = base_url if by_rule else ""
+            came_back = sum(_fails_again(run, finding, exchange, connection, base_url) for _ in range(_TIMES))
+            finding.again = Again(came_back, _TIMES, judged=by_rule or run.judge.cases(finding.requirement) > cases)
     finally:
         if moves and rest is not None:
             rest.device.leave_at_rest(rest)
@@ -196,13 +200,19 @@ def _may_be_sent(run: Run, exchange: Exchange) -> bool:
     return run.allow_motion and exchange.response.status >= HTTPStatus.INTERNAL_SERVER_ERROR
 
 
-def _fails_again(run: Run, finding: Finding, exchange: Exchange, connection: Connection) -> bool:
-    """Send a finding's request once more; return whether the failure occurred again."""
+def _fails_again(run: Run, finding: Finding, exchange: Exchange, connection: Connection, base_url: str) -> bool:
+    """Send a finding's request once more; return whether the failure occurred again.
+
+    With a base URL, the rule on the description judges the response.
+    """
     evidence, before = run.judge.evidence[finding.requirement], exchange.response
     cases, failures = evidence.cases, evidence.failures
     came = send_again(exchange.request, connection)
     if evidence.cases > cases:
         return evidence.failures > failures
+    if base_url:
+        now = Exchange(exchange.request, came.response) if isinstance(came, Exchange) else None
+        return now is not None and fails_by_description(run.contract, base_url, finding.requirement, now)
     if not isinstance(came, Exchange) or not is_same(before, came):
         return False
     # A SOAP fault is not an error page with its status.

@@ -159,7 +159,9 @@ def _api(robot: RobotUnderTest, causes: list[Cause]) -> dict[str, Any]:
     """Return what was called of an API that is judged by its own description, under its key."""
     if robot.log is None or robot.rest is None:
         return {}
-    return {"api": robot.log.document(robot.rest.call_rules, [cause.finding for cause in causes])}
+    return {
+        "api": robot.log.document(robot.rest.call_rules, [cause.finding for cause in causes], robot.rest.usual_status)
+    }
 
 
 def _target(robot: RobotUnderTest) -> dict[str, Any]:

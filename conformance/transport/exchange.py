@@ -237,5 +237,8 @@ class Listener:
     def answered(self, exchange: Exchange) -> None:
         """Handle a response."""
 
+    def by_hand(self, exchange: Exchange) -> None:
+        """Handle a response to bytes over a raw socket; the request has their method and URL alone."""
+
     def unanswered(self, request: Unanswered) -> None:
         """Handle a request without a response."""

@@ -289,6 +289,9 @@ def read_one(client: HttpClient, octets: bytes, came: RawAnswer, method: str) ->
         response, rest = parse(came.octets, method, closed=came.closed, elapsed_ms=came.elapsed_ms)
     except FramingError as error:
         return Unanswered(request, str(error), NoAnswer.MALFORMED), b""
+    for sent, target in requests_in(octets)[:1]:
+        for listener in client.connection.listeners if sent == method else ():
+            listener.by_hand(Exchange(Request(sent, _url(client, target)), response))
     return Exchange(request, response), rest
 
 

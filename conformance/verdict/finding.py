@@ -239,7 +239,7 @@ def _repeated(again: Again) -> str:
     times = "once" if again.came_back == 1 else f"{again.came_back} times"
     return (
         f"In {again.sent} repetitions without the requests before it, the request {what} {times}: the failure is "
-        "intermittent, or depends on earlier requests, which `roaas replay` sends."
+        "intermittent, or depends on the device's state: `roaas replay` sends the requests before it too."
     )
 
 

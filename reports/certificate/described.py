@@ -100,6 +100,16 @@ class Described:
         return sorted(rows, key=lambda row: not row.findings)
 
     @property
+    def unshown(self) -> list[Row]:
+        """Return the operations that never answered 2xx, of which it is known what they need."""
+        return [row for row in self.rows if "needs" in row.entry]
+
+    @property
+    def left_behind(self) -> list[str]:
+        """Return in which state the run left the device, a line for each kind of change."""
+        return list(self.api.get("left_behind", {}).get("lines", ()))
+
+    @property
     def measures(self) -> list[Measure]:
         """Return how much of the description the run reached, each kind of thing that the description has."""
         found = [(name, self.api["coverage"].get(key, (0, 0))) for key, name in _MEASURES.items()]

@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, Final
 from urllib.parse import parse_qsl
 
 from conformance.api.call_rules import CallRules
 from conformance.api.rest.branches import branches_in, branches_of
+from conformance.api.rest.left_behind import LeftBehind
+from conformance.api.rest.needs import need_of
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.documents.resources import matching, resource_at
@@ -19,6 +22,7 @@ from conformance.documents.wsdl_pack import label_in, services_of
 from conformance.transport.exchange import Exchange, Listener, Request, Unanswered
 from conformance.verdict.finding import Finding
 
+_OK, _REDIRECT = 200, 300
 # A body is read for what it shows of its schema up to this size, octets.
 _READ = 100_000
 _ERRORS: Final = 400
@@ -52,6 +56,7 @@ class OperationLog(Listener):
     def __init__(self, contract: Contract, base_url: str) -> None:
         self._contract, self._base_url = contract, base_url
         self._services = services_of(contract)
+        self._left = LeftBehind(operations_of(contract), base_url)
         self._records: dict[str, _Record] = {item.label: _Record() for item in operations_of(contract)}
         self._branches = {
             (item.label, status, name): {f"{status}{branch}" for branch in branches_of(schema)}
@@ -70,6 +75,14 @@ class OperationLog(Listener):
             record.succeeded += self._succeeded(exchange)
             record.slowest_ms = max(record.slowest_ms, exchange.response.elapsed_ms)
             self._look_into(operation, record, exchange)
+            if self._services is None or self._succeeded(exchange):
+                self._left.follow(operation, exchange)
+
+    def by_hand(self, exchange: Exchange) -> None:
+        """Note what a request over a raw socket has changed."""
+        operation = self._operation(exchange.request)
+        if operation is not None:
+            self._left.follow(operation, exchange)
 
     def unanswered(self, request: Unanswered) -> None:
         """Count a request without a response."""
@@ -116,14 +129,25 @@ class OperationLog(Listener):
         record.parameters |= {name.lower() for name, _ in request.headers}
         return record
 
-    def document(self, rules: CallRules, findings: Iterable[Finding]) -> dict[str, Any]:
-        """Return the matrix of operations and the coverage of the description, for result.json."""
+    def document(
+        self, rules: CallRules, findings: Iterable[Finding], usual_status: Mapping[str, int] = MappingProxyType({})
+    ) -> dict[str, Any]:
+        """Return the matrix of operations and the coverage of the description, for result.json.
+
+        Args:
+            rules: what may be called.
+            findings: of the run.
+            usual_status: status of the last usual request, by operation.
+        """
         operations = operations_of(self._contract)
         numbers: dict[str, list[int]] = {}
         for finding in findings:
             for label in finding.operations:
                 numbers.setdefault(label, []).append(finding.number)
-        rows = [self._row(item, rules) | {"findings": sorted(numbers.get(item.label, ()))} for item in operations]
+        rows = [
+            self._row(item, rules, usual_status) | {"findings": sorted(numbers.get(item.label, ()))}
+            for item in operations
+        ]
         called = [item for item in operations if self._records[item.label].sent]
         info = self._contract.openapi.get("info")
         info = info if isinstance(info, dict) else {}
@@ -131,6 +155,7 @@ class OperationLog(Listener):
             "title": str(info.get("title", "")),
             "version": str(info.get("version", "")),
             "operations": rows,
+            **({"left_behind": left} if (left := self._left.document()) else {}),
             "coverage": {
                 "operations": [len(called), len(operations)],
                 "parameters": [
@@ -180,9 +205,11 @@ class OperationLog(Listener):
     def _has_sent(self, operation: Operation, name: str) -> bool:
         return bool({name, name.lower()} & self._records[operation.label].parameters)
 
-    def _row(self, operation: Operation, rules: CallRules) -> dict[str, Any]:
+    def _row(self, operation: Operation, rules: CallRules, usual_status: Mapping[str, int]) -> dict[str, Any]:
         record = self._records[operation.label]
         reason = rules.decide(operation)
+        works = any(_OK <= status < _REDIRECT for status in record.statuses)
+        need, values = ("", []) if works else need_of(operation, usual_status.get(operation.label, 0))
         keys = {operation.response_key(status) for status in record.statuses} - {None}
         return {
             "operation": operation.label,
@@ -195,4 +222,6 @@ class OperationLog(Listener):
             "declared": list(operation.responses),
             "seen_declared": sorted(map(str, keys)),
             "slowest_ms": round(record.slowest_ms, 1),
+            **({"needs": need} if need else {}),
+            **({"values": values} if values else {}),
         }

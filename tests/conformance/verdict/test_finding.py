@@ -52,7 +52,7 @@ def test_how_often_a_failure_was_seen_and_came_back_is_in_the_text():
     finding.again = Again(5, 5)
     assert finding.text.endswith("Repeated 5 times: failed each time.")
     finding.again = Again(1, 5)
-    assert "the request failed once: the failure is intermittent, or depends on earlier requests" in finding.text
+    assert "the request failed once: the failure is intermittent, or depends on the device's state" in finding.text
     finding.again = Again(5, 5, judged=False)
     assert finding.text.endswith("Repeated 5 times: the same kind of response each time.")
 

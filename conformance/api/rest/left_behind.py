@@ -1,0 +1,130 @@
+"""In which state a run left a described device: what it created, changed, deleted and started last."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+from http import HTTPStatus
+from typing import Any, Final
+from urllib.parse import unquote, urljoin, urlsplit
+
+from conformance.api.rest.values import IDS
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation, is_json
+from conformance.transport.exchange import Exchange
+
+# As many ids, paths and operations a line of the summary names; the result has all.
+_NAMED: Final = 3
+_ID: Final = 60
+_GONE: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
+
+
+class LeftBehind:
+    """Follows the exchanges of a run, in their order, and keeps those whose effect lasts.
+
+    Args:
+        operations: of the description.
+        base_url: URL below which they are.
+    """
+
+    def __init__(self, operations: Iterable[Operation], base_url: str) -> None:
+        self._base_url = base_url
+        self._collections = {one.template.rpartition("/{")[0] for one in operations if one.template.endswith("}")}
+        self._created: dict[str, tuple[str, str]] = {}
+        self._changed: dict[str, tuple[str, bytes | None]] = {}
+        self._deleted: dict[str, str] = {}
+        self._read: dict[str, bytes] = {}
+        self._last: dict[str, int] = {}
+
+    def follow(self, operation: Operation, exchange: Exchange) -> None:
+        """Note what an exchange with an operation changes on the device."""
+        request, answer = exchange.request, exchange.response
+        path = request.url.removeprefix(self._base_url).partition("?")[0]
+        if operation.method == "GET":
+            self._look(path, exchange)
+        if operation.safe or not answer.ok:
+            return
+        # Written again, it is the last one.
+        self._last.pop(operation.label, None)
+        self._last[operation.label] = answer.status
+        made = self._made(operation, path, exchange)
+        if operation.method == "DELETE":
+            ours = [one for one in self._created if one == path or one.startswith(f"{path.rstrip('/')}/")]
+            for one in ours:
+                del self._created[one]
+            if not ours:
+                self._deleted[path] = operation.label
+        elif made:
+            self._created[made] = operation.label, unquote(made.rpartition("/")[2])
+        elif operation.method in {"PUT", "PATCH"}:
+            before = self._read.pop(path, None)
+            self._changed.setdefault(path, (operation.label, before))
+
+    def _look(self, path: str, exchange: Exchange) -> None:
+        if exchange.response.status in _GONE:
+            self._created.pop(path, None)
+        elif exchange.response.ok and "?" not in exchange.request.url:
+            self._read[path] = exchange.response.body
+
+    def _made(self, operation: Operation, path: str, exchange: Exchange) -> str:
+        """Return the path of what a request created; empty if it created nothing that has one."""
+        answer = exchange.response
+        location = answer.header("location") or ""
+        if operation.method == "PUT":
+            return path if answer.status == HTTPStatus.CREATED else ""
+        if operation.method != "POST":
+            return ""
+        if location and answer.status == HTTPStatus.CREATED:
+            made = urlsplit(urljoin(exchange.request.url, location)).path
+            return made.removeprefix(urlsplit(self._base_url).path.rstrip("/"))
+        if answer.status != HTTPStatus.CREATED and operation.template.rstrip("/") not in self._collections:
+            return ""
+        value: Any = read_json(answer.body).value if is_json(answer.media_type) else None
+        members = value if isinstance(value, dict) else {}
+        id_ = next((members[name] for name in IDS if isinstance(members.get(name), str | int)), None)
+        return "" if id_ is None else f"{path.rstrip('/')}/{id_}"
+
+    def document(self) -> dict[str, Any]:
+        """Return what was left behind, for result.json, with lines for readers; empty if nothing was."""
+        created: dict[str, list[str]] = defaultdict(list)
+        for label, id_ in self._created.values():
+            created[label].append(id_)
+        deleted: dict[str, list[str]] = defaultdict(list)
+        for path, label in self._deleted.items():
+            deleted[label].append(unquote(path.rpartition("/")[2]))
+        changed = {
+            path: label
+            for path, (label, before) in self._changed.items()
+            if before is None or self._read.get(path) != before
+        }
+        last = [{"operation": label, "status": status} for label, status in reversed(self._last.items())]
+        if not last:
+            return {}
+        said = {*created, *changed.values(), *deleted}
+        lines = (
+            ("created and not deleted", [_things(label, ids) for label, ids in created.items()]),
+            ("changed", [f"{path[:_ID]} by {label.partition(' ')[0]}" for path, label in changed.items()]),
+            ("deleted", [_things(label, ids) for label, ids in deleted.items()]),
+            (
+                "answered last",
+                [f"{one['operation']} with {one['status']}" for one in last if one["operation"] not in said],
+            ),
+        )
+        return {
+            "lines": [f"{what}: {_some(found)}" for what, found in lines if found],
+            "created": [{"operation": label, "ids": ids} for label, ids in created.items()],
+            "changed": [{"operation": label, "path": path} for path, label in changed.items()],
+            "deleted": [{"operation": label, "ids": ids} for label, ids in deleted.items()],
+            "last": last,
+        }
+
+
+def _things(label: str, ids: list[str]) -> str:
+    shown = ", ".join(one[:_ID] for one in ids[-_NAMED:])
+    earlier = "… " if len(ids) > _NAMED else ""
+    return f"{len(ids)} by {label} (id{'s' if len(ids) > 1 else ''} {earlier}{shown})"
+
+
+def _some(texts: list[str]) -> str:
+    more = len(texts) - _NAMED
+    return f"{', '.join(texts[:_NAMED])}{f' and {more} more' if more > 0 else ''}"
