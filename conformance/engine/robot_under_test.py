@@ -21,6 +21,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.operation_log import OperationLog
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
+from conformance.contract.described import SOAP
 from conformance.contract.interfaces import Interface
 from conformance.documents.openapi import operations_of
 from conformance.engine.lost_device import LostDevice
@@ -248,6 +249,8 @@ class RobotUnderTest:
 
         rules = CallRules(run.statement.calls.allow, run.statement.calls.never, motion=run.allow_motion)
         operations = [one for one in operations_of(run.contract) if rules.decide(one).may]
+        # The first requests call no operation of a WSDL, and show nothing of how long one takes.
+        measured = measured and SOAP not in run.contract.classes
         said = estimate(run, operations).text(run.effort.usual_ms if measured else None)
         return f"{said} It ends after about {run.limit.minutes:g} minutes." if run.limit.minutes is not None else said
 
