@@ -287,10 +287,13 @@ def carry_out(settings: Settings) -> CommandResult:
         aborted = RunAborted(ExitCode.INCONCLUSIVE, f"the load generator failed: {type(trouble).__name__}: {trouble}")
     run.name_called()
     code, document = compose(run.outcome, run.plan, aborted)
-    path: Path | None = None
+    path = None
     if aborted is None or aborted.code != ExitCode.USAGE:
-        path = write(Path(settings.output.folder), document)
-        tell(f"written: {path}")
+        try:
+            tell(f"written: {(path := write(Path(settings.output.folder), document))}")
+        except OSError as error:  # what was measured is printed below
+            code = ExitCode.INCONCLUSIVE
+            tell(f"roaas load: {settings.output.folder}: cannot write there: {error.strerror or error}")
     if aborted is None:
         sys.stdout.write(summary(document))
         sys.stdout.flush()
