@@ -276,9 +276,14 @@ class Contract:
         return {item.id: item for item in sorted(both, key=lambda item: list(self.classes).index(item.class_))}
 
     def _classes_of(self, item: Requirement) -> tuple[str, ...]:
-        """Return the pack's classes that have a requirement: its own, or those within which they are."""
-        generic = generic_classes()
-        homes = (name if name in self.classes or name not in generic else generic[name].within for name in item.classes)
+        """Return the pack's classes that have a requirement: its own, or the one that its alias names."""
+        generic, before = generic_classes(), {alias.partition("/")[0] for alias in item.aliases}
+        homes = [
+            name
+            if name in self.classes or name not in generic or generic[name].within not in before
+            else generic[name].within
+            for name in item.classes
+        ]
         return tuple(dict.fromkeys(name for name in homes if name in self.classes))
 
     def _placed(self, item: Requirement) -> Requirement:

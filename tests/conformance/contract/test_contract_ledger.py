@@ -93,6 +93,7 @@ def test_a_class_that_a_pack_does_not_name_is_within_another(tmp_path):
     moved = [item for item in LEDGER.values() if item.id.startswith("web-server/")]
     assert {item.classes for item in moved} == {("http",)}
     assert all(CONTRACT.renamed[f"http/{item.id.partition('/')[2]}"] == item.id for item in moved)
+    assert CONTRACT.requirement("web-server/host-invalid") is None, "no pack gets a new one without naming the class"
     described = Contract.load(write_described_pack(tmp_path, {"paths": {}}, {"paths": {}}))
     assert {item.classes for id_, item in described.ledger.items() if id_ in {one.id for one in moved}} == {
         ("web-server",)
