@@ -42,7 +42,8 @@ class Description:
         base_url: absolute URL below which the operations are; empty if the description does not say it.
         unresolved: each reference to another file that leads nowhere, with the reason.
         remarks: what a reader of the result should know about its server.
-        not_called: what the suite cannot call or read, with the reason.
+        not_called: what the suite cannot call, with the reason.
+        unread: operations and schemas that cannot be read and are left out of the document, with the reason.
     """
 
     source: str
@@ -52,6 +53,7 @@ class Description:
     unresolved: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     not_called: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
 
 
 def read_description(source: str, load: Load, overlays: Iterable[str] = ()) -> Description:
@@ -97,9 +99,8 @@ def _description(source: str, load: Load, overlays: Iterable[str]) -> Descriptio
         uncalled, document = not_called(document), with_sent(document, document)
     document, unread = without_unreadable(in_one_version(document))
     base_url, remarks = _base_url(source, document)
-    return Description(
-        source, document, original, base_url, (*bundle.unresolved, *broken), remarks, (*uncalled, *unread)
-    )
+    references = (*bundle.unresolved, *broken)
+    return Description(source, document, original, base_url, references, remarks, uncalled, tuple(unread))
 
 
 def _without(value: Any, broken: frozenset[str]) -> Any:

@@ -20,7 +20,7 @@ def compared(old: str, new: str) -> list[Change]:
     unread = [
         Change(None, source, f"not compared: {reference}")
         for source, description in zip((old, new), descriptions, strict=True)
-        for reference in description.unresolved
+        for reference in (*description.unresolved, *description.unread)
     ]
     try:
         return [*changes(*(one.document for one in descriptions)), *unread]

@@ -141,7 +141,7 @@ def described_contract(
     document = without_credentials(found.document, connection.credentials.places)
     folder = write_described_pack(out / FOLDER, document, found.original, found.unresolved, moves=moves)
     Contract.load.cache_clear()
-    remarks = found.not_called if base_url or endpoints.rest else (*found.remarks, *found.not_called)
+    remarks = (*(() if base_url or endpoints.rest else found.remarks), *found.not_called, *found.unread)
     return Contract.load(folder), msgspec.structs.replace(endpoints, rest=base), remarks
 
 

@@ -30,7 +30,7 @@ def test_an_unreadable_operation_leaves_the_others(broken, others):
     read = _read({"get": broken, **others}, "3.2.0")
     methods = [method.upper() for method in others.get("additionalOperations", others)]
     assert [one.label for one in read_operations(read.document)] == ["GET /ok", *(f"{one} /x" for one in methods)]
-    assert [one.partition(": not judged: ")[0] for one in read.not_called] == ["GET /x"]
+    assert [one.partition(": not judged: ")[0] for one in read.unread] == ["GET /x"]
 
 
 def test_recursive_schemas_beside_an_unreadable_operation_are_kept():
@@ -52,7 +52,7 @@ def test_recursive_schemas_beside_an_unreadable_operation_are_kept():
 )
 def test_an_unreadable_schema_allows_any_value_and_leaves_the_others(schema, place):
     read = _read(_answering(schema))
-    assert [one.partition(": not judged: ")[0] for one in read.not_called] == [_SCHEMA + place]
+    assert [one.partition(": not judged: ")[0] for one in read.unread] == [_SCHEMA + place]
     shape = shape_of(read_operations(read.document)[1].responses["200"]["application/json"])
     assert shape.holds({"a": "x", "b": 1})
     assert shape.holds({"b": "x"}) == (place != "/properties/a")
@@ -62,5 +62,5 @@ def test_an_unreadable_schema_allows_any_value_and_leaves_the_others(schema, pla
 def test_a_readable_description_stays_as_it_is(version):
     item = {**_answering({"type": "integer", "minimum": 0}), "x-vendor": {"schema": "text", "schemas": {"A": 5}}}
     read = _read(item, version)
-    assert read.not_called == ()
+    assert read.unread == ()
     assert read.document["paths"]["/x"] == item

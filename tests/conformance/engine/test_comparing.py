@@ -27,7 +27,14 @@ def test_descriptions_of_several_files_and_versions(tmp_path):
     ]
 
 
-@pytest.mark.parametrize("document", [{}, {"openapi": "3.1.0", "paths": {"/a": []}}, {"openapi": "3.1.0"}])
+def test_what_cannot_be_read_is_not_compared(tmp_path):
+    broken = {**API, "paths": {**API["paths"], "/b": []}}
+    old, new = _written(tmp_path / "old", API), _written(tmp_path / "new", broken)
+    assert [one.breaking for one in compared(old, new)] == [None]
+    assert [one.breaking for one in compared(new, old)] == [None]
+
+
+@pytest.mark.parametrize("document", [{}, {"openapi": "3.1.0"}])
 def test_what_is_no_description_is_told(tmp_path, document):
     with pytest.raises(DescriptionError):
         compared(_written(tmp_path / "old", API), _written(tmp_path / "new", document))
