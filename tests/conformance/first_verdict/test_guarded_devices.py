@@ -191,3 +191,19 @@ def test_a_soap_service_that_refuses_every_message_is_said_first_and_is_not_gree
     assert re.match(rf"All \d+ requests were answered {status}\b.*nothing was judged", done.text), done.text
     assert (done.exit_code, done.result["verdict"]) == (4, "inconclusive"), done.text
     assert not {"fail", "warn"} & set(done.blamed.values())
+
+
+def test_a_key_beyond_ascii_that_the_device_fails_on_is_found(tmp_path):
+    async def state(request):
+        key = request.query.get("key", "")
+        if not key.isascii():
+            return error(500, "comparing strings with non-ASCII characters is not supported")
+        return web.json_response({"x": 1}) if key == "sesame" else error(401, "no", **{"WWW-Authenticate": "Key"})
+
+    schemes = {"securitySchemes": {"key": {"type": "apiKey", "in": "query", "name": "key"}}}
+    api = described({"/state": reading({"type": "object"}, security=[{"key": []}])}, components=schemes)
+    (tmp_path / "key").write_text("sesame", encoding="utf-8")
+    with small_device(api, {"/state": {"GET": state}}) as url:
+        given = ("--api-key", "query key", "--api-key-file", tmp_path / "key")
+        outcome = certified(f"{url}/openapi.json", tmp_path / "out", *given)
+    assert (outcome.exit_code, outcome.blamed) == (1, {"robustness/no-server-error": "fail"}), outcome.text
