@@ -95,7 +95,14 @@ class TimeLimit:
                 if not is_first and self.is_past(share):
                     self.shortened |= waiting.keys()
                     return False
-                if next(step, self) is self:
+                try:
+                    is_done = next(step, self) is self
+                except Exception:
+                    # A step that the end of the time interrupts ends the survey for all operations.
+                    if self.over:
+                        self.shortened |= waiting.keys()
+                    raise
+                if is_done:
                     del waiting[label]
             is_first = False
         return True
