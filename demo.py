@@ -18,7 +18,7 @@ from typing import Any
 from conformance.commandline.exit_codes import ExitCode
 from conformance.selftest.robots import stopped
 
-_ROAAS = (sys.executable, "-m", "roaas")
+_ROAAS = (sys.executable, "-P", "-m", "roaas")
 _START_S = 60
 # One operation, and the client that needs the least processor time. So robot and load generator do not overload a
 # shared machine, and the difference is significant after half a minute.

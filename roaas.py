@@ -5,8 +5,17 @@ is used, so that ``roaas certify`` needs neither ROS nor Locust.
 """
 
 import os
-import signal
 import sys
+
+# `python -m roaas` puts the working directory first, and a module in it, such as click.py, would be imported.
+if (
+    __name__ == "__main__"
+    and not sys.flags.safe_path
+    and os.path.realpath(sys.path[0]) != os.path.realpath(f"{__file__}/..")
+):
+    del sys.path[0]
+
+import signal
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -50,8 +59,6 @@ def open_rooms() -> None:
         return
     sys.path.insert(0, folder)
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (folder, os.environ.get("PYTHONPATH"))))
-    # Otherwise `python -m`, with which packages start processes, would search the working directory first.
-    os.environ["PYTHONSAFEPATH"] = "1"
 
 
 class _Rooms(click.Group):

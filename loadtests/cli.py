@@ -51,7 +51,7 @@ def _run_load(settings: Settings, written: Path) -> CommandResult:
     result.
     """
     child = subprocess.Popen(
-        [sys.executable, "-m", "loadtests"],
+        [sys.executable, "-P", "-m", "loadtests"],
         stdin=subprocess.PIPE,
         text=True,
         start_new_session=True,

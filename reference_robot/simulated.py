@@ -48,6 +48,7 @@ class SimulatedRobot:
         self._log = log
         self._command = [
             sys.executable,
+            "-P",  # a module in the working directory is none of ours
             "-m",
             "reference_robot.simulation",
             f"--domain-id={domain_id}",

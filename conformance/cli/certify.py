@@ -55,7 +55,7 @@ _FILE = click.Path(exists=True, dir_okay=False)
     "pack",
     metavar="PACK",
     default=DEFAULT_PACK,
-    help="Contract pack to test against: its name or folder.",
+    help="Contract pack to test against: its name, or its folder, whose code is run.",
 )
 @click.option(
     "--requirements",

@@ -17,7 +17,11 @@ from conformance.contract.pack import DEFAULT_PACK, Contract
 
 #: ``--contract``, as the parameter ``pack``.
 contract_option = click.option(
-    "--contract", "pack", metavar="PACK", default=DEFAULT_PACK, help="The contract pack: its name, or its folder."
+    "--contract",
+    "pack",
+    metavar="PACK",
+    default=DEFAULT_PACK,
+    help="The contract pack: its name, or its folder, whose code is run.",
 )
 
 

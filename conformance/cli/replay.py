@@ -35,7 +35,10 @@ _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
     help="The robot's statement: run the requirements' checks again instead of the recorded requests.",
 )
 @click.option(
-    "--contract", "pack", metavar="PACK", help="Folder of the contract pack, if the result's pack is not installed."
+    "--contract",
+    "pack",
+    metavar="PACK",
+    help="Folder of the contract pack, if the result's pack is not installed; its code is run.",
 )
 @click.option("--recorded", is_flag=True, help="Judge the traces of the run again; send nothing.")
 @click.option("--token-file", type=click.Path(exists=True, dir_okay=False), help="File with the bearer token to send.")

@@ -12,6 +12,7 @@ from typing import Any, Final
 from conformance.contract.locating import MANIFEST
 from conformance.contract.toml_file import basic_string
 
+DOCUMENT_NAME: Final = "openapi.json"
 ORIGINAL_NAME: Final = "original.json"
 UNRESOLVED_NAME: Final = "unresolved.json"
 #: How the contract is called in verdicts: "keeps its own description".
@@ -68,7 +69,7 @@ def write_described_pack(
     ]
     (folder / MANIFEST).write_text("\n".join(lines) + "\n", encoding="utf-8")
     for file, content in (
-        ("openapi.json", document), (ORIGINAL_NAME, original), (UNRESOLVED_NAME, list(unresolved)),
+        (DOCUMENT_NAME, document), (ORIGINAL_NAME, original), (UNRESOLVED_NAME, list(unresolved)),
     ):  # fmt: skip
         (folder / file).write_text(json.dumps(content, ensure_ascii=False), encoding="utf-8")
     return folder

@@ -1,5 +1,6 @@
 """Find a contract pack: by folder, by the name of a built-in pack, or by an installed package's entry point."""
 
+import hashlib
 import importlib.util
 import sys
 from importlib.metadata import entry_points
@@ -27,12 +28,12 @@ def built_in_packs() -> tuple[str, ...]:
 
 
 def is_installed(name: str) -> bool:
-    """Return whether a name is that of a built-in pack or of an installed package's, and not only a folder."""
-    return name in built_in_packs() or (bool(entry_points(group=ENTRY_POINTS, name=name)) and not Path(name).is_dir())
+    """Return whether a name is that of a built-in pack or of an installed package's."""
+    return name in built_in_packs() or bool(entry_points(group=ENTRY_POINTS, name=name))
 
 
 def folder_of(pack: Path | str) -> Path:
-    """Return the folder of a pack.
+    """Return the folder of a pack; an installed pack comes before a folder of the same name (write ``./NAME``).
 
     Raises:
         ContractError: there is no such pack.
@@ -40,12 +41,12 @@ def folder_of(pack: Path | str) -> Path:
     name = str(pack)
     if name in built_in_packs():
         return _BUILT_IN / name
-    if Path(pack).is_dir():
-        return Path(pack)
     for entry in entry_points(group=ENTRY_POINTS, name=name):
         found = importlib.util.find_spec(entry.module)
         if found is not None and found.submodule_search_locations:
             return Path(next(iter(found.submodule_search_locations)))
+    if Path(pack).is_dir():
+        return Path(pack)
     installed = sorted(entry.name for entry in entry_points(group=ENTRY_POINTS))
     raise ContractError(
         f"{name} is neither a folder nor a contract pack; --contract takes a folder with openapi.yaml and/or *.wsdl "
@@ -55,7 +56,8 @@ def folder_of(pack: Path | str) -> Path:
 
 def module_of(path: Path) -> ModuleType:
     """Import a module from its file, once per process."""
-    name = f"roaas_pack_{path.resolve().parent.name}_{path.stem}"
+    where = path.resolve()
+    name = f"roaas_pack_{where.parent.name}_{where.stem}_{hashlib.sha256(bytes(where)).hexdigest()[:8]}"
     if name in sys.modules:
         return sys.modules[name]
     spec = importlib.util.spec_from_file_location(name, path)

@@ -20,7 +20,7 @@ from typing import Any
 import msgspec
 
 from conformance.contract.classes import FULL, ConformanceClass, Topic
-from conformance.contract.described import ORIGINAL_NAME, UNRESOLVED_NAME
+from conformance.contract.described import DOCUMENT_NAME, ORIGINAL_NAME, UNRESOLVED_NAME
 from conformance.contract.document_text import parsed
 from conformance.contract.generic import LEDGER, ClassEntry, generic_classes, generic_ledger
 from conformance.contract.interfaces import Interface
@@ -78,10 +78,19 @@ class Contract:
         ``openapi.yaml`` (or .yml, .json), one ``*.wadl`` and at most two ``*.wsdl`` describe the device. The WSDL with
         "subscriber" in its name describes the service that only reads, the other one the service that acts.
 
+        A pack with ``described = true``, which a run wrote, is its JSON files: a result is data, and whatever else is
+        in that folder is neither read nor executed.
+
         Raises:
             ContractError: there is no such pack, or it describes no interface, or one interface twice.
         """
         directory = folder_of(pack)
+        path = directory / MANIFEST
+        manifest = read_toml(path, _Manifest, ContractError) if path.is_file() else None
+        if manifest is not None and manifest.described:
+            if not (directory / DOCUMENT_NAME).is_file():
+                raise ContractError(f"{directory} describes nothing: it has no {DOCUMENT_NAME}")
+            return cls(directory, directory / DOCUMENT_NAME, None, None, None, only, manifest)
         openapi = next((directory / name for name in _OPENAPI_NAMES if (directory / name).is_file()), None)
         wsdls = sorted(directory.glob("*.wsdl"))
         reading = [path for path in wsdls if "subscriber" in path.name.lower()]
@@ -92,7 +101,6 @@ class Contract:
             if len(found) > 1:
                 names = ", ".join(path.name for path in found)
                 raise ContractError(f"{directory} has more than one WSDL of {kind}: {names}")
-        manifest = directory / MANIFEST
         return cls(
             directory,
             openapi,
@@ -100,7 +108,7 @@ class Contract:
             acting[0] if acting else None,
             reading[0] if reading else None,
             only,
-            read_toml(manifest, _Manifest, ContractError) if manifest.is_file() else None,
+            manifest,
         )
 
     @property
@@ -262,7 +270,7 @@ class Contract:
         }
         own: dict[str, Requirement] = {}
         path = self.directory / LEDGER
-        if path.is_file():
+        if path.is_file() and not self._is_data:
             try:
                 own = load_ledger(path, self.classes)
             except LedgerError as error:
@@ -299,7 +307,7 @@ class Contract:
             ContractError: the text cannot be read.
         """
         path = self.directory / TEXT_NAME
-        if not path.is_file():
+        if self._is_data or not path.is_file():
             return {}
         try:
             sections = sections_of(path.read_text(encoding="utf-8"))
@@ -315,7 +323,7 @@ class Contract:
         Raises:
             ContractError: the module cannot be imported.
         """
-        if self.manifest is None or self.manifest.plugin is None:
+        if self._is_data or self.manifest is None or self.manifest.plugin is None:
             return None
         named = self.manifest.plugin
         try:
@@ -334,4 +342,9 @@ class Contract:
     def rules(self) -> tuple[Path, ...]:
         """The folders with the checks: the generic ones, then the pack's own."""
         own = self.directory / "rules"
-        return (GENERIC_RULES, own) if own.is_dir() else (GENERIC_RULES,)
+        return (GENERIC_RULES, own) if own.is_dir() and not self._is_data else (GENERIC_RULES,)
+
+    @property
+    def _is_data(self) -> bool:
+        """Whether a run wrote the pack into its result, from which nothing is executed."""
+        return self.manifest is not None and self.manifest.described

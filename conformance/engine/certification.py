@@ -15,7 +15,7 @@ from conformance.contract.classes import Prerequisite
 from conformance.contract.described import MOTION, SOAP
 from conformance.engine.checks_plugin import ChecksPlugin
 from conformance.engine.interruption import remembered
-from conformance.engine.planning import pytest_options
+from conformance.engine.planning import conftests, pytest_options
 from conformance.engine.progress import Progress
 from conformance.engine.resending import look_again, mask
 from conformance.engine.result import RESULT_NAME, left_out, result_document, write_result
@@ -216,8 +216,8 @@ def _run_checks(robot: RobotUnderTest, teller: Progress, remarks: list[str], rec
         with pytest.MonkeyPatch.context() as environment:
             environment.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
             environment.delenv("PYTEST_ADDOPTS", raising=False)
-            folders = map(str, robot.run.contract.rules)
-            code = pytest.main([*folders, *pytest_options()], plugins=[plugin, teller, _LoadedForGood()])
+            plugins = [*conftests(robot.run.contract), plugin, teller, _LoadedForGood()]
+            code = pytest.main([*map(str, robot.run.contract.rules), *pytest_options()], plugins=plugins)
     except Exception as error:  # noqa: BLE001 - whatever breaks, what was judged until then is not lost
         remarks.append(f"The suite itself failed, please report this: {type(error).__name__}: {error}")
         robot.run.aborted = robot.run.aborted or "the suite itself failed"

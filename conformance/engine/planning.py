@@ -2,9 +2,12 @@
 
 import os
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
+from conformance.contract.locating import GENERIC_RULES, module_of
+from conformance.contract.pack import Contract
 from conformance.engine.checks_plugin import ChecksPlugin, is_check
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.plan import Step, told
@@ -19,11 +22,18 @@ def pytest_options() -> list[str]:
         f"--config-file={os.devnull}",
         f"--rootdir={_SUITE}",
         "--import-mode=importlib",
+        "--noconftest",  # pytest would run those in all folders above the checks as well; see conftests()
         "--capture=no",
         "-Wignore",
         "--assert=plain",
         *(f"-pno:{name}" for name in _UNUSED),
     ]
+
+
+def conftests(contract: Contract) -> list[ModuleType]:
+    """Return the modules ``conftest.py`` in a pack's own checks, as pytest plugins."""
+    own = [path for folder in contract.rules if folder != GENERIC_RULES for path in folder.rglob("conftest.py")]
+    return [module_of(path) for path in sorted(own)]
 
 
 def collected(robot: RobotUnderTest, plugin: ChecksPlugin | None = None) -> list[pytest.Item]:
@@ -47,7 +57,7 @@ def collect(robot: RobotUnderTest, *plugins: object) -> None:
         environment.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
         environment.delenv("PYTEST_ADDOPTS", raising=False)
         folders = map(str, robot.run.contract.rules)
-        pytest.main([*folders, *pytest_options(), "--collect-only"], plugins=list(plugins))
+        pytest.main([*folders, *pytest_options(), "--collect-only"], plugins=[*conftests(robot.run.contract), *plugins])
 
 
 def plan_of(robot: RobotUnderTest) -> list[str]:

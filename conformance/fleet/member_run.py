@@ -163,8 +163,9 @@ class MemberRun:
 
     def _command(self) -> list[str]:
         statement = self.member.statement or self._folder / "statement.toml"
-        command = [sys.executable, "-m", "roaas", "certify", str(statement), *self._options, "--out", str(self._folder)]
-        return [*command, "--baseline", str(self.member.baseline)] if self.member.baseline else command
+        command = [sys.executable, "-P", "-m", "roaas", "certify", str(statement), *self._options]
+        baseline = ["--baseline", str(self.member.baseline)] if self.member.baseline else []
+        return [*command, "--out", str(self._folder), *baseline]
 
     async def _wait(self, process: asyncio.subprocess.Process, stop: Stop) -> Outcome | None:
         """Wait for the process, at most until the time limit; return why it was ended, or None if it ended itself."""

@@ -3,9 +3,12 @@
 import multiprocessing
 import subprocess
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from typing import Final, TypeVar
+
+import pytest
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
@@ -13,6 +16,15 @@ _Result = TypeVar("_Result")
 _AGAIN_S: Final = 0.1
 # Programs that run at the moment.
 _PROGRAMS: set[subprocess.Popen[bytes]] = set()
+_STARTING = threading.Lock()
+
+
+@contextmanager
+def safe_path() -> Iterator[None]:
+    """Let Python processes that multiprocessing starts here import no module from the working directory."""
+    with _STARTING, pytest.MonkeyPatch.context() as environment:
+        environment.setenv("PYTHONSAFEPATH", "1")
+        yield
 
 
 def run_program(words: Sequence[str], folder: str, limit_s: float) -> None:

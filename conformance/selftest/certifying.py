@@ -18,6 +18,7 @@ from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
 from conformance.engine.connecting import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.selftest.at_once import safe_path
 from conformance.selftest.robots import Robot
 from conformance.statement.statement import Statement, empty_statement, load_statement
 from conformance.verdict.effort import Effort
@@ -114,7 +115,8 @@ def run_job(job: Job) -> Outcome:
     # Ctrl-C is handled here: the server that this may start, and what it forks, must not receive it.
     heard = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        process.start()
+        with safe_path():
+            process.start()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, heard)
     theirs.close()

@@ -14,6 +14,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import Connection as Pipe
 
+from conformance.selftest.at_once import safe_path
+
 Address = tuple[str, int]
 # An Ethernet frame's worth of TCP, octets.
 _SEGMENT = 1460
@@ -97,7 +99,8 @@ def linked(link: Link, seed: int, *targets: Address) -> Iterator[list[Address]]:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(target=_run, args=(link, seed, targets, theirs), daemon=True)
-    process.start()
+    with safe_path():
+        process.start()
     theirs.close()
     try:
         if not ours.poll(_START_S):

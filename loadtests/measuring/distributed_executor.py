@@ -95,7 +95,7 @@ class DistributedExecutor:
         file = None if scenario is None else scenario.file
         for _ in range(self._processes):
             child = subprocess.Popen(  # noqa: S603 -- this very program
-                [sys.executable, "-m", "loadtests.measuring.worker", here, str(self._port)], stdin=subprocess.PIPE
+                [sys.executable, "-P", "-m", "loadtests.measuring.worker", here, str(self._port)], stdin=subprocess.PIPE
             )
             self._children[child.pid] = child
             if child.stdin is not None:

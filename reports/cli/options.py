@@ -14,7 +14,10 @@ FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
 CONTRACT = click.option(
-    "--contract", "pack", metavar="PACK", help="The contract pack of the certificates: its name, or its folder."
+    "--contract",
+    "pack",
+    metavar="PACK",
+    help="The contract pack of the certificates: its name, or its folder, whose code is run.",
 )
 
 

@@ -51,7 +51,7 @@ class RosProcess:
         try:
             # In a session of its own: Ctrl-C is for its parent, which then ends it.
             self._process = subprocess.Popen(  # noqa: S603 - our own program
-                [sys.executable, "-m", module, "--domain-id", str(domain_id), *options],
+                [sys.executable, "-P", "-m", module, "--domain-id", str(domain_id), *options],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,

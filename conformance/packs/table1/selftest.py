@@ -30,7 +30,7 @@ _MESSAGE_S, _FORGOTTEN_S = 0.05, 2.0
 
 
 def _on_ros(start: Start, *options: str) -> list[str]:
-    return [sys.executable, "-m", "roaas", "robot", *_FREE_PORTS, "--domain-id", str(start.domain_id), *options]
+    return [sys.executable, "-P", "-m", "roaas", "robot", *_FREE_PORTS, "--domain-id", str(start.domain_id), *options]
 
 
 def _realistic(start: Start) -> list[str]:
@@ -47,7 +47,7 @@ def _with_body(name: str) -> GoodDevice:
 def _in_python(name: str, *modules: str, options: tuple[str, ...] = ()) -> Callable[[Start], list[str]]:
     def command(_: Start) -> list[str]:
         check_installed(*modules)
-        return [sys.executable, "-m", "conformance.packs.table1.independent_robots", name, *_FREE_PORTS, *options]
+        return [sys.executable, "-P", "-m", "conformance.packs.table1.independent_robots", name, *_FREE_PORTS, *options]
 
     return command
 

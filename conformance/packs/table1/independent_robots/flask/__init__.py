@@ -18,7 +18,7 @@ _THREADS = 16
 def serve(rest_port: int, _soap_port: int) -> tuple[str, str, Callable[[], None]]:
     """Start the robot. Return REST's base URL, an empty WSDL address, and a function that stops the robot."""
     sock, rest = bound(rest_port)
-    command = [sys.executable, "-m", "gunicorn", "--bind", f"fd://{sock.fileno()}", "--threads", str(_THREADS)]
+    command = [sys.executable, "-P", "-m", "gunicorn", "--bind", f"fd://{sock.fileno()}", "--threads", str(_THREADS)]
     command += ["--log-level", "critical"]
     command += [f"{__name__}.application:application"]
     # This interpreter, with arguments made above.
