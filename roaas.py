@@ -15,7 +15,6 @@ if (
 ):
     del sys.path[0]
 
-import signal
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -189,8 +188,8 @@ _SETTINGS = {
 @click.version_option(package_name="roaas", prog_name="roaas")
 def main() -> None:
     """Conformance and load tests for robots that are web services."""
-    # SIGTERM, sent by containers and CI jobs, cleans up like Ctrl-C; some commands install their own handler.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # A closed terminal, and SIGTERM of containers and CI jobs, clean up like Ctrl-C; some commands have own handlers.
+    import_module("conformance.commandline.endings").end_like_ctrl_c()
 
 
 def load_node() -> None:

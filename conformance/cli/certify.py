@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +15,7 @@ from conformance.cli.certify_init import init, init_described
 from conformance.cli.certify_target import check_folder, told_apart, what_is_judged
 from conformance.cli.summary import print_summary
 from conformance.commandline.device_options import credential_options, description_options
+from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, FrontDoor, ResultCommand
 from conformance.commandline.terminal import inert
@@ -129,8 +129,9 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **options: Any) -> Com
 
     Exit code: 0 conformant, 1 not conformant, 2 usage, 3 robot not reached, 4 inconclusive, 130 interrupted.
     """
-    # A terminated run still stops the robot and writes what it has.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # However it ends, a run stops the robot and writes what it has.
+    end_like_ctrl_c()
+    end_with_parent()
     if options["as_json"] and (options["plan"] or options["init"]):
         raise click.UsageError("--json prints the result of a run, and --plan and --init have none: give one of them")
     if options["fleet"]:

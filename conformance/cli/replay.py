@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.commandline.terminal import inert
@@ -87,6 +88,8 @@ def replay(  # noqa: C901 - one branch for each way to judge
     from conformance.engine.replay import replay as send_again  # noqa: PLC0415
     from conformance.transport.client import Connection  # noqa: PLC0415
 
+    end_like_ctrl_c()
+    end_with_parent()
     folder = result if result.is_dir() else result.parent
     document = _read(folder / "result.json" if result.is_dir() else result)
     token = Path(token_file).read_text(encoding="utf-8").strip() if token_file else None

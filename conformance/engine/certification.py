@@ -4,7 +4,7 @@ import datetime as dt
 import gc
 import sys
 from collections.abc import Container, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -22,6 +22,7 @@ from conformance.engine.result import RESULT_NAME, left_out, result_document, wr
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.scenario import Recordings
 from conformance.scenarios.stored import write_traces
+from conformance.transport.client import Connection
 from conformance.verdict.baseline import Expectation, accepted_until, apply_baseline
 from conformance.verdict.causes import Cause, by_cause
 from conformance.verdict.evidence import Evidence
@@ -82,10 +83,11 @@ def certify(
         OSError: the CA file cannot be read.
     """
     run, started = robot.run, dt.datetime.now(dt.UTC)
-    remarks = list(notes)
-    recordings = Recordings()
-    try:
-        with remembered(run):
+    remarks, recordings, reached = list(notes), Recordings(), True
+    with remembered(run) as interruption:
+        # A result is there from the first request on, whatever ends the process.
+        _unwritten(_unfinished(robot, started, command, notes), recordings, out)
+        try:
             run.limit.begin()
             robot.connect(progress)
             reached = robot.reached
@@ -93,21 +95,56 @@ def certify(
                 # Of a robot that is not there, they would only hide that.
                 if progress is not None:
                     progress.writelines(f"{note}\n" for note in filter(None, (*notes, *announced, robot.estimate())))
-                run.interrupted |= _run_checks(robot, Progress(robot, progress, bar=bar), remarks, recordings)
-                run.limit.end()
-                if not (run.interrupted or run.aborted):
-                    look_again(run, robot.connection, robot.rest)
-                    # The last request may have been the one too many.
-                    robot.alive()
+                _judge(robot, Progress(robot, progress, bar=bar), remarks, recordings)
             else:
                 run.aborted = "the robot could not be reached: " + "; ".join(
                     f"{name}: {why}" for name, why in run.unreachable.items()
                 )
-    except KeyboardInterrupt:
-        reached, run.interrupted = True, True
+        except KeyboardInterrupt:
+            reached, run.interrupted = True, True
+        finally:
+            interruption.only_record()
+            robot.leave_at_rest()
+        return _concluded(robot, out, remarks, recordings, baseline, started, command, reached=reached)
+
+
+def _unfinished(robot: RobotUnderTest, started: dt.datetime, command: str, notes: Iterable[str]) -> dict[str, Any]:
+    """Return the content of result.json for a run that has not ended, which remains if the process is killed."""
+    run = replace(robot.run, interrupted=True, aborted="the run has not ended")
+    told = [*notes, "The run has not ended: it is under way, or it was killed."]
+    verdicts, causes = draw_verdicts(run)
+    classes = _deciding(verdicts, run.claims, run.beside)
+    same = RobotUnderTest(run, Connection())
+    return result_document(
+        same,
+        verdicts,
+        causes,
+        classes,
+        started=started,
+        finished=started,
+        command=command,
+        notes=told,
+        interrupted=True,
+    )
+
+
+def _concluded(
+    robot: RobotUnderTest,
+    out: Path,
+    remarks: list[str],
+    recordings: Recordings,
+    baseline: tuple[Expectation, ...],
+    started: dt.datetime,
+    command: str,
+    *,
+    reached: bool,
+) -> Certification:
+    """Draw the verdicts of a run that has ended, and write its result."""
+    run = robot.run
     if run.interrupted:
-        run.aborted = "the run was interrupted"
-        remarks.append("The run was interrupted; what follows is what was judged until then.")
+        by = f" by {run.ended_by}" if run.ended_by else ""
+        run.aborted = f"the run was interrupted{by}"
+        remarks.append(f"The run was interrupted{by}; what follows is what was judged until then.")
     run.refused = robot.refusals.text
     if run.refused:
         remarks.insert(0, run.refused)
@@ -209,6 +246,23 @@ class _LoadedForGood:
         gc.freeze()
 
 
+def _judge(robot: RobotUnderTest, teller: Progress, remarks: list[str], recordings: Recordings) -> None:
+    """Run the checks, and send the requests of findings again. Whatever breaks, what was judged until then is kept."""
+    run = robot.run
+    try:
+        run.interrupted |= _run_checks(robot, teller, remarks, recordings)
+        run.limit.end()
+        if not (run.interrupted or run.aborted):
+            robot.is_at_rest = False
+            look_again(run, robot.connection, robot.rest)
+            robot.is_at_rest = True
+            # The last request may have been the one too many.
+            robot.alive()
+    except Exception as error:  # noqa: BLE001 - as above
+        remarks.append(f"The suite itself failed, please report this: {type(error).__name__}: {error}")
+        run.aborted = run.aborted or "the suite itself failed"
+
+
 def _run_checks(robot: RobotUnderTest, teller: Progress, remarks: list[str], recordings: Recordings) -> bool:
     """Run the checks with pytest, without configuration from the current folder; return True when interrupted."""
     plugin = ChecksPlugin(lambda: robot, lambda: robot.run.contract, recordings)
@@ -218,10 +272,6 @@ def _run_checks(robot: RobotUnderTest, teller: Progress, remarks: list[str], rec
             environment.delenv("PYTEST_ADDOPTS", raising=False)
             plugins = [*conftests(robot.run.contract), plugin, teller, _LoadedForGood()]
             code = pytest.main([*map(str, robot.run.contract.rules), *pytest_options()], plugins=plugins)
-    except Exception as error:  # noqa: BLE001 - whatever breaks, what was judged until then is not lost
-        remarks.append(f"The suite itself failed, please report this: {type(error).__name__}: {error}")
-        robot.run.aborted = robot.run.aborted or "the suite itself failed"
-        return False
     finally:
         teller.end()
     if code in {pytest.ExitCode.INTERNAL_ERROR, pytest.ExitCode.USAGE_ERROR}:

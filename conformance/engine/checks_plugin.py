@@ -68,6 +68,7 @@ class ChecksPlugin:
     def _robot(self) -> RobotUnderTest:
         if self._connected is None:
             self._connected = self._connect()
+            self._connected.is_at_rest = False
         return self._connected
 
     def ids_of(self, item: pytest.Item) -> tuple[str, ...]:
@@ -229,13 +230,7 @@ class ChecksPlugin:
     def pytest_sessionfinish(self) -> None:
         """Stop the robot at the end of the session, also after Ctrl-C."""
         if self._connected is not None:
-            self._connected.run.limit.end()
-        if self._connected is not None and self._connected.rest is not None:
-            from conformance.api.rest.stops import send_stops  # noqa: PLC0415 - see pytest_collect_file()
-
-            self._connected.run.judge.begin("")  # what is sent from here on belongs to no check
-            self._connected.device.leave_at_rest(self._connected.rest)
-            send_stops(self._connected.rest)
+            self._connected.leave_at_rest()
 
     @pytest.fixture(scope="session")
     def run(self) -> Run:

@@ -5,6 +5,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from conformance.commandline.endings import end_like_ctrl_c
 from conformance.commandline.extras import lacking_soap
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
@@ -57,6 +58,7 @@ def robot_from_options(config: pytest.Config) -> RobotUnderTest:
         effort=Effort(effort),
     )
     robot = RobotUnderTest(run, connection_of(where))
+    end_like_ctrl_c()  # pytest ends its session, which stops the robot
     robot.connect()
     if not robot.reached:
         raise pytest.UsageError(f"the robot cannot be reached: {run.unreachable}")

@@ -19,6 +19,7 @@ from conformance.api.interfaces import Interfaces
 from conformance.api.permission import Permission
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.operation_log import OperationLog
+from conformance.api.rest.stops import send_stops
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
 from conformance.contract.described import SOAP
@@ -54,6 +55,7 @@ class RobotUnderTest:
         log: what was sent to each operation of an API that is judged by its own description, else None.
         permission: what may be sent; every request passes it.
         refusals: whether the device accepts the run's credentials.
+        is_at_rest: whether the run has sent nothing that may move the device, or has stopped it since.
     """
 
     run: Run
@@ -62,6 +64,7 @@ class RobotUnderTest:
     log: OperationLog | None = None
     permission: Permission = field(init=False)
     refusals: RefusalListener = field(init=False)
+    is_at_rest: bool = True
     _services: SoapServices | None = None
     _progress: TextIO | None = None
 
@@ -198,6 +201,16 @@ class RobotUnderTest:
             run.unreachable.pop(name, None)
             run.effort = run.effort.seen(statistics.median(times), min(times))
             self.connection.pace.usual_s = run.effort.usual_ms / 1000
+
+    def leave_at_rest(self) -> None:
+        """Stop the device after the checks, unless that is done; takes at most some seconds, and never raises."""
+        self.run.limit.end()
+        if self.is_at_rest or self.rest is None:
+            return
+        self.run.judge.begin("")  # what is sent from here on belongs to no check
+        self.device.leave_at_rest(self.rest)
+        send_stops(self.rest)
+        self.is_at_rest = True
 
     def has(self, name: Interface) -> bool:
         """Return whether an interface has an address."""

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import asdict
 
+from conformance.commandline.endings import as_parent
 from conformance.commandline.exit_codes import ExitCode
 from conformance.contract.toml_file import basic_string
 
@@ -133,9 +134,15 @@ class MemberRun:
         try:
             self._prepare()
             with (self._folder / LOG_NAME).open("wb") as log:
-                # A session of its own: Ctrl-C reaches the fleet's process alone, which ends the runs one by one.
+                # A session of its own: Ctrl-C reaches the fleet's process alone, which ends the runs one by one. A run
+                # whose fleet is killed ends by itself.
                 process = await asyncio.create_subprocess_exec(
-                    *self._command(), stdin=asyncio.subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True
+                    *self._command(),
+                    stdin=asyncio.subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=log,
+                    start_new_session=True,
+                    env=as_parent(os.environ),
                 )
             try:
                 ended = await self._wait(process, stop)

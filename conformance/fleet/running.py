@@ -2,11 +2,11 @@
 
 import asyncio
 import contextlib
-import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import TextIO
 
+from conformance.commandline.endings import ending_signals
 from conformance.commandline.terminal import inert
 from conformance.fleet.member_run import MemberResult, MemberRun, Outcome, Stop
 
@@ -70,14 +70,14 @@ class FleetRun:
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
-        """End the runs on SIGINT or SIGTERM; a second signal kills them."""
+        """End the runs on a signal that would end the process; a second signal kills them."""
         loop = asyncio.get_running_loop()
 
         def stop() -> None:
             self._tell("ending; a second Ctrl-C kills" if not self._stop.asked.is_set() else "killing what still runs")
             self._stop.ask()
 
-        numbers = (signal.SIGINT, signal.SIGTERM)
+        numbers = ending_signals()
         for number in numbers:
             loop.add_signal_handler(number, stop)
         try:

@@ -55,7 +55,8 @@ class Run:
         effort: how much is tried; reduced when the robot responds slowly.
         judge: the evidence.
         aborted: why the run was aborted, or empty.
-        interrupted: whether the user interrupted the run.
+        interrupted: whether the run was interrupted.
+        ended_by: what interrupted it, such as SIGHUP, if that is known.
         losses: how often the device stopped responding.
         restart_command: command that restarts a device that stopped responding, or empty.
         wait_s: how long a device that stopped responding is waited for, s; None: as the restart command has it.
@@ -78,6 +79,7 @@ class Run:
     judge: Judge = field(init=False)
     aborted: str = ""
     interrupted: bool = False
+    ended_by: str = ""
     losses: int = 0
     restart_command: str = ""
     wait_s: float | None = None

@@ -1,0 +1,65 @@
+"""What may end a process before its work is done: a signal, or the end of the process that started it.
+
+Each of them raises KeyboardInterrupt in the main thread, so that what stops a robot and writes a result after Ctrl-C
+does so after all of them.
+"""
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from typing import Final
+
+#: Names, in the environment, the process that a command belongs to: the command ends with it.
+PARENT_VARIABLE: Final = "ROAAS_PARENT"
+_OFTEN_S: Final = 0.2
+_ALWAYS: Final = ("SIGINT", "SIGTERM")
+# By default they end the process, too; those that show a crash, as SIGSEGV, and those that profilers use are left.
+_USUALLY: Final = ("SIGHUP", "SIGQUIT", "SIGUSR1", "SIGUSR2", "SIGALRM", "SIGXCPU", "SIGPWR", "SIGBREAK")
+_parent_ended = threading.Event()
+
+
+def ending_signals() -> tuple[signal.Signals, ...]:
+    """Return the signals that end this process, without those that it ignores, as ``nohup`` makes it ignore SIGHUP."""
+    handled = {signal.SIG_DFL, signal.default_int_handler}
+    usual = (signal.Signals[name] for name in _USUALLY if name in signal.Signals.__members__)
+    always = (signal.Signals[name] for name in _ALWAYS)
+    return (*always, *(number for number in usual if signal.getsignal(number) in handled))
+
+
+def end_like_ctrl_c() -> None:
+    """Make every signal that ends the process raise KeyboardInterrupt."""
+    for number in ending_signals():
+        signal.signal(number, signal.default_int_handler)
+
+
+def end_with_parent() -> None:
+    """Send this process SIGTERM when its parent process ends; call it in the main thread.
+
+    A process that ``nohup`` started outlives its parent, unless the environment names the parent.
+    """
+    named = os.environ.pop(PARENT_VARIABLE, "")
+    if sys.platform == "win32" or (not named and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN):
+        return
+    parent, main = int(named) if named.isdecimal() else os.getppid(), threading.main_thread().ident
+
+    def follow() -> None:
+        while os.getppid() == parent:
+            time.sleep(_OFTEN_S)
+        _parent_ended.set()
+        # To the main thread: its system call returns at once.
+        signal.pthread_kill(main or 0, signal.SIGTERM)
+
+    threading.Thread(target=follow, name="follows the parent", daemon=True).start()
+
+
+def as_parent(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return the environment of a command that ends when this process does."""
+    return {**environment, PARENT_VARIABLE: str(os.getpid())}
+
+
+def ended_by(number: int) -> str:
+    """Return what ended the process, for a sentence."""
+    return "the end of its parent process" if _parent_ended.is_set() else signal.Signals(number).name
