@@ -116,10 +116,10 @@ class FrontDoor:
     """
 
     @staticmethod
-    def notary(key: Path) -> Any:
+    def notary(key: Path, pack: str | None = None) -> Any:
         """Return a signer that holds the private key in a file, read before the run whose results it will sign."""
         try:
-            return import_module("reports.attestation.signing").Notary(key)
+            return import_module("reports.attestation.signing").Notary(key, lambda: FrontDoor.known(pack))
         except import_module("reports.errors").ReportError as error:
             raise click.UsageError(str(error)) from error
 

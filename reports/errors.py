@@ -33,6 +33,10 @@ class ResultInvalidError(ReportError):
     """The error for a file that violates the JSON Schema of its format, or that contradicts itself."""
 
 
+class ResultUnsignableError(ResultInvalidError):
+    """The error for a valid result that must not be signed: incomplete, edited, or beside files of another run."""
+
+
 class ResultsIncompatibleError(ReportError):
     """The error for two valid results that cannot be compared."""
 

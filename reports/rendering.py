@@ -10,7 +10,7 @@ from reports.attestation.statement import RESULT_SUBJECT, sha256
 from reports.certificate.moves_drawn import pictures
 from reports.certificate.page import certificate_html, certificate_print
 from reports.certificate.seal import Seal
-from reports.errors import ReportError, ResultMissingError
+from reports.errors import ReportError, ResultMissingError, ResultUnsignableError
 from reports.fleet.page import fleet_html, fleet_markdown
 from reports.formats.catalogue import FORMATS
 from reports.latency.junit import latency_junit
@@ -55,6 +55,8 @@ def render(directory: Path, notary: "Notary | None" = None) -> list[Path]:
             written += write_pages(directory, pages[path.name](path))
         except ReportError as error:
             problems.append(error)
+            if isinstance(error, ResultUnsignableError):
+                written += write_pages(directory, _conformance(path, None))
     if problems:
         raise problems[0]
     return written
@@ -75,7 +77,10 @@ def _in_formats(result: Mapping[str, Any], names: Sequence[str]) -> dict[str, st
 
 def _conformance(path: Path, notary: "Notary | None") -> dict[str, str]:
     document = read_result(path)
-    digest = sha256(path.read_bytes())
+    octets = path.read_bytes()
+    digest = sha256(octets)
+    if notary:
+        notary.check(path, octets, document)
     seal = Seal(digest, notary.key if notary else _signed_by(path, digest))
     drawn = pictures(path.parent, document) if "motion" in document["classes"] else []
     pages = {
@@ -84,7 +89,7 @@ def _conformance(path: Path, notary: "Notary | None") -> dict[str, str]:
     }
     if seal.key:
         pages["certificate-print.html"] = certificate_print(document, seal)
-    return {**pages, ENVELOPE_NAME: notary.envelope(path, document, pages)} if notary else pages
+    return {**pages, ENVELOPE_NAME: notary.envelope(path, octets, document, pages)} if notary else pages
 
 
 def _signed_by(path: Path, digest: str) -> str | None:

@@ -184,7 +184,7 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
     if not options["plan"]:
         check_folder(options["out"])
     # Before the run: what cannot be signed by this key is told at once.
-    notary = door.notary(Path(options["key"])) if options["key"] else None
+    notary = door.notary(Path(options["key"]), str(contract.directory)) if options["key"] else None
     if options["plan"]:
         return _plan(chosen, options, contract)
     outcome = _certify(door, chosen, options, contract, statement)

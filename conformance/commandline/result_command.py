@@ -25,8 +25,8 @@ class CommandResult(NamedTuple):
 class FrontDoor(Protocol):
     """What such a command needs from roaas.py, which is the click context's object."""
 
-    def notary(self, key: Path) -> Any:
-        """Return a signer with a private key; raise a usage error if the key cannot be read."""
+    def notary(self, key: Path, pack: str | None = None) -> Any:
+        """Return a signer with a private key for results by a pack; raise a usage error if the key cannot be read."""
 
     def prepare(self) -> None:
         """Load what render() needs, at a moment when nobody waits for it."""
@@ -56,5 +56,5 @@ class ResultCommand(click.Command):
             except (OSError, click.ClickException) as error:
                 # The verdict stands without its pages.
                 said = error.message if isinstance(error, click.ClickException) else error
-                click.echo(f"the pages could not be written: {said}. {result.file} is kept", err=True)
+                click.echo(f"the pages could not be written or signed: {said}. {result.file} is kept", err=True)
         ctx.exit(result.exit_code)

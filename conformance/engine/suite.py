@@ -1,12 +1,16 @@
 """The identity of the suite: version, digests, and the contract packs it knows."""
 
 import hashlib
+from collections.abc import Mapping
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from conformance.contract.ledger import Requirement
 from conformance.contract.pack import DEFAULT_PACK, Contract
-from conformance.contract.requirement_sets import current, load_set, names
+from conformance.contract.requirement_sets import RequirementSet, current, load_set, names
+from conformance.verdict.verdicts import holds_back
 
 _PACKAGE = Path(__file__).parents[1]
 # The rooms that decide what is asked and what is said of it.
@@ -69,13 +73,32 @@ def file_digest(path: Path) -> str:
 
 
 def known(pack: str | None = None) -> dict[str, Any]:
-    """Return what a verifier needs to recognise this suite's certificates: digest, requirement sets, profiles."""
+    """Return what a verifier needs to check this suite's certificates: digests, requirement sets, ledger, profiles."""
     contract = Contract.load(pack or DEFAULT_PACK)
-    sets = [load_set(contract, name) for name in names(contract)] or [current(contract, contract.ledger)]
+    sets = {
+        one.name: one
+        for one in (current(contract, contract.ledger), *map(partial(load_set, contract), names(contract)))
+    }
     return {
         "suite": suite_digest(contract),
-        "requirement_sets": {one.name: one.digest for one in sets},
+        "requirement_sets": {name: one.digest for name, one in sets.items()},
+        "ledger": {id_: _known(item, contract, sets) for id_, item in contract.ledger.items()},
+        "contract": contract_digests(contract),
         "profiles": {name: list(classes) for name, classes in contract.profiles.items()},
+    }
+
+
+def _known(item: Requirement, contract: Contract, sets: Mapping[str, RequirementSet]) -> dict[str, Any]:
+    """Return what a certificate must say of one requirement: the fields of `reports.attestation.outcomes.Entry`."""
+    ids = {item.id, *item.aliases}
+    return {
+        "level": item.level,
+        "classes": list(item.classes),
+        "aliases": list(item.aliases),
+        "sets": [name for name, one in sets.items() if not ids.isdisjoint(one.requirements)],
+        # Of a device with a description of its own, a run leaves out what no permitted request shows.
+        "decides": holds_back(item) and not contract.described,
+        "beside": contract.classes[item.class_].beside,
     }
 
 

@@ -167,7 +167,7 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
         item
         for item in verdicts
         if (item.value is Value.ERROR and item.requirement.level is not Level.MAY)
-        or (item.value is Value.SKIP and not item.evidence.is_unseen and _holds_back(item.requirement))
+        or (item.value is Value.SKIP and not item.evidence.is_unseen and holds_back(item.requirement))
     ]
     if unjudged:
         first = unjudged[0]
@@ -199,7 +199,7 @@ def views(verdicts: Iterable[Verdict], acting: Container[str] = ()) -> dict[str,
     return dict.fromkeys(sorted(others), View.ON_ROS if watched else View.BLACK_BOX) | seen
 
 
-def _holds_back(requirement: Requirement) -> bool:
+def holds_back(requirement: Requirement) -> bool:
     """Return whether a class is inconclusive until this requirement is judged.
 
     Requirements that only a ROS probe can judge, or that depend on something that did not occur, do not hold back.

@@ -7,8 +7,9 @@ because only the recipient decides whom to trust. The module `signature` verifie
 
 import base64
 import binascii
+import json
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 
@@ -71,7 +72,8 @@ def open_envelope(octets: bytes) -> Opened:
         raise EnvelopeRefusedError(f"not a certificate: the file is larger than {_MOST_BYTES} bytes")
     try:
         envelope = msgspec.json.decode(octets, type=_Envelope)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        strict_json(octets)
+    except (ValueError, RecursionError) as error:
         raise EnvelopeRefusedError(f"not an envelope with one signature: {error}") from error
     if envelope.payload_type != PAYLOAD_TYPE:
         raise EnvelopeRefusedError(f"the payload type is {envelope.payload_type[:80]!r}, not {PAYLOAD_TYPE}")
@@ -89,12 +91,32 @@ def statement_in(opened: Opened) -> Statement:
     """
     try:
         statement = msgspec.json.decode(opened.payload, type=Statement)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        strict_json(opened.payload)
+    except (ValueError, RecursionError) as error:
         raise EnvelopeRefusedError(f"the signed content is not a certificate of a run: {error}") from error
     for found, wanted in ((statement.type, STATEMENT_TYPE), (statement.predicate_type, PREDICATE_TYPE)):
         if found != wanted:
             raise EnvelopeRefusedError(f"the signed content is of type {found[:80]!r}, not {wanted}")
     return statement
+
+
+def strict_json(octets: bytes) -> Any:
+    """Parse JSON in which no object has a name twice: of two members, readers may take either.
+
+    Raises:
+        ValueError: it is not JSON, or a name occurs twice in one object.
+        RecursionError: it is nested too deeply.
+    """
+    return json.loads(octets, object_pairs_hook=_object)
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"the name {twice[:80]!r} occurs twice in one object")
+    return found
 
 
 def _octets(text: str, what: str) -> bytes:

@@ -1,13 +1,19 @@
-"""Sign a conformance result together with the pages written from it."""
+"""Sign a conformance result together with the files that belong to it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
+from reports.attestation.envelope import strict_json
+from reports.attestation.files import DESCRIPTION, TRACES, digests_in
 from reports.attestation.keys import signer_of
+from reports.attestation.outcomes import Entry, contradictions, departures, named
+from reports.attestation.policy import Known
 from reports.attestation.signature import seal
-from reports.attestation.statement import statement_of
-from reports.errors import ResultInvalidError
+from reports.attestation.statement import run_of, sha256, statement_of
+from reports.errors import ResultUnsignableError
 
 
 class Notary:
@@ -17,36 +23,104 @@ class Notary:
         key: the key's fingerprint (SHA-256 in hexadecimal).
     """
 
-    def __init__(self, path: Path) -> None:
-        """Read the private key from a PEM file; raise `KeyUnusableError` if that fails, like `keys.signer_of`."""
-        self._signer = signer_of(path)
-        self.key = self._signer.public_key.keyid
-
-    def envelope(self, path: Path, result: Mapping[str, Any], pages: Mapping[str, str]) -> str:
-        """Return the signed envelope (JSON text) for a result file and the pages written from it.
+    def __init__(self, path: Path, known: Callable[[], Mapping[str, object]] = dict) -> None:
+        """Read the private key from a PEM file.
 
         Args:
-            path: the file result.json, whose SHA-256 is signed.
-            result: the parsed content of that file.
-            pages: content of each page, by file name; the digests of the pages are signed as well.
+            path: the file.
+            known: returns the digests and the ledger of the installed suite for the contract of the results, with the
+                fields of `policy.Known`; of a result by another suite or contract, the ledger is not checked.
 
         Raises:
-            ResultInvalidError: the result contradicts itself, for example because somebody edited it.
+            KeyUnusableError: the file cannot be read, has a passphrase, or holds no Ed25519 private key.
         """
-        _agree(path, result)
-        return seal(statement_of(result, path.read_bytes(), pages), self._signer)
+        self._signer = signer_of(path)
+        self._known = known
+        self.key = self._signer.public_key.keyid
+
+    def check(self, path: Path, octets: bytes, result: Mapping[str, Any]) -> None:
+        """Check that a result may be signed: it is complete, and agrees with itself, its folder and the ledger.
+
+        Args:
+            path: the file result.json.
+            octets: the content of the file.
+            result: the same, parsed and valid by its schema.
+
+        Raises:
+            ResultUnsignableError: it is not, for example because somebody edited it.
+        """
+        known = msgspec.convert(self._known(), Known)
+        problems = [*_edited(octets, result), *_disagreeing(result), *_replaced(path.parent, result)]
+        run = run_of(result)
+        problems += contradictions(run)
+        if run.interrupted:
+            problems.append("the run was interrupted")
+        if run.suite.digest == known.suite and run.requirement_set is not None:
+            problems += departures(run, known.ledger, run.requirement_set.name, same=True)
+            problems += _moved(result, known.ledger)
+        if problems:
+            raise ResultUnsignableError(
+                f"{path}: not signed. Only the complete and unchanged result of one run is. Found: "
+                f"{'; '.join(problems[:5])}. Certify again, with --sign KEY"
+            )
+
+    def envelope(self, path: Path, octets: bytes, result: Mapping[str, Any], pages: Mapping[str, str]) -> str:
+        """Return the signed envelope (JSON text) for a checked result file and the pages written from it.
+
+        Args:
+            path: the file result.json.
+            octets: its content, whose SHA-256 is signed.
+            result: the same, parsed.
+            pages: content of each page, by file name. The digests of the pages are signed, and those of the traces and
+                of the description in the folder.
+
+        Raises:
+            ResultUnsignableError: a file of the folder cannot be signed, because it is a link.
+        """
+        files = {name: sha256(text.encode()) for name, text in pages.items()}
+        return seal(
+            statement_of(result, octets, files | digests_in(path.parent, described="api" in result)), self._signer
+        )
 
 
-def _agree(path: Path, result: Mapping[str, Any]) -> None:
-    """Raise `ResultInvalidError` if a result's verdicts contradict each other.
+def _edited(octets: bytes, result: Mapping[str, Any]) -> list[str]:
+    try:
+        return [] if strict_json(octets) == result else ["the file changed while it was read"]
+    except ValueError as error:
+        return [f"{error}"]
 
-    A class must not pass if one of its requirements failed, and the run must not be conformant unless all claimed
-    classes passed.
-    """
-    passed = {name for name, verdict in result["classes"].items() if verdict == "pass"}
-    claimed = {name for name, verdict in result["classes"].items() if verdict != "not-claimed"}
+
+def _replaced(directory: Path, result: Mapping[str, Any]) -> list[str]:
+    """Return the files of the description in a result's folder that are not those that the device was judged by."""
+    judged = {
+        f"{DESCRIPTION}/{name}": digest.removeprefix("sha256:")
+        for name, digest in ((result.get("digests") or {}).get("contract") or {}).items()
+    }
+    there = digests_in(directory, described="api" in result)
+    other = [name for name, digest in there.items() if name != TRACES and judged.get(name) != digest]
+    return [f"the device was not judged by these files: {named(other)}"] if other else []
+
+
+def _moved(result: Mapping[str, Any], ledger: Mapping[str, Entry]) -> list[str]:
+    """Return which requirements of a result are in another class than the ledger has them, in words."""
+    return [
+        f"{item['id']} is in class {item['class']}, not {ledger[item['id']].classes[0]}"
+        for item in result["requirements"]
+        if item["id"] in ledger and item["class"] != ledger[item["id"]].classes[0]
+    ]
+
+
+def _disagreeing(result: Mapping[str, Any]) -> list[str]:
+    """Return where the requirements of a result are not as a run writes them, in words."""
+    found = []
     for item in result["requirements"]:
-        if item["verdict"] == "fail" and item["class"] in passed:
-            raise ResultInvalidError(f"{path}: it says that class {item['class']} passed, although {item['id']} failed")
-    if result["verdict"] == "conformant" and (not passed or passed != claimed):
-        raise ResultInvalidError(f"{path}: it says conformant, although not all claimed classes passed")
+        id_, verdict, findings = item["id"], item["verdict"], len(item["failures"])
+        if verdict == "pass" and not item["cases"]:
+            found.append(f"{id_} passed without a case")
+        if verdict == "fail" and not findings:
+            found.append(f"{id_} failed without a finding")
+        if findings and (verdict in {"skip", "not-claimed"} or (verdict == "pass" and item["level"] != "MAY")):
+            found.append(f"{id_} has {findings} findings, but ended with {verdict!r}")
+    if (result["finished"] or result["started"]) < result["started"]:
+        found.append("the run ended before it started; set the clock")
+    return found

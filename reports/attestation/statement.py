@@ -20,7 +20,6 @@ PREDICATE_TYPE = "https://in-toto.io/attestation/svr/v0.2"
 PROPERTY = "ROAAS_CLASS_"
 """Prefix of a class among the verified properties."""
 RESULT_SUBJECT = "result.json"
-PAGE_SUBJECTS = ("certificate.html", "certificate-print.html")
 STATEMENT_SUBJECT = "statement"
 CONTRACT_SUBJECT = "contract/"
 """Prefix of a contract file among the subjects."""
@@ -66,6 +65,27 @@ class RequirementSet(msgspec.Struct, frozen=True):
     digest: str
 
 
+class Extent(msgspec.Struct, frozen=True, kw_only=True):
+    """How much a run tested.
+
+    Attributes:
+        claims: the conformance classes that were claimed.
+        cases: share of the cases that were tried, of those that a fast robot gets at this effort, 0 to 1.
+        requests: number of HTTP requests.
+        operations: how many operations of the device's own description were called, and how many it has; None for a
+            device that was judged by a contract pack.
+        left_out: the minutes of --minutes if they ended the run before everything was tried, or None.
+        suite_errors: ids of the requirements that could not be judged because of an error in the suite.
+    """
+
+    claims: list[str]
+    cases: float
+    requests: int
+    operations: tuple[int, int] | None
+    left_out: float | None
+    suite_errors: list[str]
+
+
 class Run(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The facts about a conformance run that a policy checks, without addresses or tokens.
 
@@ -75,6 +95,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         requirements: number of requirements with each verdict.
         outcomes: ids of requirements by level and verdict, so that two certificates can be compared; empty in older
             certificates.
+        extent: how much the run tested; None in older certificates.
         accepted: ids of the requirements whose failure the baseline file accepts.
         accepted_until: last day on which the baseline file accepts the failures, or None.
         baseline: digest of the file of accepted failures, or None.
@@ -104,6 +125,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     started: str
     finished: str
     outcomes: dict[str, dict[str, list[str]]] = {}
+    extent: Extent | None = None
 
     @property
     def ended(self) -> dt.datetime | None:
@@ -144,23 +166,23 @@ class Statement(msgspec.Struct, frozen=True, rename="camel"):
         return next((item.sha256 for item in self.subject if item.name == name), None)
 
 
-def statement_of(result: Mapping[str, Any], octets: bytes, pages: Mapping[str, str]) -> Statement:
-    """Return the in-toto statement to sign for a result file and the pages written from it.
+def statement_of(result: Mapping[str, Any], octets: bytes, files: Mapping[str, str]) -> Statement:
+    """Return the in-toto statement to sign for a result file and the files that belong to it.
 
     Args:
         result: a valid `roaas-result/1` document.
         octets: the content of the document's file.
-        pages: content of the pages written from the document, by file name.
+        files: SHA-256 in hexadecimal of each file beside it, by its path in the folder.
     """
     digests = result.get("digests") or {}
     contract = [
         _subject(f"{CONTRACT_SUBJECT}{name}", digest) for name, digest in sorted(digests.get("contract", {}).items())
     ]
     subjects = [Subject(RESULT_SUBJECT, {"sha256": sha256(octets)})]
-    subjects += [Subject(name, {"sha256": sha256(pages[name].encode())}) for name in PAGE_SUBJECTS]
+    subjects += [Subject(name, {"sha256": digest}) for name, digest in files.items()]
     if digests.get("statement"):
         subjects.append(_subject(STATEMENT_SUBJECT, digests["statement"]))
-    run = _run(result)
+    run = run_of(result)
     verifier = Verifier(f"urn:roaas:suite:{run.suite.version}:{run.suite.digest}", contract)
     predicate = Predicate(verifier, run.finished, [PROPERTY + property_name(name) for name in passed(run)], run)
     return Statement(STATEMENT_TYPE, [*subjects, *contract], PREDICATE_TYPE, predicate)
@@ -191,7 +213,8 @@ def _subject(name: str, digest: str) -> Subject:
     return Subject(name, {"sha256": digest.removeprefix("sha256:")})
 
 
-def _run(result: Mapping[str, Any]) -> Run:
+def run_of(result: Mapping[str, Any]) -> Run:
+    """Return the facts that are signed for a valid `roaas-result/1` document."""
     requirements = result["requirements"]
     robot = result["statement"]["robot"]
     baseline = result.get("baseline") or {}
@@ -215,6 +238,19 @@ def _run(result: Mapping[str, Any]) -> Run:
         started=result["started"],
         finished=result["finished"] or result["started"],
         outcomes=_outcomes(requirements),
+        extent=_extent(result),
+    )
+
+
+def _extent(result: Mapping[str, Any]) -> Extent:
+    speed, api = result.get("speed") or {}, result.get("api")
+    return Extent(
+        claims=list(result["statement"]["claims"]),
+        cases=round(speed.get("share_of_cases", 1.0) * speed.get("share_tried", 1.0), 4),
+        requests=result.get("requests", 0),
+        operations=(api["coverage"]["operations"][0], api["coverage"]["operations"][1]) if api else None,
+        left_out=result["left_out"]["minutes"] if "left_out" in result else None,
+        suite_errors=sorted({id_ for fault in result.get("suite_errors", ()) for id_ in fault["requirements"]}),
     )
 
 

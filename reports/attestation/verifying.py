@@ -4,16 +4,20 @@
 """
 
 import datetime as dt
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import msgspec
 from securesystemslib.signer import Key
 
-from reports.attestation.policy import Known, Point, Policy, judge
+from reports.attestation.envelope import strict_json
+from reports.attestation.files import compared, remarks_on
+from reports.attestation.judging import Point, judge
+from reports.attestation.policy import Known, Policy
 from reports.attestation.signature import unseal
-from reports.attestation.statement import PAGE_SUBJECTS, RESULT_SUBJECT, Statement, sha256
-from reports.errors import ResultUnreadableError
+from reports.attestation.statement import RESULT_SUBJECT, Statement, run_of
+from reports.errors import ResultMissingError, ResultUnreadableError
 
 PROVED = (
     "Proved: the holder of this key vouches that this run took place and gave this result, and nothing was changed "
@@ -32,10 +36,12 @@ class Verification:
     Attributes:
         statement: the signed statement.
         points: the checks of the policy, followed by those of the compared files.
+        remarks: sentences on files that were not compared.
     """
 
     statement: Statement
     points: tuple[Point, ...]
+    remarks: tuple[str, ...] = ()
 
     @property
     def accepted(self) -> bool:
@@ -54,26 +60,59 @@ def verify(
         policy: the requirements that the certificate must meet.
         known: digests and profiles of the installed suite.
         now: the time from which the age of the run is counted.
-        directory: folder with result.json and the pages to compare with the signed digests, or None.
+        directory: folder with result.json and the files beside it to compare with the signed digests, or None.
 
     Raises:
         EnvelopeRefusedError: the envelope is not signed by the key, or is not a certificate.
+        ResultMissingError: the directory has no result.json.
         ResultUnreadableError: a file of the directory cannot be read.
     """
     statement = unseal(octets, key)
-    files = () if directory is None else _files(statement, directory)
-    return Verification(statement, (*judge(statement, policy, known, now), *files))
+    points = judge(statement, policy, known, now)
+    if directory is None:
+        return Verification(statement, tuple(points))
+    result = _result_in(directory)
+    name = _statement_name(result)
+    points += (_file(*one) for one in compared(statement, directory, name))
+    points.append(_agreement(statement, result))
+    return Verification(statement, tuple(points), tuple(remarks_on(statement, directory, name)))
 
 
-def _files(statement: Statement, directory: Path) -> Iterator[Point]:
-    """Compare result.json and each existing page in the directory with the signed digests; yield one check per file."""
-    for name in (RESULT_SUBJECT, *PAGE_SUBJECTS):
-        path = directory / name
-        if name in PAGE_SUBJECTS and not path.exists():
-            continue
-        try:
-            digest = sha256(path.read_bytes())
-        except OSError as error:
-            raise ResultUnreadableError(f"{path}: {error.strerror or error}") from error
-        same = digest == statement.digest_of(name)
-        yield Point(name, same, "as it was signed" if same else "not the file that was signed")
+def _result_in(directory: Path) -> Any:
+    """Return the content of result.json as it was parsed, without validation; None if it is not JSON."""
+    path = directory / RESULT_SUBJECT
+    try:
+        return strict_json(path.read_bytes())
+    except FileNotFoundError as error:
+        raise ResultMissingError(f"{path}: no such file. --result DIR is the folder that the vendor sent") from error
+    except OSError as error:
+        raise ResultUnreadableError(f"{path}: {error.strerror or error}") from error
+    except (ValueError, RecursionError):
+        return None
+
+
+def _statement_name(result: Any) -> str | None:
+    """Return the file name of the vendor's statement, by result.json."""
+    try:
+        return Path(result["places"]["statement"]["file"]).name or None
+    except (KeyError, TypeError):
+        return None
+
+
+def _file(name: str, problem: str) -> Point:
+    return Point(
+        name, not problem, problem or "as it was signed", "the file that was signed",
+        "ask the vendor for the file of this run; if the vendor changed it, for another run",
+    )  # fmt: skip
+
+
+def _agreement(statement: Statement, result: Any) -> Point:
+    """Return the check that the envelope says what result.json says, as far as both know the facts."""
+    signed = msgspec.to_builtins(statement.predicate.roaas)
+    try:
+        read = msgspec.to_builtins(run_of(result))
+        other = sorted(key for key in signed if signed[key] != read.get(key))
+    except (KeyError, TypeError, AttributeError, IndexError, msgspec.ValidationError):
+        other = ["all"]
+    text = f"the certificate says otherwise than result.json: {', '.join(other)}" if other else "the same facts in both"
+    return Point("agreement", not other, text, "a certificate that says what result.json says", "do not rely on it")

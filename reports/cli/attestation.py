@@ -38,7 +38,7 @@ def keygen(directory: Path) -> None:
 @click.option("--policy", type=FILE, help="What a certificate must meet (TOML).  [default: the strict policy]")
 @CONTRACT
 @click.option("--nonce", help="The nonce that you gave to the vendor: the run must have been made with it.")
-@click.option("--result", type=FOLDER, metavar="DIR", help="Compare DIR/result.json and DIR/certificate.html as well.")
+@click.option("--result", type=FOLDER, metavar="DIR", help="Compare the files of DIR as well.")
 @click.pass_obj
 def verify(
     door: FrontDoor,
@@ -73,6 +73,12 @@ def _print(found: Verification, key: str) -> None:
     click.echo(f"result         sha256:{found.statement.digest_of(RESULT_SUBJECT)}\n")
     for point in found.points:
         click.echo(f"  {'ok     ' if point.met else 'REFUSED'}  {point.name:<17} {excerpt(point.found, 400)}")
+        if not point.met:
+            click.echo(
+                f"{'':11}demanded: {excerpt(point.demanded, 400)}\n{'':11}what to do: {excerpt(point.remedy, 400)}"
+            )
+    for remark in found.remarks:
+        click.echo(f"\n{fill(excerpt(remark, 400), 100)}")
     refused = [point.name for point in found.points if not point.met]
     for words in (PROVED, NOT_PROVED):
         click.echo(f"\n{fill(words, 100)}")

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import msgspec
 
-from reports.attestation.policy import Known, Point, Policy, judge
+from reports.attestation.judging import Point, judge
+from reports.attestation.policy import Known, Policy
 from reports.attestation.statement import passed, sha256
 from reports.registry.entries import Certificate
 
@@ -20,6 +21,14 @@ _WORDS = {
     "max_age_days": "expired",
     "requirement_sets": "another requirement set",
     "suites": "an unknown suite",
+    "contract": "another contract",
+    "requirements": "not the requirements of the suite",
+    "extent": "signed by a former version",
+    "cases": "too few cases",
+    "operations": "too few operations",
+    "left_out": "cut short by --minutes",
+    "suite_errors": "errors of the suite",
+    "statement": "another statement",
     "efforts": "too little effort",
     "motion": "was not allowed to move",
     "baseline": "with accepted failures",

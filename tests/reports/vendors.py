@@ -3,6 +3,7 @@
 from typing import Any
 
 SUITE, SET = "sha256:" + "5" * 64, "sha256:" + "7" * 64
+DIGESTS = {"statement": "sha256:" + "1" * 64, "contract": {"openapi.yaml": "sha256:" + "2" * 64}}
 
 
 class Door:
@@ -11,7 +12,17 @@ class Door:
     @staticmethod
     def known(_pack=None) -> dict[str, Any]:
         """Return what the suite knows."""
-        return {"suite": SUITE, "requirement_sets": {"1.2": SET}, "profiles": {"full": ("http", "safety")}}
+        ledger = {
+            id_: {"level": level, "classes": [id_.partition("/")[0]], "sets": ["1.2"], "decides": level == "MUST"}
+            for id_, level in (("http/a", "MUST"), ("http/b", "MUST"), ("safety/c", "SHOULD"), ("describe/d", "MAY"))
+        }
+        return {
+            "suite": SUITE,
+            "requirement_sets": {"1.2": SET},
+            "ledger": ledger,
+            "contract": DIGESTS["contract"],
+            "profiles": {"full": ("http", "safety")},
+        }
 
 
 def requirement(verdict: str = "pass", level: str = "MUST", id_: str = "http/x", **more: Any) -> dict[str, Any]:
@@ -27,10 +38,13 @@ def requirement(verdict: str = "pass", level: str = "MUST", id_: str = "http/x",
 def make_conformant(result: dict[str, Any]) -> None:
     """Turn a result into one that the default policy accepts."""
     passed = [requirement(id_="http/a"), requirement(id_="http/b"), requirement("pass", "SHOULD", "safety/c")]
+    passed.append(requirement("not-claimed", "MAY", "describe/d"))
+    result["statement"]["claims"] = ["http", "safety"]
     result |= {
         "verdict": "conformant",
         "suite": {"version": "1.1.0", "contract": "1.1", "digest": SUITE},
         "requirement_set": {"name": "1.2", "digest": SET},
+        "digests": DIGESTS,
         "classes": {"http": "pass", "safety": "pass", "describe": "not-claimed"},
         "class_reasons": {},
         "requirements": passed,

@@ -9,9 +9,10 @@ from typing import Any
 
 import msgspec
 import pytest
+from securesystemslib.dsse import Envelope
 from vendors import Door, change, make_conformant
 
-from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key
+from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key, signer_of
 from reports.attestation.policy import Known, Policy
 from reports.attestation.signing import Notary
 from reports.attestation.verifying import Verification, verify
@@ -70,6 +71,18 @@ class Desk:
         assert old in self.payload
         self.edit(payload=base64.b64encode(self.payload.replace(old, new).encode()).decode())
 
+    def forge(self, **changes: Any) -> None:
+        """Have the vendor sign facts that no run wrote, with changes at paths such as `extent__cases`."""
+        document = json.loads(self.payload)
+        change(document["predicate"]["roaas"], changes)
+        self.seal(json.dumps(document).encode())
+
+    def seal(self, payload: bytes) -> None:
+        """Have the vendor sign any payload."""
+        envelope = Envelope(payload, "application/vnd.in-toto+json", {})
+        envelope.sign(signer_of(self.keys / PRIVATE_NAME))
+        self.envelope.write_text(json.dumps(envelope.to_dict()))
+
     def asking(self, **points: Any) -> "Desk":
         return replace(self, policy=replace_points(self.policy, points))
 
@@ -89,7 +102,6 @@ def desk(tmp_path: Path, result: dict[str, Any]) -> Desk:
     """A desk with a good certificate on it."""
     generate(tmp_path / "keys")
     make_conformant(result)
-    result["digests"] = {"statement": "sha256:" + "1" * 64, "contract": {"openapi.yaml": "sha256:" + "2" * 64}}
     desk = Desk(tmp_path / "sent", tmp_path / "keys", result)
     desk.sign()
     return desk

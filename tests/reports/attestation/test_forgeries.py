@@ -4,10 +4,9 @@ import base64
 import json
 
 import pytest
-from securesystemslib.dsse import Envelope
 
 from reports.attestation.envelope import ENVELOPE_NAME
-from reports.attestation.keys import PRIVATE_NAME, generate, signer_of
+from reports.attestation.keys import PRIVATE_NAME, generate
 from reports.attestation.signing import Notary
 from reports.attestation.statement import seed_of
 from reports.errors import EnvelopeRefusedError
@@ -35,10 +34,7 @@ def resigned_as(**texts):
     """Another statement of the vendor's own, which is no certificate."""
 
     def forge(desk):
-        document = {**json.loads(desk.payload), **texts}
-        envelope = Envelope(json.dumps(document).encode(), "application/vnd.in-toto+json", {})
-        envelope.sign(signer_of(desk.keys / PRIVATE_NAME))
-        desk.envelope.write_text(json.dumps(envelope.to_dict()))
+        desk.seal(json.dumps({**json.loads(desk.payload), **texts}).encode())
 
     return forge
 
@@ -108,16 +104,24 @@ def other_envelope(desk):
 
 
 def accepted_failure(desk):
-    accepted = {"id": "http/x", "class": "http", "verdict": "warn", "expected_failure": {"reason": "ticket 7"}}
-    desk.sign(requirements=[{**desk.result["requirements"][0], **accepted}])
+    first, *others = desk.result["requirements"]
+    desk.sign(requirements=[{**first, "verdict": "warn", "expected_failure": {"reason": "ticket 7"}}, *others])
 
 
 def signed_with(**changes):
     return lambda desk: desk.sign(**changes)
 
 
+def forged_with(**changes):
+    return lambda desk: desk.forge(**changes)
+
+
 def nothing(_):
     pass
+
+
+PAGES = {"certificate.html", "certificate-print.html"}
+OTHER = PAGES | {"certificate.md", "junit.xml", "agreement"}
 
 
 INCONCLUSIVE = {"verdict": "inconclusive", "classes": {"http": "pass", "safety": "inconclusive"}}
@@ -126,8 +130,8 @@ OLDER = {"name": "1.0", "digest": "sha256:" + "0" * 64}
 RESULTS = [
     ("edited page", edited("certificate.html"), {}, {"certificate.html"}),
     ("edited sheet", edited("certificate-print.html"), {}, {"certificate-print.html"}),
-    ("edited result", edited("result.json"), {}, {"result.json"}),
-    ("beside another result", other_envelope, {}, {"result.json", "certificate.html", "certificate-print.html"}),
+    ("edited result", edited("result.json"), {}, {"result.json", "agreement"}),
+    ("beside another result", other_envelope, {}, {"result.json"} | OTHER),
     ("another robot", nothing, {"robot": "Courier 8"}, {"robot"}),
     ("another vendor", nothing, {"vendor": "Somebody"}, {"vendor"}),
     ("old firmware", signed_with(statement__robot__version="1.0"), {"firmware": "2.4.1"}, {"firmware"}),
@@ -143,8 +147,8 @@ RESULTS = [
     ("ROS not seen", signed_with(class_views={"http": "black box"}), {"ros": True}, {"ros"}),
     ("baseline", signed_with(baseline={"digest": "sha256:" + "3" * 64}), {}, {"baseline"}),
     ("accepted failure", accepted_failure, {}, {"baseline", "classes"}),
-    ("part of a run", signed_with(interrupted=True), {}, {"interrupted"}),
-    ("expired", signed_with(finished="2025-11-20T12:00:00Z"), {}, {"max_age_days"}),
+    ("part of a run", forged_with(interrupted=True), {}, {"interrupted", "agreement"}),
+    ("expired", signed_with(started="2025-11-20T11:00:00Z", finished="2025-11-20T12:00:00Z"), {}, {"max_age_days"}),
     ("from the future", signed_with(finished="2026-11-22T12:00:00Z"), {}, {"max_age_days"}),
     ("replayed nonce", signed_with(nonce="monday", seed=seed_of("monday")), {"nonce": "tuesday"}, {"nonce"}),
     ("nonce and another seed", signed_with(nonce="monday", seed=0), {"nonce": "monday"}, {"nonce"}),
@@ -166,8 +170,7 @@ WAIVERS = [
     (signed_with(suite__digest="sha256:6"), {"suites": ("installed", "sha256:6")}),
     (signed_with(classes={"http": "pass"}), {"profile": "paper"}),
     (signed_with(baseline={"digest": "sha256:" + "3" * 64}), {"baseline": True}),
-    (signed_with(interrupted=True), {"interrupted": True}),
-    (signed_with(finished="2025-11-20T12:00:00Z"), {"max_age_days": 400}),
+    (signed_with(started="2025-11-20T11:00:00Z", finished="2025-11-20T12:00:00Z"), {"max_age_days": 400}),
     (signed_with(class_views={"http": "seen on ROS"}), {"ros": True}),
     (signed_with(nonce="monday", seed=seed_of("monday")), {"nonce": "monday"}),
     (nothing, {"robot": "Courier 7", "vendor": "Example Robotics", "firmware": "2.4.1"}),

@@ -87,7 +87,7 @@ def test_keys_are_not_taken_for_one_another(tmp_path):
 
 def test_subjects_are_the_files_that_the_run_was_made_with(desk):
     subjects = {item["name"]: item["digest"]["sha256"] for item in json.loads(desk.payload)["subject"]}
-    files = ["result.json", "certificate.html", "certificate-print.html"]
+    files = ["result.json", "certificate.html", "certificate.md", "junit.xml", "certificate-print.html"]
     assert list(subjects) == [*files, "statement", "contract/openapi.yaml"]
     assert subjects["statement"] == "1" * 64
     done = ended("sha256sum", desk.folder / "result.json", check=True)
@@ -138,7 +138,12 @@ def test_the_sheet_for_print_shows_both_fingerprints(desk):
 def test_the_sheet_is_one_page(desk, tmp_path):
     """Also with all classes and long names."""
     names = {f"class-{number}": "pass" for number in range(12)}
-    desk.sign(classes=names, requirements=[], statement__robot__name="A long name of a robot " * 9)
+    desk.sign(
+        classes=names,
+        requirements=[],
+        statement__claims=list(names),
+        statement__robot__name="A long name of a robot " * 9,
+    )
     browser = shutil.which("chromium") or shutil.which("google-chrome")
     assert browser, "the pages' tests need a Chromium"
     command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]

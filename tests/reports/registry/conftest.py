@@ -49,9 +49,9 @@ class Host:
         render(folder, Notary(self.folder / vendor / PRIVATE_NAME))
         return folder / "certificate.intoto.json"
 
-    def build(self, *options: str) -> Result:
+    def build(self, *options: str, door: type[Door] = Door) -> Result:
         words = ["build", str(self.folder / "sent"), "--keys", str(self.folder / "keys"), "--out", str(self.site)]
-        return CliRunner().invoke(registry, [*words, *options], obj=Door())
+        return CliRunner().invoke(registry, [*words, *options], obj=door())
 
     def text(self) -> str:
         """Everything that the site says."""

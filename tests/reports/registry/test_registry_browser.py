@@ -2,7 +2,7 @@
 
 import re
 
-from vendors import requirement
+from vendors import Door, requirement
 
 from reports.certificate.difference import difference
 from reports.certificate.difference_page import difference_html
@@ -34,13 +34,25 @@ MEASURE = """(page, view) => {
 
 def test_the_pages_fit_a_desk_and_a_phone_and_can_be_filtered(host, fleet, browse):
     classes = dict.fromkeys(fleet["class_titles"], "pass")
-    broken = [requirement(id_=f"http/a-rather-long-name-{number}") for number in range(3)]
-    host.sign("old", days_ago=3, classes=classes, requirements=broken, statement__robot__version="2.3")
-    changed = [{**item, "verdict": "warn"} for item in broken]
-    host.sign("new", classes=classes, requirements=changed)
-    host.sign("other", statement__robot__name="Kiosk", classes={**classes, "rest-resources": "not-claimed"})
+    broken = [requirement("pass", "SHOULD", f"http/a-rather-long-name-{number}") for number in range(3)]
+    each = [requirement("pass", "MAY", f"{name}/x") for name in classes]
+    host.result["statement"]["claims"] = list(classes)
+
+    class Wide(Door):
+        """An installation whose ledger has these requirements."""
+
+        @staticmethod
+        def known(_pack=None):
+            ledger = {one["id"]: {"level": one["level"], "classes": [one["class"]]} for one in (*broken, *each)}
+            return Door.known() | {"ledger": ledger}
+
+    both = {"classes": classes, "requirements": broken + each}
+    host.sign("old", days_ago=3, statement__robot__version="2.3", **both)
+    host.sign("new", classes=classes, requirements=[{**item, "verdict": "warn"} for item in broken] + each)
+    most = {**classes, "rest-resources": "not-claimed"}
+    host.sign("other", statement__robot__name="Kiosk", **(both | {"classes": most}))
     host.sign("foreign", vendor="stranger")
-    assert host.build().exit_code == 1
+    assert host.build(door=Wide).exit_code == 1
     index = (host.site / "index.html").read_text()
     (robot,) = (host.site / "robots").glob("courier-7-*.html")
     both = difference({**host.result, "seed": 1}, host.result)
