@@ -93,6 +93,7 @@ class _Rooms(click.Group):
         open_rooms()
         guard = import_module("conformance.commandline.guard")
         guard.make_streams_lenient()
+        import_module("conformance.commandline.secrecy").SECRETS.keep_userinfo(" ".join(sys.argv))
         try:
             return super().invoke(ctx)
         except (click.ClickException, click.exceptions.Exit):

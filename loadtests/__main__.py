@@ -12,10 +12,13 @@ import traceback
 from pathlib import Path
 
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.guard import make_streams_lenient
+from conformance.commandline.secrecy import SECRETS
 
 
 def main() -> int:
     """Run the settings on standard input; returns the exit code."""
+    make_streams_lenient()
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C during the imports ends it without a traceback
     from loadtests.engine.run import carry_out  # noqa: PLC0415 -- it takes a second, during which Ctrl-C has to work
     from loadtests.settings.settings import Settings  # noqa: PLC0415 -- as above
@@ -23,6 +26,7 @@ def main() -> int:
     _raise_file_limit()
     try:
         written, _, settings = sys.stdin.read().partition("\n")
+        SECRETS.keep_userinfo(settings)
         result = carry_out(Settings.from_json(settings))
     except Exception:  # noqa: BLE001 -- exit code 1 would say that the robot missed a threshold
         traceback.print_exc()

@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+from conformance.commandline.guard import make_streams_lenient
 from loadtests.cli import DEFAULT_OUT, load
 from loadtests.described.device import CREDENTIALS, secrets_of
 from loadtests.settings.errors import SettingsError
@@ -20,6 +21,7 @@ LINGER_S = 600.0
 
 def main(words: list[str]) -> None:
     """Run as the master or as a worker; ends with the exit code of `roaas load`."""
+    make_streams_lenient()
     if "--worker" in words:
         _work(words)
         return

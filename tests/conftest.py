@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from conformance.commandline.secrecy import SECRETS
+
 # How long an example takes is the machine's affair, which others may use as well. Every run has the same examples.
 settings.register_profile("tests", deadline=None, derandomize=True)
 settings.load_profile("tests")
@@ -19,6 +21,14 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Ids up to 101 leave DDS's ports below Linux's ephemeral range.
 _DOMAIN_IDS = range(40, 102)
+
+
+@pytest.fixture(autouse=True)
+def _no_secrets() -> Iterator[None]:
+    """Let no test mask what was a secret in another one."""
+    SECRETS.forget()
+    yield
+    SECRETS.forget()
 
 
 @contextmanager

@@ -1,7 +1,11 @@
-"""Atomic writing of files."""
+"""Atomic writing of files, with variables in place of secrets."""
 
+import json
 import secrets
 from pathlib import Path
+from typing import Any
+
+from conformance.commandline.secrecy import SECRETS
 
 
 def write_atomically(path: Path, text: str) -> Path:
@@ -12,6 +16,24 @@ def write_atomically(path: Path, text: str) -> Path:
     Raises:
         OSError: the file cannot be written; the old content is kept, and no temporary file remains.
     """
+    return _written(path, SECRETS.masked(text))
+
+
+def write_json(path: Path, value: Any, **options: Any) -> Path:
+    """Write JSON atomically; return its path. It stays JSON, whatever in it was a secret.
+
+    Args:
+        path: of the file.
+        value: its content.
+        options: of json.dumps().
+
+    Raises:
+        OSError: as above.
+    """
+    return _written(path, json.dumps(SECRETS.masked_json(value), **options) + "\n")
+
+
+def _written(path: Path, text: str) -> Path:
     draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
         with draft.open("x", encoding="utf-8") as file:

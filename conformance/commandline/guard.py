@@ -11,6 +11,7 @@ from typing import Any, TextIO
 import click
 
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.secrecy import SECRETS
 from conformance.commandline.terminal import inert
 
 _SHOWN = 300
@@ -26,8 +27,19 @@ class _Lenient(io.FileIO):
             return memoryview(octets).nbytes
 
 
+class _Masking(io.BufferedWriter):
+    """A buffer that masks secrets. A text stream gives it each text whole, unless its own buffer is full before."""
+
+    def write(self, octets: Any, /) -> int:
+        super().write(SECRETS.masked_bytes(bytes(octets)))
+        return memoryview(octets).nbytes
+
+
 def make_streams_lenient() -> None:
-    """Let the process end with the exit code of its verdict also where nobody reads its stdout or stderr any more."""
+    """Let the process end with the exit code of its verdict also where nobody reads its stdout or stderr any more.
+
+    What it writes there shows no secret.
+    """
     sys.stdout = _lenient(sys.stdout, sys.__stdout__)
     sys.stderr = _lenient(sys.stderr, sys.__stderr__)
 
@@ -40,7 +52,7 @@ def _lenient(stream: TextIO | None, own: TextIO | None) -> TextIO:
     if stream is not own:
         return stream
     raw = _Lenient(stream.fileno(), "wb", closefd=False)
-    return io.TextIOWrapper(io.BufferedWriter(raw), stream.encoding, stream.errors, line_buffering=True)
+    return io.TextIOWrapper(_Masking(raw), stream.encoding, stream.errors, line_buffering=True)
 
 
 def report_failure(error: Exception) -> ExitCode:
@@ -62,7 +74,7 @@ def _kept(error: Exception) -> str:
     try:
         descriptor, path = tempfile.mkstemp(prefix="roaas-error-", suffix=".txt")
         with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:
-            file.writelines(traceback.format_exception(error))
+            file.write(SECRETS.masked("".join(traceback.format_exception(error))))
     except (OSError, RecursionError):
         return ""
     return f"; the details are in {path}"

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from conformance.commandline.atomic_write import write_atomically, write_json
 from conformance.contract.locating import MANIFEST
 from conformance.contract.toml_file import basic_string
 
@@ -67,11 +68,11 @@ def write_described_pack(
         f"without = {json.dumps(list(_WITHOUT))}",
         *(f'\n[[class]]\nname = "{class_}"' for class_ in classes),
     ]
-    (folder / MANIFEST).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_atomically(folder / MANIFEST, "\n".join(lines) + "\n")
     for file, content in (
         (DOCUMENT_NAME, document), (ORIGINAL_NAME, original), (UNRESOLVED_NAME, list(unresolved)),
     ):  # fmt: skip
-        (folder / file).write_text(json.dumps(content, ensure_ascii=False), encoding="utf-8")
+        write_json(folder / file, content, ensure_ascii=False)
     return folder
 
 

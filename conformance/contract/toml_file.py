@@ -16,6 +16,8 @@ from typing import Annotated, Any, TypeVar
 import msgspec
 from msgspec import Meta, inspect
 
+from conformance.commandline.secrecy import SECRETS
+
 _Shape = TypeVar("_Shape")
 
 #: The kinds of values that several files have. NaN and infinity, which TOML can write, are none of them.
@@ -49,7 +51,9 @@ def read_tables(path: Path, error: type[TomlFileError] = TomlFileError) -> dict[
         TomlFileError: as ``error``: the file cannot be read, or is not TOML.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        SECRETS.keep_userinfo(text)
+        return tomllib.loads(text)
     except OSError as problem:
         raise error(f"{path} cannot be read: {problem.strerror or problem}") from problem
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as problem:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urlsplit
 
+from conformance.commandline.atomic_write import write_atomically, write_json
 from conformance.contract.described import MOTION, SOAP, TITLE, WEB_SERVER
 from conformance.contract.locating import MANIFEST
 from conformance.contract.pack import Contract
@@ -66,11 +67,11 @@ def write_soap_pack(
         "described = true",
         *(f'\n[[class]]\nname = "{class_}"' for class_ in (SOAP, WEB_SERVER, *((MOTION,) if moves else ()))),
     ]
-    (folder / MANIFEST).write_text("\n".join(lines) + "\n", encoding="utf-8")
-    (folder / "openapi.json").write_text(json.dumps(_operations(found)), encoding="utf-8")
+    write_atomically(folder / MANIFEST, "\n".join(lines) + "\n")
+    write_json(folder / "openapi.json", _operations(found))
     texts = {place: text.decode("latin-1") for place, text in documents.items()}
     kept = {"location": location, "address": address, "documents": texts, "named": named or {}, "foreign": foreign}
-    (folder / DOCUMENTS_NAME).write_text(json.dumps(kept), encoding="utf-8")
+    write_json(folder / DOCUMENTS_NAME, kept)
     return folder
 
 

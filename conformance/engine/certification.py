@@ -11,6 +11,7 @@ from typing import Any, TextIO
 import pytest
 
 from conformance.commandline.exit_codes import OF_VERDICT, ExitCode
+from conformance.commandline.secrecy import SECRETS
 from conformance.contract.classes import Prerequisite
 from conformance.contract.described import MOTION, SOAP
 from conformance.engine.checks_plugin import ChecksPlugin
@@ -154,6 +155,7 @@ def _concluded(
     remarks += run.remarks
     seen, causes = draw_verdicts(run)
     remarks += [one["text"] for one in left_out(robot).values()]
+    remarks += SECRETS.notes
     mask((cause.finding for cause in causes), robot.connection.credentials)
     if run.requirement_set is not None and run.scored is not None:
         seen = score(seen, run.scored, f"requirement set {run.requirement_set.name}")
@@ -177,7 +179,7 @@ def _concluded(
         notes=remarks,
         interrupted=run.interrupted,
     )
-    document = robot.connection.credentials.hidden_in(document)
+    document = SECRETS.masked_json(document)
     path, unwritten = out / RESULT_NAME, _unwritten(document, recordings, out)
     if run.interrupted or unwritten:
         code = ExitCode.INTERRUPTED if run.interrupted else ExitCode.INCONCLUSIVE

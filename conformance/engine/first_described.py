@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from conformance.api.call_rules import CallRules, Reason
+from conformance.commandline.atomic_write import write_atomically
 from conformance.contract.toml_file import basic_string
 from conformance.documents.description import Description, DescriptionError, is_url
 from conformance.documents.json_schema import UnresolvedError, kinds_of
@@ -70,7 +71,8 @@ def write_described_statement(path: Path, found: Description, api: Api, calls: C
     info = info if isinstance(info, dict) else {}
     rules = CallRules(calls.allow, calls.never)
     called = sum(rules.decide(item).may for item in operations)
-    path.write_text(
+    write_atomically(
+        path,
         _TEMPLATE.format(
             file=path.name,
             name=basic_string(str(info.get("title", ""))[:200]),
@@ -83,7 +85,6 @@ def write_described_statement(path: Path, found: Description, api: Api, calls: C
             motion="".join(f"# {line}".rstrip() + "\n" for line in _motion(operations)),
             values="".join(f"{line}\n" for line in _values(operations)) or "# id = [1, 2]\n",
         ),
-        encoding="utf-8",
     )
 
 

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from conformance.commandline.atomic_write import write_atomically
 from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import basic_string
@@ -55,7 +56,8 @@ def write_first_statement(path: Path, known: Statement, contract: Contract) -> s
     info = info if isinstance(info, dict) else {}
     doubts = _doubts(robot)
     lines = [f'  "{name}",' if name not in doubts else f'  # "{name}",  # {doubts[name]}' for name in contract.classes]
-    path.write_text(
+    write_atomically(
+        path,
         _TEMPLATE.format(
             file=path.name,
             name=_quoted(info.get("title", "")),
@@ -64,7 +66,6 @@ def write_first_statement(path: Path, known: Statement, contract: Contract) -> s
             claims="".join(f"{line}\n" for line in lines),
         )
         + robot.device.statement_template,
-        encoding="utf-8",
     )
     return ""
 

@@ -13,6 +13,7 @@ from urllib.parse import urlsplit
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.stops import send_stops
+from conformance.commandline.secrecy import SECRETS
 from conformance.documents.readable import unreadable
 from conformance.engine.by_description import fails_by_description
 from conformance.transport import raw
@@ -77,15 +78,19 @@ def written(sequence: Sequence[Sent]) -> list[dict[str, Any]]:
 
 
 def mask(findings: Iterable[Finding], credentials: Credentials) -> None:
-    """Put variables in place of secrets in the requests of findings, before anything encodes them."""
-    if not credentials:
+    """Put variables in place of secrets in the exchanges of findings, before anything encodes or cuts them."""
+    if not SECRETS:
         return
 
     def masked(request: Request) -> Request:
-        body = credentials.hidden_bytes(request.body)
-        return request if body == request.body else replace(request, body=body)
+        body = SECRETS.masked_bytes(credentials.hidden_bytes(request.body))
+        octets = None if request.raw is None else SECRETS.masked_bytes(request.raw)
+        return request if (body, octets) == (request.body, request.raw) else replace(request, body=body, raw=octets)
 
     for finding in findings:
+        if isinstance(finding.exchange, Exchange):
+            response = replace(finding.exchange.response, body=SECRETS.masked_bytes(finding.exchange.response.body))
+            finding.exchange = replace(finding.exchange, response=response)
         if finding.exchange is not None:
             finding.exchange = replace(finding.exchange, request=masked(finding.exchange.request))
         finding.sequence = tuple(one._replace(request=masked(one.request)) for one in finding.sequence)

@@ -1,7 +1,6 @@
 """The content of result.json (format roaas-result/1)."""
 
 import datetime as dt
-import json
 import platform
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Any
 
 from msgspec import to_builtins
 
-from conformance.commandline.atomic_write import write_atomically
+from conformance.commandline.atomic_write import write_json
 from conformance.commandline.without_folders import without_folders
 from conformance.contract.interfaces import Interface
 from conformance.documents.openapi import operations_of
@@ -287,5 +286,4 @@ def write_result(document: dict[str, Any], directory: Path) -> Path:
         OSError: the file cannot be written.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(document, indent=1, ensure_ascii=False)
-    return write_atomically(directory / RESULT_NAME, text + "\n")
+    return write_json(directory / RESULT_NAME, document, indent=1, ensure_ascii=False)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import asdict
 
+from conformance.commandline.atomic_write import write_atomically
 from conformance.commandline.endings import as_parent
 from conformance.commandline.exit_codes import ExitCode
 from conformance.contract.toml_file import basic_string
@@ -166,7 +167,7 @@ class MemberRun:
             for path in self._folder.glob(pattern):
                 path.unlink()
         if self.member.statement is None:
-            (self._folder / "statement.toml").write_text(_statement(self.member), encoding="utf-8")
+            write_atomically(self._folder / "statement.toml", _statement(self.member))
 
     def _command(self) -> list[str]:
         statement = self.member.statement or self._folder / "statement.toml"

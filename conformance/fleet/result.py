@@ -1,13 +1,12 @@
 """The content of fleet.json (format roaas-fleet/1), and the fleet's exit code."""
 
 import datetime as dt
-import json
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from conformance.commandline.atomic_write import write_atomically
+from conformance.commandline.atomic_write import write_json
 from conformance.commandline.exit_codes import ExitCode
 from conformance.engine.result import rfc3339
 from conformance.engine.suite import suite_version
@@ -62,7 +61,7 @@ def write_fleet(document: dict[str, Any], directory: Path) -> Path:
         OSError: the file cannot be written.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    return write_atomically(directory / FLEET_NAME, json.dumps(document, indent=1, ensure_ascii=False) + "\n")
+    return write_json(directory / FLEET_NAME, document, indent=1, ensure_ascii=False)
 
 
 def _robot(result: MemberResult) -> dict[str, Any]:

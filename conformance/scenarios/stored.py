@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from conformance.commandline.secrecy import SECRETS
 from conformance.scenarios.scenario import Recording, Recordings, Scenario
 
 TRACES_NAME = "traces.json.gz"
@@ -25,6 +26,8 @@ class TracesError(ValueError):
 def write_traces(recordings: Recordings, folder: Path) -> Path | None:
     """Write the traces to ``folder/traces.json.gz``; return its path, or None if there is no trace.
 
+    Variables are in place of secrets, in bytes before they are encoded as well.
+
     Raises:
         OSError: the file cannot be written.
     """
@@ -32,6 +35,9 @@ def write_traces(recordings: Recordings, folder: Path) -> Path | None:
     if not traces:
         return None
     path = folder / TRACES_NAME
+    if SECRETS:
+        plain = msgspec.to_builtins(traces, builtin_types=(bytes,), str_keys=True, enc_hook=_plain)
+        traces = SECRETS.masked_json(plain)
     path.write_bytes(gzip.compress(msgspec.json.encode(traces, enc_hook=_plain), _FAST, mtime=0))
     return path
 

@@ -1,10 +1,10 @@
 """Write the results of a self-test: selftest.json, selftest.md and a summary for the terminal."""
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from conformance.commandline.atomic_write import write_atomically, write_json
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.selftest.comparison import Comparison
 from conformance.selftest.controls import ControlResult
@@ -132,8 +132,8 @@ class Report:
         """
         out.mkdir(parents=True, exist_ok=True)
         path = out / "selftest.json"
-        path.write_text(json.dumps(self.document(), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-        (out / "selftest.md").write_text(self.matrix(), encoding="utf-8")
+        write_json(path, self.document(), indent=2, ensure_ascii=False)
+        write_atomically(out / "selftest.md", self.matrix())
         return path
 
     def matrix(self) -> str:

@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 
 import h11
 
+from conformance.commandline.secrecy import SECRETS
 from conformance.transport.connections import ClosedError, Connections, NoConnectionError, tls_context
 from conformance.transport.credentials import Credentials, bearer
 from conformance.transport.deadline import Deadline
@@ -137,6 +138,7 @@ class HttpClient:
     """
 
     def __init__(self, base_url: str, connection: Connection) -> None:
+        SECRETS.keep_userinfo(base_url)
         self.base_url = base_url.rstrip("/")
         self.connection = connection
         parts = urlsplit(self.base_url)

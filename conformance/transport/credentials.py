@@ -5,6 +5,7 @@ the name of a shell variable (``$ROAAS_TOKEN``) where the secret was.
 """
 
 import base64
+import contextlib
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -12,6 +13,8 @@ from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import quote
+
+from conformance.commandline.secrecy import SECRETS
 
 if TYPE_CHECKING:
     from conformance.transport.digest import DigestUser
@@ -55,6 +58,11 @@ class Credential:
     kind: Kind
     secret: str = field(repr=False)
     name: str = ""
+
+    def __post_init__(self) -> None:
+        if _WRONG not in self.secret:
+            for secret in self.secrets:
+                SECRETS.keep(secret, self.variable)
 
     @property
     def variable(self) -> str:
@@ -104,7 +112,12 @@ class Credential:
     @property
     def secrets(self) -> tuple[str, ...]:
         """The texts that must not be shown, the longest first."""
-        parts = [*self.secret.split(":", 1)[1:], self.secret.removeprefix(self.scheme).lstrip()]
+        parts = [self.secret.removeprefix(self.scheme).lstrip()]
+        if self.kind in {Kind.BASIC, Kind.DIGEST}:
+            parts += self.secret.split(":", 1)[1:]
+        if self.scheme.lower() == "basic":
+            with contextlib.suppress(ValueError):
+                parts += base64.b64decode(parts[0]).decode("utf-8", "replace").split(":", 1)[1:]
         if self.kind is Kind.HEADER and self.header.lower() == "cookie":
             values = (pair.partition("=")[2] for pair in self.secret.split("; "))
             parts += [value for value in values if len(value) >= _SHORTEST_IN_COOKIE]

@@ -1,5 +1,6 @@
 """HTTP's digest authentication (RFC 7616): a device sends a challenge with a 401, and each request after it answers."""
 
+import hashlib
 import threading
 from collections.abc import Iterable
 from types import SimpleNamespace
@@ -7,6 +8,8 @@ from typing import Any
 
 from requests.auth import HTTPDigestAuth
 from requests.utils import parse_dict_header
+
+from conformance.commandline.secrecy import SECRETS
 
 _SCHEME = "digest "
 
@@ -19,6 +22,7 @@ class DigestUser(HTTPDigestAuth):
     """
 
     def __init__(self, pair: str) -> None:
+        self._pair = pair
         user, _, password = pair.partition(":")
         super().__init__(user, password)
         # requests keeps a challenge for each thread; a device that counts the uses of one wants one count for all.
@@ -36,6 +40,11 @@ class DigestUser(HTTPDigestAuth):
             with self._lock:
                 before = self._thread_local.chal
                 self._thread_local.chal = parse_dict_header(offer[at + len(_SCHEME) :])
+                # By this hash one is the user as well, in this realm (RFC 7616 3.4.2).
+                user, _, password = self._pair.partition(":")
+                whole = f"{user}:{self._thread_local.chal.get('realm', '')}:{password}".encode()
+                for algorithm in ("md5", "sha256"):
+                    SECRETS.keep(hashlib.new(algorithm, whole, usedforsecurity=False).hexdigest(), "$ROAAS_DIGEST")
                 try:
                     if self.build_digest_header("GET", "http://device/"):
                         return True

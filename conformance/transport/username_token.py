@@ -12,6 +12,8 @@ from email.utils import parsedate_to_datetime
 from pathlib import Path
 from typing import Final
 
+from conformance.commandline.secrecy import SECRETS
+
 # What stands in a request for the texts that each message has of its own, and where they are.
 _VARIABLES: Final = (b"$WSSE_DIGEST", b"$WSSE_NONCE", b"$WSSE_CREATED")
 _TOKEN: Final = re.compile(rb"(:Password [^>]*>)[^<]*(<.*?:Nonce [^>]*>)[^<]*(<.*?:Created>)[^<]*", re.DOTALL)
@@ -30,6 +32,9 @@ class UsernameToken:
     user: str
     password: str = field(repr=False)
     ahead: dt.timedelta = dt.timedelta()
+
+    def __post_init__(self) -> None:
+        SECRETS.keep(self.password, "$ROAAS_USERNAME_TOKEN")
 
     @classmethod
     def of(cls, path: str | None) -> UsernameToken | None:

@@ -5,6 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
+from conformance.commandline.secrecy import SECRETS
 from conformance.packs.table1.statement import Ros
 from conformance.transport.credentials import Credential, Credentials, Kind
 from conformance.transport.username_token import UsernameToken
@@ -59,6 +60,9 @@ class Robot:
     credentials: tuple[Credential, ...] = ()
     certificate: tuple[str, str | None] | None = None
     username_token: UsernameToken | None = None
+
+    def __post_init__(self) -> None:
+        SECRETS.keep(self.token or "", "$ROAAS_TOKEN")
 
     @property
     def soap(self) -> str | None:

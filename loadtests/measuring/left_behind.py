@@ -4,7 +4,6 @@ Nothing reads the file, and it contains no verdict, because the other workers' s
 long run are not lost.
 """
 
-import json
 import os
 import platform
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from conformance.commandline.atomic_write import write_atomically
+from conformance.commandline.atomic_write import write_json
 from loadtests.schedule.plan import Plan
 from loadtests.statistics.recorder import Recorder
 
@@ -70,4 +69,4 @@ class LeftBehind:
         }
         self.folder.mkdir(parents=True, exist_ok=True)
         path = self.folder / f"worker-{platform.node()}-{os.getpid()}.json"
-        return write_atomically(path, json.dumps(document, indent=1, allow_nan=False) + "\n")
+        return write_json(path, document, indent=1, allow_nan=False)

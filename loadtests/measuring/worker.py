@@ -21,6 +21,7 @@ import msgspec
 from gevent.event import Event
 
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.guard import make_streams_lenient
 from loadtests.clients.robot import Robot, Secrets, with_secrets
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import answer_clock, clock_id
@@ -225,6 +226,7 @@ def serve(
 
 def main() -> None:
     """Run a worker of a master on this machine."""
+    make_streams_lenient()
     parent = os.getppid()
     told = msgspec.json.decode(sys.stdin.readline() or "{}", type=_Told)
     gevent.signal_handler(signal.SIGINT, lambda: None)  # the master says when to stop

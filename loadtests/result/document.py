@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.secrecy import SECRETS
 from loadtests.measuring.end_to_end import LOST_S
 from loadtests.measuring.environment import describe
 from loadtests.measuring.machine import Moment, conditions
@@ -94,7 +95,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "valid": not reasons and not undecided,
         "trustworthy": not reasons,
         "invalid_because": reasons + undecided,
-        "notes": [*settings.notes, *outcome.notes, *notes, *spoilt, *losses],
+        "notes": [*settings.notes, *outcome.notes, *notes, *spoilt, *losses, *SECRETS.notes],
         "interrupted": outcome.interrupted or outcome.dead_at is not None,
         "exit_code": code,
         "started": _stamp(outcome.started),

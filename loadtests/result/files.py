@@ -1,7 +1,6 @@
 """The files of a result: latency.json and one .hgrm file for each series, each written completely or not at all."""
 
 import io
-import json
 import re
 from collections import Counter
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Any
 
 from hdrh.histogram import HdrHistogram
 
-from conformance.commandline.atomic_write import write_atomically
+from conformance.commandline.atomic_write import write_atomically, write_json
 
 FORMAT = "roaas-latency/1"
 _NO_NAME = re.compile(r"[^A-Za-z0-9.-]+")
@@ -28,7 +27,7 @@ def write(folder: Path, result: dict[str, Any]) -> Path:
         stem += f"-{taken[stem]}" if taken[stem] > 1 else ""
         for time, key in (("service", "histogram"), ("response", "response_histogram")):
             write_atomically(folder / f"{stem}-{time}.hgrm", percentile_distribution(series[key]))
-    return write_atomically(folder / "latency.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
+    return write_json(folder / "latency.json", result, indent=1, allow_nan=False)
 
 
 def percentile_distribution(encoded: str) -> str:

@@ -1,0 +1,269 @@
+r"""Mask the secrets of this process in everything that it writes.
+
+``SECRETS`` knows each credential as soon as it is read, and what writes asks it: result files, traces, stdout and
+stderr, logs and tracebacks. A secret is recognized in these forms, and in each of them inside another one:
+
+- as it is, in any case, and as UTF-16;
+- percent-encoded, as JSON (``\u0073``), as entities (``&#115;``), with backslashes, quoted-printable, in whole or part;
+- in base64 (both alphabets, at each of the three alignments) and in hexadecimal digits;
+- broken over several lines, or cut short before an ellipsis or a quotation mark.
+
+Not recognized are a reversed or encrypted secret, and base64 of an escaped one.
+"""
+
+import gzip
+import re
+import zlib
+from base64 import b64encode
+from collections.abc import Iterator
+from itertools import takewhile
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+from urllib.parse import unquote
+
+# A secret of fewer characters, or a word or number of fewer than the second, would be masked where it is none.
+_SHORTEST: Final = 5
+_SHORTEST_WORD: Final = 8
+# The beginning of a secret that is recognized where the text is cut after it, and how long such a secret is at least.
+_BEGINNING: Final = 8
+_LONG: Final = 12
+_CUT: Final = re.compile(r"\Z|\.\.\.|[\s…\"'`<\\]")
+# An escape may itself be escaped; hostile text is not searched deeper than this.
+_DEPTH: Final = 4
+_ESCAPE: Final = re.compile(
+    r"%(?:25){0,8}(?:(?P<wide>(?:[C-Dc-d][0-9A-Fa-f]|[Ee][0-9A-Fa-f]%(?:25){0,8}[89ABab][0-9A-Fa-f])"
+    r"%(?:25){0,8}[89ABab][0-9A-Fa-f])|(?P<percent>[0-9A-Fa-f]{2}))"
+    r"|\\\\{0,15}(?:u(?P<u>[0-9A-Fa-f]{4})|x(?P<x>[0-9A-Fa-f]{2})|(?P<octal>[01][0-7]{2})|(?P<itself>[\"'/<>&]))"
+    r"|\\\\{1,15}(?P<backslash>)"
+    r"|&(?:amp;){0,8}(?:#[xX]0{0,6}(?P<hex>[0-9A-Fa-f]{1,4})|#0{0,6}(?P<decimal>[0-9]{1,5})"
+    r"|(?P<name>amp|lt|gt|quot|apos));?"
+)
+_NAMED: Final = {"amp": "&", "lt": "<", "gt": ">", "quot": '"', "apos": "'"}
+_LINE_END: Final = r"(?:\\{1,16}[rn]|[\r\n])"
+_QUOTED_PRINTABLE: Final = re.compile(rf"=(?:(?P<hex>[0-9A-F]{{2}})|{_LINE_END}{{1,4}})")
+_FOLDED: Final = re.compile(rf"{_LINE_END}[ \t]*")
+_UNITS: Final = (_ESCAPE, _QUOTED_PRINTABLE, _FOLDED)
+_URLSAFE: Final = str.maketrans("+/", "-_")
+# What a device gives to who has a credential: the value of a cookie. And a password in a URL (RFC 3986 3.2.1).
+_SET_COOKIE: Final = re.compile(r"([Ss][Ee][Tt]-[Cc][Oo][Oo][Kk][Ii][Ee]2?: ?[^=;,\s\"]{1,99}=)[^;,\s\"]+")
+_COOKIE: Final = re.compile(r"^([^=;]{1,99}=)[^;]+")
+_USERINFO: Final = re.compile(r"://[^/?#\s:@\"']{0,99}:([^/?#\s@\"']{1,999})@")
+# A compressed body hides what it says from every reader but the curious one.
+_GZIP: Final = b"\x1f\x8b"
+_MOST: Final = 1 << 24
+# The formats of results and the requirements: a word of theirs is not masked, as no program could read the rest.
+_ROOMS: Final = Path(__file__).parents[2]
+_OUR_WORDS: Final = ("reports/schemas/*.json", "conformance/rules/requirements.toml", "conformance/packs/*/*.toml")
+
+
+class _Form(NamedTuple):
+    """One form of a secret: what is searched for first, the whole, and what is written in its place."""
+
+    beginning: str
+    whole: str
+    variable: str
+
+
+class Secrets:
+    """The secrets of a process, each with the variable that stands for it in what is written."""
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget all secrets, as the tests of one process do between two runs."""
+        self._known: set[str] = set()
+        self._weak: dict[str, str] = {}
+        # Those in which the case does not matter, and the others.
+        self._folded: tuple[_Form, ...] = ()
+        self._exact: tuple[_Form, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self._known)
+
+    def keep(self, secret: str, variable: str) -> None:
+        """Mask a secret from now on.
+
+        Args:
+            secret: the text.
+            variable: what stands in its place, such as ``$ROAAS_TOKEN``.
+        """
+        if not secret or secret in self._known:
+            return
+        self._known.add(secret)
+        if why := _weakness(secret):
+            self._weak[variable] = why
+            return
+        folded, exact = _forms(secret)
+        self._folded = _with(self._folded, folded, variable)
+        self._exact = _with(self._exact, exact, variable)
+
+    def keep_userinfo(self, text: str) -> None:
+        """Mask the passwords of all URLs in a text that have one (``http://user:password@robot``)."""
+        for found in _USERINFO.finditer(text):
+            self.keep(found[1], "$ROAAS_URL_PASSWORD")
+            self.keep(unquote(found[1]), "$ROAAS_URL_PASSWORD")
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A sentence on each secret that is not masked."""
+        return tuple(
+            f"The secret behind {variable} {why}: it is not masked, and may appear in the results."
+            for variable, why in self._weak.items()
+        )
+
+    def masked(self, text: str) -> str:
+        """Return a text with variables in place of all secrets."""
+        if not self._known:
+            return text
+        if "ookie" in text or "OOKIE" in text:
+            text = _SET_COOKIE.sub(r"\1$ROAAS_SET_COOKIE", text)
+        parts, end = list[str](), 0
+        for begin, until, variable in sorted(self._spans(text), key=lambda span: (span[0], -span[1])):
+            if begin >= end:
+                parts += (text[end:begin], variable)
+            end = max(end, until)
+        return "".join((*parts, text[end:])) if parts else text
+
+    def masked_bytes(self, octets: bytes) -> bytes:
+        """Return bytes with variables in place of all secrets; gzipped ones stay gzipped."""
+        if not self._known or not octets:
+            return octets
+        if octets.startswith(_GZIP):
+            try:
+                plain = zlib.decompressobj(31).decompress(octets, _MOST)
+            except zlib.error:
+                plain = b""
+            shown = self.masked_bytes(plain)
+            return octets if shown == plain else gzip.compress(shown, mtime=0)
+        text = octets.decode("latin-1")
+        shown_text = self.masked(text)
+        return octets if shown_text is text else shown_text.encode("latin-1", "replace")
+
+    def masked_json(self, value: Any) -> Any:
+        """Return JSON, which may have bytes in it, with variables in place of the secrets in texts, names and bytes."""
+        if not self._known:
+            return value
+        seen = dict[str, str]()
+        return self._walked(value, seen)
+
+    def shown_in(self, text: str) -> bool:
+        """Return whether a text shows a secret."""
+        return bool(self._known) and self.masked(text) != text
+
+    def _walked(self, value: Any, seen: dict[str, str]) -> Any:
+        if isinstance(value, str):
+            if value not in seen:
+                seen[value] = self.masked(value)
+            return seen[value]
+        if isinstance(value, bytes):
+            return self.masked_bytes(value)
+        if isinstance(value, dict):
+            return {
+                self._walked(key, seen): _without_cookie(key, self._walked(item, seen)) for key, item in value.items()
+            }
+        if isinstance(value, list | tuple):
+            items = [self._walked(item, seen) for item in value]
+            return [items[0], _without_cookie(*items)] if len(items) == 2 else items  # noqa: PLR2004 - name and value
+        return value
+
+    def _spans(self, text: str, depth: int = 0) -> Iterator[tuple[int, int, str]]:
+        """Yield where a text shows a secret: begin, end, variable."""
+        lowered = text.lower()
+        if len(lowered) != len(text):
+            lowered = "".join(small if len(small := char.lower()) == 1 else char for char in text)
+        for forms, where in ((self._folded, lowered), (self._exact, text)):
+            for form in forms:
+                yield from _found(form, where)
+        for unit in (_UNITS if depth == 0 else _UNITS[:1]) if depth < _DEPTH else ():
+            plain = unit.sub(_decoded, text)
+            if len(plain) != len(text) and (inner := [*self._spans(plain, depth + 1)]):
+                yield from _outer(inner, unit, text)
+
+
+def _weakness(secret: str) -> str:
+    """Return why a secret cannot be masked without masking what is none, or an empty text."""
+    if len(secret) < _SHORTEST:
+        return f"has {len(secret)} character{'' if len(secret) == 1 else 's'}, too few to be recognized"
+    if len(secret) < _SHORTEST_WORD and (secret.isalpha() or secret.isdigit()):
+        return "is a short word or number, as other texts have it"
+    ours = (path for pattern in _OUR_WORDS for path in _ROOMS.glob(pattern))
+    if any(secret.lower() in path.read_text(encoding="utf-8").lower() for path in ours):
+        return "is a word that the results use themselves"
+    return ""
+
+
+def _forms(secret: str) -> tuple[set[str], set[str]]:
+    """Return the forms of a secret in which the case of letters does not matter, in lower case, and the others."""
+    octets, wide = secret.encode("utf-8", "surrogateescape"), secret.encode("utf-16-le", "surrogatepass")
+    small = {secret, secret.replace(" ", "+"), re.sub(r"\\+", r"\\", secret)}
+    small |= {form.encode("utf-8", "surrogateescape").decode("latin-1") for form in small}
+    small |= {"\0".join(secret), octets.hex(), wide.hex()}
+    exact = {_base64(form, shift) for form in (octets, wide) for shift in range(3)}
+    exact |= {form.translate(_URLSAFE) for form in exact}
+    return {form.lower() for form in small}, {form for form in exact if len(form) >= _SHORTEST}
+
+
+def _base64(octets: bytes, shift: int) -> str:
+    """Return the characters of base64 that bytes alone decide where ``shift`` others are before them."""
+    encoded = b64encode(bytes(shift) + octets).decode()
+    return encoded[(0, 2, 3)[shift] : (shift + len(octets)) * 8 // 6]
+
+
+def _with(before: tuple[_Form, ...], forms: set[str], variable: str) -> tuple[_Form, ...]:
+    made = (_Form(form[:_BEGINNING] if len(form) >= _LONG else form, form, variable) for form in forms)
+    return tuple(sorted({*before, *made}, key=lambda form: -len(form.whole)))
+
+
+def _found(form: _Form, text: str) -> Iterator[tuple[int, int, str]]:
+    """Yield where a text has a form of a secret, or its beginning before a cut."""
+    begin = text.find(form.beginning)
+    while begin >= 0:
+        end = begin + len(form.beginning)
+        if len(form.beginning) < len(form.whole):
+            alike = zip(form.whole, text[begin : begin + len(form.whole)], strict=False)
+            end = begin + len([*takewhile(lambda pair: pair[0] == pair[1], alike)])
+        if end - begin == len(form.whole) or _CUT.match(text, end):
+            yield begin, end, form.variable
+        begin = text.find(form.beginning, end)
+
+
+def _decoded(unit: re.Match[str]) -> str:
+    """Return what an escape stands for."""
+    kind, digits = unit.lastgroup, unit[unit.lastgroup] if unit.lastgroup else ""
+    if kind is None:
+        return ""
+    if kind == "name":
+        return _NAMED[digits]
+    if kind == "wide":
+        return bytes.fromhex(re.sub("%(?:25)*", "", digits)).decode("utf-8", "replace")
+    if kind in {"itself", "backslash"}:
+        return digits or "\\"
+    return chr(int(digits, {"decimal": 10, "octal": 8}.get(kind, 16)))
+
+
+def _outer(inner: list[tuple[int, int, str]], unit: re.Pattern[str], text: str) -> Iterator[tuple[int, int, str]]:
+    """Yield where in the escaped text the spans of the plain one are."""
+    # For each character of the plain text, where its escape begins and ends.
+    begins, ends, last = list[int](), list[int](), 0
+    for found in unit.finditer(text):
+        begins += (*range(last, found.start()), *([found.start()] * len(_decoded(found))))
+        ends += (*range(last + 1, found.start() + 1), *([found.end()] * len(_decoded(found))))
+        last = found.end()
+    begins += range(last, len(text))
+    ends += range(last + 1, len(text) + 1)
+    for begin, end, variable in inner:
+        yield begins[begin], ends[end - 1], variable
+
+
+def _without_cookie(name: Any, value: Any) -> Any:
+    """Return the value of a header, or values, without what a Set-Cookie gives."""
+    if not (isinstance(name, str) and name.lower() == "set-cookie"):
+        return value
+    if isinstance(value, list):
+        return [_without_cookie(name, one) for one in value]
+    return _COOKIE.sub(r"\1$ROAAS_SET_COOKIE", value) if isinstance(value, str) else value
+
+
+#: Those of this process.
+SECRETS: Final = Secrets()
