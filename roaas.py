@@ -160,7 +160,7 @@ class FrontDoor:
         """Return what changed: whether it breaks clients (None if that is not known), the operation, and what it is."""
         comparing = import_module("conformance.engine.comparing")
         refused = import_module("conformance.documents.description").DescriptionError
-        unreachable = import_module("conformance.engine.describing").UnreachableError
+        unreachable = import_module("conformance.transport.reach").UnreachableError
         try:
             return [(one.breaking, one.operation, one.text) for one in comparing.compared(old, new)]
         except (refused, unreachable) as error:

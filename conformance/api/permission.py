@@ -14,6 +14,7 @@ from conformance.documents.resources import is_normal, matching
 from conformance.statement.motion_map import shape_of
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import SAFE_METHODS
+from conformance.transport.reach import moved
 from conformance.verdict.run import Run
 
 _SLASHES = re.compile("/{2,}")
@@ -42,7 +43,7 @@ class Permission:
             base_url: scheme and host of the device, whatever the WSDL says.
         """
         # xmlschema and lxml take a third of a second, which other devices need not pay.
-        from conformance.documents.soap_services import base_of, moved  # noqa: PLC0415
+        from conformance.documents.soap_services import base_of  # noqa: PLC0415
         from conformance.documents.wsdl_pack import services_of  # noqa: PLC0415
 
         found = services_of(self._run.contract)

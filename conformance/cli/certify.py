@@ -26,8 +26,8 @@ from conformance.contract.places import places
 from conformance.contract.requirement_sets import RequirementSetError, judged_by
 from conformance.documents.description import DescriptionError
 from conformance.documents.openapi import operations_of
-from conformance.engine.describing import UnreachableError
 from conformance.statement.statement import Statement, StatementError
+from conformance.transport.reach import UnreachableError
 from conformance.verdict.effort import DEEP_MINUTES, EFFORTS, Effort
 
 if TYPE_CHECKING:

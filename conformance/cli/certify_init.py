@@ -59,10 +59,12 @@ def init_described(path: Path | None, source: str, options: dict[str, Any]) -> C
     if is_wsdl(source) or source == options["wsdl"]:
         raise click.UsageError(f'--init reads OpenAPI descriptions: for {source}, write [api] and wsdl = "{source}"')
     path = _new_file(path, force=options["force"])
-    given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) is not None}
+    given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) not in {None, ()}}
     api = Api(overlays=tuple(options["overlays"]), base_url=options["base_url"] or options["rest"])
     try:
-        found = fetch_description(source, api.overlays, connection_of(Endpoints(**given)))
+        found = fetch_description(
+            source, api.overlays, connection_of(Endpoints(**given)), allow_files=options["allow_files"]
+        )
         write_described_statement(path, found, api, Calls(tuple(options["allow"]), tuple(options["never"])))
     except OSError as error:
         raise StatementError(str(error)) from error

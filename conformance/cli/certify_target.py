@@ -72,7 +72,7 @@ def _described(
         DescriptionError, StatementError, ContractError: one of them cannot be used.
         UnreachableError: the server of the description does not respond.
     """
-    given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) is not None}
+    given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) not in {None, ()}}
     where = msgspec.structs.replace(endpoints_of(statement) if statement else Endpoints(), **given)
     overlays = tuple(options["overlays"]) or (api.overlays if api else ())
     base_url = options["base_url"] or (api.base_url if api else None)
@@ -81,15 +81,18 @@ def _described(
     try:
         # Where an API key goes, the description may say, so that it is read without one.
         connection = connection_of(where if where.api_key else msgspec.structs.replace(where, api_key_file=None))
-        moves = statement is not None and has_motion_map(statement)
+        more = {
+            "moves": statement is not None and has_motion_map(statement),
+            "allow_files": bool(options.get("allow_files") or (api and api.allow_files)),
+        }
         if soap:
             schemas = options.get("schemas") or (Path(api.schemas) if api and api.schemas else None)
             contract, where, remarks = soap_contract(
-                source, base_url, where, connection, options["out"], schemas=schemas, moves=moves
+                source, base_url, where, connection, options["out"], schemas=schemas, **more
             )
         else:
             contract, where, remarks = described_contract(
-                source, overlays, base_url, where, connection, options["out"], moves=moves
+                source, overlays, base_url, where, connection, options["out"], **more
             )
     except OSError as error:
         raise StatementError(str(error)) from error
@@ -143,7 +146,7 @@ def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> 
     Raises:
         StatementError: an option has an invalid value.
     """
-    given = {key: options[key] for key in declared.endpoints.__struct_fields__ if options.get(key) is not None}
+    given = {key: options[key] for key in declared.endpoints.__struct_fields__ if options.get(key) not in {None, ()}}
     where = msgspec.structs.replace(declared.endpoints, **given)
     for key in ("rest", "publishers_endpoint", "subscribers_endpoint"):
         url = getattr(where, key)

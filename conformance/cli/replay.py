@@ -145,9 +145,9 @@ def _judge_again(
     import msgspec  # noqa: PLC0415 - as above
 
     from conformance.documents.description import DescriptionError  # noqa: PLC0415
-    from conformance.engine.describing import UnreachableError  # noqa: PLC0415
     from conformance.engine.replay import judged_by_checks  # noqa: PLC0415
     from conformance.statement.statement import StatementError, load_statement  # noqa: PLC0415
+    from conformance.transport.reach import UnreachableError  # noqa: PLC0415
 
     try:
         if contract is None and _names_description(statement_file):

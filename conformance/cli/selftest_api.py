@@ -17,8 +17,9 @@ from conformance.cli.selftest_progress import Progress, compare
 from conformance.contract.toml_file import basic_string
 from conformance.documents.description import DescriptionError
 from conformance.documents.openapi import operations_of
-from conformance.engine.describing import UnreachableError, described_contract
+from conformance.engine.describing import described_contract
 from conformance.statement.endpoints import Endpoints
+from conformance.transport.reach import UnreachableError
 
 if TYPE_CHECKING:
     from conformance.contract.pack import Contract

@@ -20,6 +20,7 @@ _DESCRIPTION = (
     ),
     click.option("--overlay", "overlays", multiple=True, metavar="FILE", help="OpenAPI Overlay to apply; repeatable."),
     click.option("--base-url", metavar="URL", help="Where the operations of the description are."),
+    click.option("--allow-files", is_flag=True, help="A description in a file may refer to files outside its folder."),
     click.option(
         "--call",
         "allow",
@@ -30,6 +31,13 @@ _DESCRIPTION = (
     click.option("--never", multiple=True, metavar="PATTERN", help="Never call these operations; repeatable."),
 )
 _CREDENTIALS = (
+    click.option(
+        "--trust-host",
+        "trust_hosts",
+        multiple=True,
+        metavar="HOST[:PORT]",
+        help="A description may lead to this server too, with the credentials; repeatable.",
+    ),
     click.option("--basic-file", type=_FILE, help="File with user:password for basic authentication."),
     click.option("--digest-file", type=_FILE, help="File with user:password for digest authentication (RFC 7616)."),
     click.option(

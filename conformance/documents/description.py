@@ -20,9 +20,14 @@ from conformance.documents.schema_words import in_one_version
 from conformance.documents.sent_parameters import not_called, with_sent
 from conformance.documents.swagger import as_openapi_3
 from conformance.documents.unreadable_parts import without_unreadable
+from conformance.transport.reach import ElsewhereError, Trust, is_same
 
 _MOST_FILES: Final = 5_000
+# Objects whose members have names that an author chose.
+_BY_NAME: Final = frozenset({"properties", "patternProperties", "dependentSchemas", "$defs", "definitions", "schemas"})
 _VARIABLE: Final = re.compile(r"\{([^{}]+)\}")
+_BLANK: Final = b"\xef\xbb\xbf \t\r\n"
+_SCHEME: Final = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")
 # Returns the content of a URL or file.
 Load = Callable[[str], bytes]
 
@@ -43,7 +48,8 @@ class Description:
         unresolved: each reference to another file that leads nowhere, with the reason.
         remarks: what a reader of the result should know about its server.
         not_called: what the suite cannot call, with the reason.
-        unread: operations and schemas that cannot be read and are left out of the document, with the reason.
+        unread: operations and schemas that cannot be read and are left out of the document, and references that are not
+            followed, because they lead to another server or out of the folder; each with the reason.
     """
 
     source: str
@@ -56,24 +62,25 @@ class Description:
     unread: tuple[str, ...] = ()
 
 
-def read_description(source: str, load: Load, overlays: Iterable[str] = ()) -> Description:
+def read_description(source: str, load: Load, overlays: Iterable[str] = (), trust: Trust | None = None) -> Description:
     """Return the description at a URL or in a file.
 
     Args:
         source: URL or path.
         load: returns the content of a URL or file; its errors are OSError or ValueError.
         overlays: URLs or paths of OpenAPI Overlay documents, applied in this order.
+        trust: the servers that the description may name; by default that of a URL.
 
     Raises:
         DescriptionError: it cannot be read, or is neither OpenAPI 3 nor Swagger 2.0.
     """
     try:
-        return _description(source, load, overlays)
+        return _description(source, load, overlays, trust or Trust.of(source))
     except RecursionError as error:
         raise DescriptionError(f"{source} cannot be read: it is nested too deeply") from error
 
 
-def _description(source: str, load: Load, overlays: Iterable[str]) -> Description:
+def _description(source: str, load: Load, overlays: Iterable[str], trust: Trust) -> Description:
     original = _parsed(source, load)
     bundle = _Bundle(source, load)
     document = bundle.with_files(original)
@@ -98,9 +105,10 @@ def _description(source: str, load: Load, overlays: Iterable[str]) -> Descriptio
     if not version.startswith("2."):
         uncalled, document = not_called(document), with_sent(document, document)
     document, unread = without_unreadable(in_one_version(document))
-    base_url, remarks = _base_url(source, document)
+    base_url, remarks = _base_url(source, document, trust)
     references = (*bundle.unresolved, *broken)
-    return Description(source, document, original, base_url, references, remarks, uncalled, tuple(unread))
+    left_out = (*unread, *bundle.refused)
+    return Description(source, document, original, base_url, references, remarks, uncalled, left_out)
 
 
 def _without(value: Any, broken: frozenset[str]) -> Any:
@@ -122,7 +130,7 @@ def _refers(value: Any, broken: frozenset[str]) -> bool:
 
 def is_url(source: str) -> bool:
     """Return whether a source is an HTTP URL rather than a file."""
-    return source.startswith(("http://", "https://"))
+    return source.lower().startswith(("http://", "https://"))
 
 
 def _parsed(source: str, load: Load) -> Schema:
@@ -131,12 +139,18 @@ def _parsed(source: str, load: Load) -> Schema:
     Raises:
         DescriptionError: it cannot be read.
     """
+    octets = b""
     try:
-        document = parsed(load(source), urlsplit(source).path if is_url(source) else source)
+        octets = load(source)
+        document = parsed(octets, urlsplit(source).path if is_url(source) else source)
     except (OSError, ValueError) as error:
-        raise DescriptionError(f"{source} cannot be read: {error}") from error
+        if not octets.lstrip(_BLANK).startswith(b"<"):
+            raise DescriptionError(f"{source} cannot be read: {error}") from error
+        document = None
     if not isinstance(document, dict):
-        raise DescriptionError(f"{source} is no description: it holds no object")
+        markup = octets.lstrip(_BLANK).startswith(b"<")
+        what = ", but HTML or XML, such as a page for people, a login or a WSDL" if markup else ""
+        raise DescriptionError(f"{source} is no description: it holds no object{what}")
     return document
 
 
@@ -150,6 +164,7 @@ class _Bundle:
     anchors: dict[str, dict[str, str]] = field(default_factory=dict)
     files: dict[str, Any] = field(default_factory=dict)
     unresolved: list[str] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
 
     def with_files(self, document: Schema) -> Schema:
         """Return the document with the files that it refers to below FILES, and references to there."""
@@ -159,13 +174,15 @@ class _Bundle:
         whole: Schema = self._walked(plain, self.source, "#")
         return {**whole, FILES: self.files} if self.files else whole
 
-    def _walked(self, value: Any, location: str, root: str) -> Any:
+    def _walked(self, value: Any, location: str, root: str, *, by_name: bool = False) -> Any:
         if isinstance(value, list):
             return [self._walked(item, location, root) for item in value]
         if not isinstance(value, dict):
             return value
         found = {
-            key: item if key in DATA and key != "examples" else self._walked(item, location, root)
+            key: item
+            if key in DATA and key != "examples" and not by_name
+            else self._walked(item, location, root, by_name=key in _BY_NAME and not by_name)
             for key, item in value.items()
         }
         if isinstance(value.get("$ref"), str):
@@ -180,22 +197,23 @@ class _Bundle:
         file, _, pointer = reference.partition("#")
         if not file:
             return f"{root}{self._pointer(location, pointer)}"
-        target = urljoin(location, file) if is_url(location) else normpath(Path(location).parent / file)
-        if is_url(location) and urlsplit(target).netloc != urlsplit(location).netloc:
-            self.unresolved.append(f"{reference}: another server's file is not fetched")
-            return None
+        target = file if is_url(file) else urljoin(location, file)
+        if not is_url(location) and not is_url(file):
+            target = file if _SCHEME.match(file) else normpath(Path(location).parent / file)
         if target == (self.source if is_url(self.source) else normpath(self.source)):
             return f"#{self._pointer(self.source, pointer)}"
         if target not in self.numbers:
-            if len(self.numbers) >= _MOST_FILES or is_url(target) != is_url(location):
-                reason = "a URL in a file" if is_url(target) else f"the limit is {_MOST_FILES:,} files"
-                self.unresolved.append(f"{reference}: it is not read ({reason})")
+            if len(self.numbers) >= _MOST_FILES:
+                self.unresolved.append(f"{reference}: it is not read (the limit is {_MOST_FILES:,} files)")
                 return None
             number = self.numbers[target] = str(len(self.numbers))
             try:
                 other = _parsed(target, self.load)
             except DescriptionError as error:
-                self.unresolved.append(f"{reference}: {error}")
+                if isinstance(error.__cause__, ElsewhereError):
+                    self.refused.append(f"The reference {reference} is not followed: {error.__cause__}.")
+                else:
+                    self.unresolved.append(f"{reference}: {error}")
             else:
                 self.files[number] = {}
                 self.anchors[target] = make_plain(other, target)
@@ -209,7 +227,7 @@ class _Bundle:
         return self.anchors.get(location, {}).get(fragment, fragment)
 
 
-def _base_url(source: str, document: Schema) -> tuple[str, tuple[str, ...]]:
+def _base_url(source: str, document: Schema, trust: Trust) -> tuple[str, tuple[str, ...]]:
     """Return the URL below which the operations are, and a remark where the description names another server."""
     given = document.get("servers")
     servers = [one for one in given if isinstance(one, dict)] if isinstance(given, list) else []
@@ -217,17 +235,24 @@ def _base_url(source: str, document: Schema) -> tuple[str, tuple[str, ...]]:
     if not is_url(source):
         wholes = [f"http:{url}" if url.startswith("//") else url for url in urls]
         return next(filter(is_url, wholes), "").rstrip("/"), ()
-    wholes = [urljoin(source, url) for url in urls]
-    same = [one for one in wholes if urlsplit(one)[:2] == urlsplit(source)[:2]]
-    if same:
-        return same[0].rstrip("/"), ()
-    parts = urlsplit(source)
-    here = f"{parts.scheme}://{parts.netloc}{urlsplit(wholes[0]).path}".rstrip("/")
+    wholes = [_joined(source, url) for url in urls]
+    known = [one for one in wholes if is_same(one, source)] or [one for one in wholes if trust.trusts(one)]
+    if known:
+        return trust.place(known[0]).partition("?")[0].rstrip("/"), ()
+    here = f"{urlsplit(source).scheme}://{urlsplit(source).netloc}{urlsplit(wholes[0]).path}".rstrip("/")
     remark = (
         f"The description names the server {wholes[0]}. Tested was {here}, from where it was read; --base-url changes "
         "that."
     )
     return here, (remark,)
+
+
+def _joined(base: str, reference: str) -> str:
+    """Return a reference as a URL; one that is none, as it is."""
+    try:
+        return urljoin(base, reference)
+    except ValueError:
+        return reference
 
 
 def _with_defaults(server: Schema) -> str:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
-from urllib.parse import urlsplit
 
 from lxml import etree
 
@@ -19,6 +18,7 @@ from conformance.documents.wsdl_imports import Fetch, Locate, collect
 from conformance.documents.xml_names import ENVELOPE, WSDL, WSDL_SOAP, XSD, clark
 from conformance.documents.xsd import SchemaError, Types
 from conformance.documents.xsd_assembly import SchemaDocument, rpc_wrapper
+from conformance.transport.reach import server_of
 
 ENVELOPE_12: Final = "http://www.w3.org/2003/05/soap-envelope"
 _WSDL_SOAP_12: Final = "http://schemas.xmlsoap.org/wsdl/soap12/"
@@ -289,10 +289,4 @@ def _qname(element: etree._Element, text: str) -> str:
 
 def base_of(description: SoapDescription) -> str:
     """Return scheme and host of the first port."""
-    parts = urlsplit(description.ports[0].url)
-    return f"{parts.scheme}://{parts.netloc}"
-
-
-def moved(url: str, old: str, new: str) -> str:
-    """Return a port's URL with another scheme and host: a device behind a front does not know its own."""
-    return new + url[len(old) :] if url.startswith(old) else url
+    return server_of(description.ports[0].url)

@@ -11,6 +11,7 @@ from conformance.statement.statement import StatementError
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.credentials import Credential, Credentials, Kind
 from conformance.transport.exchange import NoAnswerError
+from conformance.transport.reach import Trust
 
 # Places in which a description may want an API key (OpenAPI 3.1, Security Scheme Object).
 _PLACES: Final = frozenset({Kind.HEADER, Kind.QUERY, Kind.COOKIE})
@@ -23,6 +24,14 @@ def connection_of(where: Endpoints) -> Connection:
         OSError: a file with a credential cannot be read.
         StatementError: a credential is malformed, or the login fails; the message shows no secret.
     """
+    try:
+        trust = Trust.of(
+            *(where.rest, where.publishers_wsdl, where.subscribers_wsdl),
+            *(where.publishers_endpoint, where.subscribers_endpoint),
+            hosts=where.trust_hosts,
+        )
+    except ValueError as error:
+        raise StatementError(f"--trust-host: {error}") from error
     found = Connection(
         timeout_s=where.timeout_s,
         ca_file=Path(where.ca_file) if where.ca_file else None,
@@ -30,6 +39,7 @@ def connection_of(where: Endpoints) -> Connection:
         credentials=_credentials(where),
         certificate=_certificate(where),
         request_rate=where.request_rate,
+        trust=trust,
     )
     if where.auth is not None and where.rest:
         found.credentials = Credentials((*found.credentials.items, _logged_in(where.auth, where.rest, found)))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 from urllib.parse import urljoin, urlsplit
 
 from conformance.contract.described import write_described_pack
@@ -11,8 +13,11 @@ from conformance.contract.pack import Contract
 from conformance.documents.description import Description, DescriptionError, is_url, read_description
 from conformance.documents.security import without_credentials
 from conformance.statement.endpoints import Endpoints
-from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import NoAnswer, NoAnswerError
+from conformance.transport.client import Connection
+from conformance.transport.reach import Folder, Trust, UnreachableError, is_same, server_of
+
+if TYPE_CHECKING:
+    from conformance.documents.soap_services import SoapDescription
 
 #: The folder of the pack, in the folder of the results.
 FOLDER: Final = "description"
@@ -21,8 +26,6 @@ _USUAL: Final = (
     "/openapi.json", "/openapi.yaml", "/swagger.json", "/v3/api-docs", "/api/openapi.json", "/api-docs",
     "/swagger/v1/swagger.json", "/api/v1/openapi.json", "/docs/openapi.json",
 )  # fmt: skip
-_REDIRECTS: Final = 4
-_OK, _REDIRECT, _CLIENT_ERROR = 200, 300, 400
 
 
 def is_wsdl(source: str) -> bool:
@@ -30,78 +33,88 @@ def is_wsdl(source: str) -> bool:
     return source.lower().endswith((".wsdl", "?wsdl", "?singlewsdl"))
 
 
-class UnreachableError(Exception):
-    """Raised when the server of a description does not respond; the message says why."""
+class Loader:
+    """Loads the description that the user named, and what it refers to: from the user's servers and its own folder.
 
-
-class _Loader:
-    """Loads the content of URLs, with the deadline of the run, and of files.
-
-    Credentials go to the server of the description alone: its references may lead anywhere.
+    Args:
+        connection: deadline, credentials and TLS.
+        trust: the servers that get the credentials.
+        source: URL or file of the description.
+        named: URLs and files that the user named beside it; their servers get no credentials.
+        anywhere: whether it may refer to any file (--allow-files).
     """
 
-    def __init__(self, connection: Connection, source: str) -> None:
-        self._connection, self._own = connection, urlsplit(source).netloc
-        self._silent: dict[str, str] = {}
+    def __init__(
+        self, connection: Connection, trust: Trust, source: str, named: Iterable[str] = (), *, anywhere: bool = False
+    ) -> None:
+        self._settings = connection, trust, tuple(named)
+        self._folder = Folder(source, tuple(named), anywhere)
+
+    @cached_property
+    def _fetch(self) -> Callable[[str], bytes]:
+        # Imported late: httpx takes a twentieth of a second, which a description in a file need not pay.
+        from conformance.transport.fetching import Fetcher  # noqa: PLC0415
+
+        return Fetcher(*self._settings)
 
     def __call__(self, source: str) -> bytes:
         """Return the content of a URL or file.
 
         Raises:
             UnreachableError: the server does not respond.
-            OSError, ValueError: there is no such content.
+            OSError, ValueError: there is no such content, or the description must not refer to it.
         """
-        if not is_url(source):
-            return Path(source).read_bytes()
-        url = source
-        for _ in range(_REDIRECTS):
-            parts = urlsplit(url)
-            if parts.netloc in self._silent:
-                raise UnreachableError(f"{url}: {self._silent[parts.netloc]}")
-            client = HttpClient(f"{parts.scheme}://{parts.netloc}", self._connection)
-            target = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
-            try:
-                accept = ("Accept", "application/json, application/yaml, */*")
-                own = parts.netloc == self._own
-                response = client.send("GET", target, headers=[accept], authorized=own).response
-            except NoAnswerError as none:
-                if none.kind is NoAnswer.CIRCUIT_OPEN:
-                    raise ValueError(str(none)) from none
-                self._silent[parts.netloc] = str(none)
-                raise UnreachableError(f"{url}: {none}") from none
-            finally:
-                client.close()
-            location = response.header("location")
-            if _REDIRECT <= response.status < _CLIENT_ERROR and location:
-                url = urljoin(url, location)
-                if urlsplit(url).netloc != parts.netloc:
-                    raise ValueError(f"it redirects to another server, {url}")
-                continue
-            if response.status != _OK:
-                raise ValueError(f"the server responded {response.status}")
-            return response.body
-        raise ValueError(f"more than {_REDIRECTS} redirects")
+        return self._fetch(source) if is_url(source) else self._folder.read(source)
 
 
-def fetch_description(source: str, overlays: tuple[str, ...], connection: Connection) -> Description:
+def trusting(connection: Connection, *named: str | None) -> Trust:
+    """Return the trust of a connection, and in the servers of further URLs that the user named."""
+    known = connection.trust or Trust()
+    return Trust.of(*known.named, *named, hosts=known.hosts)
+
+
+def fetch_description(
+    source: str, overlays: tuple[str, ...], connection: Connection, *, allow_files: bool = False
+) -> Description:
     """Return the description at a URL or in a file; at a URL that is none, try the usual places on its server.
+
+    Args:
+        source: URL or file of the description.
+        overlays: URLs or files of overlays.
+        connection: deadline, credentials and TLS.
+        allow_files: whether a description in a file may refer to files outside its folder.
 
     Raises:
         DescriptionError: there is no usable description.
         UnreachableError: the server does not respond.
     """
-    load = _Loader(connection, source)
+    trust = trusting(connection, source)
+    load = Loader(connection, trust, source, overlays, anywhere=allow_files)
     try:
-        return read_description(source, load, overlays)
+        return read_description(source, load, overlays, trust)
     except DescriptionError as error:
         if not is_url(source):
             raise
         for path in _USUAL if len(urlsplit(source).path.strip("/").split("/")) <= 1 else ():
             try:
-                return read_description(urljoin(source, path), load, overlays)
+                return read_description(urljoin(source, path), load, overlays, trust)
             except DescriptionError:
                 continue
         raise DescriptionError(f"{error}; name the URL or file of its OpenAPI description") from error
+
+
+def _check_server(source: str, base: str, endpoints: Endpoints, connection: Connection) -> None:
+    """Check that no description in a file decides where credentials go.
+
+    Raises:
+        DescriptionError: there are credentials, and only the file says where the device is.
+    """
+    secret = connection.credentials or connection.certificate or endpoints.auth or endpoints.username_token_file
+    if not is_url(source) and (secret or endpoints.api_key_file) and not trusting(connection).trusts(base):
+        raise DescriptionError(
+            f"{source} names the server {base}, and no description decides where credentials go: name the server "
+            f"yourself, as by --base-url {base}"
+        )
 
 
 def described_contract(
@@ -113,6 +126,7 @@ def described_contract(
     out: Path,
     *,
     moves: bool = False,
+    allow_files: bool = False,
 ) -> tuple[Contract, Endpoints, tuple[str, ...]]:
     """Return the contract of an API's own description, the endpoints with its base URL, and remarks.
 
@@ -124,6 +138,7 @@ def described_contract(
         connection: deadline, credentials and TLS.
         out: folder of the results, in which the pack is written.
         moves: whether the statement has a motion map.
+        allow_files: whether a description in a file may refer to files outside its folder.
 
     Raises:
         DescriptionError: there is no usable description, or it does not say where the API is.
@@ -132,17 +147,33 @@ def described_contract(
     """
     import msgspec  # noqa: PLC0415 - read already where this is used
 
-    found = fetch_description(source, overlays, connection)
+    found = fetch_description(source, overlays, connection, allow_files=allow_files)
     base = base_url or endpoints.rest or found.base_url
     if not base:
         raise DescriptionError(
             f"{source} names no server: say where the API is with --base-url, as in --base-url http://robot:8000"
         )
+    if not (base_url or endpoints.rest):
+        _check_server(source, base, endpoints, connection)
     document = without_credentials(found.document, connection.credentials.places)
     folder = write_described_pack(out / FOLDER, document, found.original, found.unresolved, moves=moves)
     Contract.load.cache_clear()
     remarks = (*(() if base_url or endpoints.rest else found.remarks), *found.not_called, *found.unread)
     return Contract.load(folder), msgspec.structs.replace(endpoints, rest=base), remarks
+
+
+def _server_of_ports(found: SoapDescription, source: str, trust: Trust) -> tuple[str, str]:
+    """Return the server of a WSDL's ports, and a remark where that is another one than the user named."""
+    from conformance.documents.soap_services import base_of  # noqa: PLC0415 - as below
+
+    if not is_url(source):
+        return base_of(found), ""
+    url = found.ports[0].url
+    if trust.trusts(url):
+        return server_of(trust.place(url)), ""
+    here = server_of(trust.place(source))
+    remark = f"The WSDL names the address {url}, on another server. Tested was {here}, from where the WSDL was read; "
+    return here, f"{remark}--base-url and --trust-host change that."
 
 
 def soap_contract(
@@ -154,6 +185,7 @@ def soap_contract(
     *,
     schemas: Path | None = None,
     moves: bool = False,
+    allow_files: bool = False,
 ) -> tuple[Contract, Endpoints, tuple[str, ...]]:
     """Return the contract of a device's WSDL, the endpoints with its address, and remarks.
 
@@ -166,6 +198,7 @@ def soap_contract(
         out: folder of the results, in which the pack is written.
         schemas: folder with schemas that the WSDL's references do not lead to, or None.
         moves: whether the statement has a motion map.
+        allow_files: whether a WSDL in a file may refer to files outside its folder.
 
     Raises:
         DescriptionError: there is no usable WSDL.
@@ -174,17 +207,19 @@ def soap_contract(
     """
     import msgspec  # noqa: PLC0415 - read already where this is used
 
-    from conformance.documents.soap_services import WsdlError, base_of, moved, read_services  # noqa: PLC0415
+    from conformance.documents.soap_services import WsdlError, base_of, read_services  # noqa: PLC0415
     from conformance.documents.wsdl_imports import SchemaFolder  # noqa: PLC0415
 
     # xmlschema and lxml take a third of a second, which other devices need not pay.
     from conformance.documents.wsdl_pack import each, label_of, write_soap_pack  # noqa: PLC0415
 
-    load, documents, named = _Loader(connection, source), dict[str, bytes](), dict[str, str]()
+    trust = trusting(connection, source, base_url, endpoints.rest)
+    load = Loader(connection, trust, source, [str(schemas)] if schemas else (), anywhere=allow_files)
+    documents, named = dict[str, bytes](), dict[str, str]()
     folder = SchemaFolder(schemas) if schemas else None
 
     def fetch(place: str) -> bytes:
-        own = urlsplit(place).netloc == urlsplit(source).netloc
+        own = is_same(place, source)
         given = folder.at(place) if folder and not own else None
         try:
             documents[place] = load(place) if given is None else given
@@ -215,13 +250,19 @@ def soap_contract(
         raise DescriptionError(str(error)) from error
     except ValueError as error:
         raise DescriptionError(f"{source} could not be read: {error}") from error
-    base = (base_of(found) if address else base_url or endpoints.rest or base_of(found)).rstrip("/")
+    base = base_of(found) if address else base_url or endpoints.rest
+    remark = ""
+    if base is None:
+        base, remark = _server_of_ports(found, source, trust)
+        _check_server(source, base, endpoints, connection)
+    base = base.rstrip("/")
     elsewhere = (
         f"Port {port.name} is at {port.url}, another server, and is not called."
         for port in found.ports
-        if not moved(port.url, base_of(found), base).startswith(base)
+        if not is_same(port.url, base_of(found)) and not is_same(port.url, base)
     )
     uncalled = (f"{label_of(port, one)} is not called: {one.remark}." for port, one in each(found.ports) if one.remark)
     pack = write_soap_pack(out / FOLDER, found, source, documents, address, named=named, foreign=foreign, moves=moves)
     Contract.load.cache_clear()
-    return Contract.load(pack), msgspec.structs.replace(endpoints, rest=base), (*elsewhere, *uncalled, *found.notes)
+    remarks = (*filter(None, [remark]), *elsewhere, *uncalled, *found.notes)
+    return Contract.load(pack), msgspec.structs.replace(endpoints, rest=base), remarks

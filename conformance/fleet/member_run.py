@@ -239,8 +239,12 @@ async def _first(process: asyncio.subprocess.Process, event: asyncio.Event, most
 def _statement(member: Member) -> str:
     """Return a statement (TOML) with the addresses from the fleet file."""
     endpoints = [
-        f"{key} = {basic_string(value) if isinstance(value, str) else value}"
-        for key, value in asdict(member.endpoints).items()
-        if value is not None
+        f"{key} = {_written(value)}" for key, value in asdict(member.endpoints).items() if value not in {None, ()}
     ]
     return "\n".join(["[robot]", f"name = {basic_string(member.name)}", "", "[endpoints]", *endpoints, ""])
+
+
+def _written(value: str | float | tuple[str, ...]) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(basic_string, value))}]"
+    return basic_string(value) if isinstance(value, str) else str(value)

@@ -27,6 +27,7 @@ from conformance.scenarios.described_messages import DescribedMessages, fields_o
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange, NoAnswerError, Unanswered
+from conformance.transport.reach import is_same
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 from conformance.verdict.time_limit import TimeIsOverError
@@ -210,7 +211,7 @@ def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
     for port, operation in sorted(each(found.ports), key=lambda one: caller.asks(one[1])):
         rule = described[label_of(port, operation)]
         why = operation.remark or ("" if rule.may else str(rule))
-        why = why or ("" if port.url.startswith(base_of(found)) else f"its port is at another server, {port.url}")
+        why = why or ("" if is_same(port.url, base_of(found)) else f"its port is at another server, {port.url}")
         if why:
             caller.left_out.append((label_of(port, operation), why))
         else:

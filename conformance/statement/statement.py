@@ -38,6 +38,7 @@ class Api(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         overlays: files of OpenAPI Overlays to apply to it.
         base_url: where its operations are, in place of what the description says.
         schemas: folder with the schemas that the WSDL imports, where their addresses do not have them.
+        allow_files: whether a description in a file may refer to files outside its folder.
     """
 
     openapi: Text | None = None
@@ -45,6 +46,7 @@ class Api(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     base_url: Text | None = None
     wsdl: Text | None = None
     schemas: Text | None = None
+    allow_files: bool = False
 
 
 class Statement(msgspec.Struct, frozen=True):

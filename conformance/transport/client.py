@@ -34,6 +34,7 @@ from conformance.transport.exchange import (
     sendable,
 )
 from conformance.transport.pace import Pace, time_to_arrive
+from conformance.transport.reach import Trust
 
 Headers = tuple[tuple[str, str], ...]
 # Called with method and URL; returns an empty text if the request may be sent, else why not.
@@ -60,6 +61,7 @@ class Connection:
         token: bearer token, or None; it is one of the credentials.
         credentials: what every request carries.
         certificate: client certificate and key (PEM) for TLS, or None; the key may be in the certificate's file.
+        trust: the servers to which the credentials may go; None: to each that a client is made for.
         patience_s: how long the run may yet wait for a device that puts requests off, s.
         request_rate: maximum requests per second, or None.
         listeners: are called with every response and every failed request.
@@ -91,6 +93,7 @@ class Connection:
     permit: Permit = lambda _method, _url: ""
     credentials: Credentials = field(default_factory=Credentials)
     certificate: tuple[Path, Path | None] | None = None
+    trust: Trust | None = None
     patience_s: float = 120.0
     _next_slot: float = 0.0
 
@@ -98,9 +101,13 @@ class Connection:
         if self.token and bearer(self.token) not in self.credentials.items:
             self.credentials = Credentials((*self.credentials.items, bearer(self.token)))
 
-    def tls(self) -> ssl.SSLContext:
+    def tls(self, *, authorized: bool = True) -> ssl.SSLContext:
         """The TLS context that trusts ``ca_file``, or the system's authorities, with the client certificate if any."""
-        return tls_context(self.ca_file, self.certificate)
+        return tls_context(self.ca_file, self.certificate if authorized else None)
+
+    def may_authorize(self, url: str) -> bool:
+        """Return whether the credentials may go to the server of a URL."""
+        return self.trust is None or self.trust.trusts(url)
 
     def take_slot(self, *requests: tuple[str, str]) -> None:
         """Count one message, after waiting until ``request_rate`` allows it. Everything that sends calls this before.
@@ -148,7 +155,8 @@ class HttpClient:
         self.prefix = parts.path
         self.authority = parts.netloc.rsplit("@", 1)[-1]
         self._hangs: defaultdict[str, list[float]] = defaultdict(list)
-        self.tls = connection.tls() if parts.scheme == "https" else None
+        self._authorized = connection.may_authorize(self.base_url)
+        self.tls = connection.tls(authorized=self._authorized) if parts.scheme == "https" else None
         self._connections = Connections(self.host.encode("idna").decode("ascii"), self.port, self.tls)
 
     def close(self) -> None:
@@ -182,7 +190,7 @@ class HttpClient:
             headers: headers after Host. ``Accept: */*`` is added by default; ("Accept", "") leaves it out.
             body: request body; Content-Length is added for it, and for every PUT, POST and PATCH.
             fresh: use a new connection and close it afterwards, so that the request is never sent twice.
-            authorized: whether to send the credentials, if there are any.
+            authorized: whether to send the credentials, if there are any and the server may have them.
             timeout_s: deadline instead of the run's, s; large bodies extend it.
 
         Raises:
@@ -193,6 +201,7 @@ class HttpClient:
         fields = self._fields(method, tuple(headers), body, close=fresh)
         shown = tuple((name, value) for name, value in fields if name != "Connection")
         sent, target, query = list(fields), path, ""
+        authorized = authorized and self._authorized
         if authorized:
             credentials = self.connection.credentials
             target, query = credentials.target(path), credentials.target(path, shown=True)[len(path) :]

@@ -17,13 +17,14 @@ from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.documents.description import DescriptionError, is_url
 from conformance.documents.openapi import Operation, operations_of
 from conformance.engine.connecting import connection_of
-from conformance.engine.describing import UnreachableError, is_wsdl, soap_contract
+from conformance.engine.describing import is_wsdl, soap_contract
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.motion_map import shape_of
 from conformance.statement.statement import Statement, StatementError, api_of
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswerError
+from conformance.transport.reach import UnreachableError
 from conformance.transport.username_token import UsernameToken
 from conformance.verdict.run import Run
 from loadtests.clients.failures import CallError
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
 #: Options, by their names in Python, that a device with a description alone has.
 DESCRIBED_ONLY = (
-    "openapi", "wsdl", "schemas", "overlays", "base_url", "allow", "never", "basic_file", "digest_file",
+    "openapi", "wsdl", "schemas", "overlays", "base_url", "allow_files", "allow", "never", "basic_file", "digest_file",
     "username_token_file", "api_key", "api_key_file", "headers_file", "client_cert_file", "client_key_file",
     "streams", "stamp_field", "clock_field", "scenario",
 )  # fmt: skip

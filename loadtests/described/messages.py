@@ -10,6 +10,7 @@ from conformance.documents.xml_node import Node
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import NoAnswerError, Request
+from conformance.transport.reach import is_same
 from conformance.transport.username_token import hidden
 from loadtests.clients.described import Described
 from loadtests.clients.failures import CallError, Reply
@@ -28,7 +29,7 @@ def _found(messages: DescribedMessages, operation: Operation) -> tuple[SoapPort,
 
 def at_hand(messages: DescribedMessages, operation: Operation) -> bool:
     """Return whether the port of an operation is at the server of the first one; others are not called."""
-    return _found(messages, operation)[0].url.startswith(base_of(messages.found))
+    return is_same(_found(messages, operation)[0].url, base_of(messages.found))
 
 
 def described_message(device: Device, messages: DescribedMessages, operation: Operation) -> Described:

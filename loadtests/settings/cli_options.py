@@ -54,7 +54,7 @@ class CliOptions:
     def of(cls, **given: Any) -> Self:
         """Return options grouped as the settings are, from options by name."""
         endpoints = _take(given, Endpoints.__struct_fields__)
-        endpoints = {name: value for name, value in endpoints.items() if value not in {None, ""}}
+        endpoints = {name: value for name, value in endpoints.items() if value not in {None, "", ()}}
         selection = Selection(**_take(given, [item.name for item in fields(Selection)]))
         generator = Generator(**_take(given, [item.name for item in fields(Generator)]))
         repeats = Repeats(given.pop("repeat", 1), given.pop("restart_command", None))

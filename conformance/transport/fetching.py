@@ -1,0 +1,203 @@
+"""Fetch what is not judged: descriptions, and the schemas and files that they refer to.
+
+One httpx client, which takes its transport from here: a redirect is a request like any other, and goes to no server
+that the user did not name. Credentials are added in the transport, so that none follows a redirect elsewhere. Proxies
+in the environment are not used: the suite reaches the device as its requests do.
+"""
+
+import ssl
+import threading
+import time
+import zlib
+from collections.abc import Iterable
+from functools import cached_property
+from queue import Empty, SimpleQueue
+from typing import Final
+
+import httpx
+
+from conformance.transport.client import Connection
+from conformance.transport.credentials import Credentials
+from conformance.transport.reach import ElsewhereError, Trust, UnreachableError
+
+_REDIRECTS: Final = 4
+# Of one document, and of all that one description refers to.
+_MOST_OCTETS: Final = 32 * 1024 * 1024
+_MOST_IN_ALL: Final = 256 * 1024 * 1024
+_MOST_SECONDS: Final = 300.0
+_PIECE: Final = 1024 * 1024
+_ACCEPT: Final = "application/json, application/yaml, */*"
+_GZIP: Final = frozenset({"gzip", "x-gzip", "deflate"})
+_EITHER_FORM: Final = 47  # zlib finds out by itself whether it is gzip's or zlib's
+
+
+class Fetcher:
+    """Fetches documents from the servers that the user named.
+
+    Args:
+        connection: deadline, credentials and TLS.
+        trust: the servers that get the credentials.
+        public: further URLs that the user named; their servers get no credentials.
+
+    Attributes:
+        refused: the URLs that were not fetched because of their server, each with the reason.
+    """
+
+    def __init__(self, connection: Connection, trust: Trust, public: Iterable[str] = ()) -> None:
+        self.refused: dict[str, str] = {}
+        self._connection, self._trust = connection, trust
+        self._guard = _Guard(connection, trust, Trust.of(*public))
+        self._silent: dict[str, str] = {}
+        self._octets, self._began = 0, time.monotonic()
+
+    def __call__(self, url: str) -> bytes:
+        """Return the content of a URL.
+
+        Raises:
+            UnreachableError: its server does not respond.
+            ElsewhereError: it is on a server that the user did not name, or redirects there.
+            ValueError: there is no such content, or it is too large.
+        """
+        try:
+            server = httpx.URL(self._guard.place(url)[0]).netloc.decode("ascii")
+        except (ElsewhereError, httpx.InvalidURL) as error:
+            self.refused[url] = str(error)
+            raise ElsewhereError(str(error)) from error
+        if server in self._silent:
+            raise UnreachableError(f"{url}: {self._silent[server]}")
+        if time.monotonic() - self._began > _MOST_SECONDS:
+            raise ValueError(f"fetching took more than {_MOST_SECONDS:g} s in all")
+        seconds = self._connection.timeout_s
+        # httpx bounds each read and not their sum, which a server that sends single bytes makes endless.
+        done: SimpleQueue[bytes | Exception] = SimpleQueue()
+        threading.Thread(target=lambda: done.put(self._outcome(url)), daemon=True).start()
+        try:
+            found = done.get(timeout=seconds)
+        except Empty:
+            found = httpx.ReadTimeout("")
+        if isinstance(found, bytes):
+            return found
+        if isinstance(found, httpx.TooManyRedirects):
+            raise ValueError(f"more than {_REDIRECTS} redirects") from found  # noqa: TRY004 - of what was fetched
+        if isinstance(found, httpx.TransportError):
+            self._silent[server] = _worded(found, seconds)
+            raise UnreachableError(f"{url}: {self._silent[server]}") from found
+        if isinstance(found, ElsewhereError):
+            self.refused[url] = str(found)
+        raise found
+
+    def _outcome(self, url: str) -> bytes | Exception:
+        try:
+            return self._content(url)
+        except Exception as error:  # noqa: BLE001 - the caller's thread raises it
+            return error
+
+    def _content(self, url: str) -> bytes:
+        client = httpx.Client(
+            transport=self._guard,
+            trust_env=False,
+            follow_redirects=True,
+            max_redirects=_REDIRECTS,
+            timeout=self._connection.timeout_s,
+            headers={"Accept": _ACCEPT, "Accept-Encoding": "identity", "User-Agent": "roaas"},
+        )
+        with client.stream("GET", self._guard.place(url)[0]) as response:
+            if response.status_code != httpx.codes.OK:
+                asks = {httpx.codes.UNAUTHORIZED, httpx.codes.FORBIDDEN}
+                hint = "; are credentials missing, as by --token-file?" if response.status_code in asks else ""
+                raise ValueError(f"the server responded {response.status_code}{hint}")
+            octets = _decoded(response)
+        self._octets += len(octets)
+        if self._octets > _MOST_IN_ALL:
+            raise ValueError(f"the documents have more than {_MOST_IN_ALL:,} bytes in all")
+        return octets
+
+
+class _Guard(httpx.BaseTransport):
+    """Sends a request to a server that the user named, with the credentials if they are for it, and no other request.
+
+    Args:
+        connection: credentials and TLS.
+        trust: the servers that get the credentials.
+        public: those that get a request without them.
+    """
+
+    def __init__(self, connection: Connection, trust: Trust, public: Trust) -> None:
+        self._connection, self._trust, self._public = connection, trust, public
+
+    def place(self, url: str) -> tuple[str, Credentials]:
+        """Return the URL as it is sent, and the credentials for its server.
+
+        Raises:
+            ElsewhereError: the user named no such server.
+        """
+        if not self._trust.trusts(url) and self._public.trusts(url):
+            return self._public.place(url), Credentials()
+        return self._trust.place(url), self._connection.credentials
+
+    def handle_request(self, request: httpx.Request) -> httpx.Response:
+        """Send a request, and a second time with an answer to a challenge (RFC 7616)."""
+        try:
+            url, credentials = self.place(str(request.url))
+        except ElsewhereError as error:
+            raise ElsewhereError(f"it redirects to {request.url}: {error}") from None
+        parts = httpx.URL(url)
+        target = credentials.target(parts.raw_path.decode("ascii"))
+        # Those of the server as the user named it are made below.
+        given = [pair for pair in request.headers.items() if pair[0] not in {"host", "authorization", "connection"}]
+        for last in (False, True):
+            sent = httpx.Request(
+                request.method,
+                parts.copy_with(raw_path=target.encode("ascii")),
+                headers=credentials.added([*given, ("Connection", "close")], request.method, target),
+                extensions=request.extensions,
+            )
+            inner = self._tls if parts.scheme == "https" else self._plain
+            response = inner.handle_request(sent)
+            if last or response.status_code != httpx.codes.UNAUTHORIZED:
+                break
+            if not credentials.learn(response.headers.multi_items()):
+                break
+            response.close()
+        return response
+
+    @cached_property
+    def _plain(self) -> httpx.HTTPTransport:
+        return httpx.HTTPTransport(verify=ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT), trust_env=False)
+
+    @cached_property
+    def _tls(self) -> httpx.HTTPTransport:
+        return httpx.HTTPTransport(verify=self._connection.tls(), trust_env=False)
+
+
+def _decoded(response: httpx.Response) -> bytes:
+    """Return the content of a response, unpacked at most as far as one document may be long.
+
+    Raises:
+        ValueError: it is longer, or packed in a way that the request did not accept.
+    """
+    coding = response.headers.get("content-encoding", "identity").strip().lower()
+    if coding not in {*_GZIP, "identity", ""}:
+        raise ValueError(f"the server sent Content-Encoding {coding[:40]!r}, which the request did not accept")
+    unpacker, octets = zlib.decompressobj(_EITHER_FORM) if coding in _GZIP else None, bytearray()
+    for piece in response.iter_raw(_PIECE):
+        try:
+            octets += unpacker.decompress(piece, _MOST_OCTETS + 1) if unpacker else piece
+        except zlib.error as error:
+            raise ValueError(f"the server sent Content-Encoding {coding}, and no such content: {error}") from error
+        if len(octets) > _MOST_OCTETS:
+            raise ValueError(f"it has more than {_MOST_OCTETS:,} bytes")
+    if unpacker and not unpacker.eof:
+        raise ValueError(f"the server sent Content-Encoding {coding}, and its content ends too early")
+    return bytes(octets)
+
+
+def _worded(error: httpx.TransportError, seconds: float) -> str:
+    text = str(error) or type(error).__name__
+    if isinstance(error, httpx.TimeoutException):
+        return f"no response within {seconds:.3g} s"
+    if isinstance(error, httpx.ConnectError):
+        return f"no connection: {text}"
+    if isinstance(error, httpx.RemoteProtocolError) and "disconnected" not in text:
+        return f"a response that is not HTTP: {text}"
+    return f"the server closed the connection without a response: {text}"
