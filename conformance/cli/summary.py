@@ -33,6 +33,7 @@ _LINE = 160
 def print_summary(outcome: Certification) -> None:
     """Print the summary to stdout; if the robot was not reached, print that to stderr."""
     document = outcome.document
+    click.secho(warning(document), fg="red", nl=False)
     if outcome.exit_code == ExitCode.UNREACHABLE:
         reasons = (item["reason"] for item in document["requirements"] if item["verdict"] == "error")
         click.echo(f"error: {inert(next(reasons, 'the robot could not be reached'))}", err=True)
@@ -77,6 +78,12 @@ def print_summary(outcome: Certification) -> None:
         f"\n{document['verdict_line']}{accepted}: {told}; "
         f"{document['requests']} requests in {document['duration_s']:.1f} s, seed {document['seed']}"
     )
+
+
+def warning(document: Mapping[str, Any]) -> str:
+    """Return the line that says that the robot may still move, which comes before all others; or an empty text."""
+    said = document.get("stop_undelivered", "")
+    return f"WARNING: {inert(said)}\n" if said else ""
 
 
 def _print_unjudged(document: Mapping[str, Any]) -> None:

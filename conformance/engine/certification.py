@@ -150,6 +150,7 @@ def _concluded(
     if run.refused:
         remarks.insert(0, run.refused)
         robot.refusals.withdraw()
+    remarks[:0] = filter(None, [run.stop_undelivered])
     robot.note_uncalled()
     run.unshown = robot.nothing_shown
     remarks += run.remarks
@@ -258,8 +259,7 @@ def _judge(robot: RobotUnderTest, teller: Progress, remarks: list[str], recordin
             robot.is_at_rest = False
             look_again(run, robot.connection, robot.rest)
             robot.is_at_rest = True
-            # The last request may have been the one too many.
-            robot.alive()
+            robot.finish()
     except Exception as error:  # noqa: BLE001 - as above
         remarks.append(f"The suite itself failed, please report this: {type(error).__name__}: {error}")
         run.aborted = run.aborted or "the suite itself failed"

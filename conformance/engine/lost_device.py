@@ -69,6 +69,7 @@ class LostDevice:
         responds: returns whether the device responds within so many seconds.
         operation_of: returns the label of the operation that a request is for, or an empty text.
         tell: reports progress.
+        stop: stops the device.
     """
 
     def __init__(
@@ -78,9 +79,10 @@ class LostDevice:
         responds: Callable[[float], bool],
         operation_of: Callable[[Request], str],
         tell: Callable[[str], None],
+        stop: Callable[[], None] = lambda: None,
     ) -> None:
         self._run, self._connection, self._responds = run, connection, responds
-        self._operation_of, self._tell = operation_of, tell
+        self._operation_of, self._tell, self._stop = operation_of, tell, stop
         self._sends, self._until, self._is_back = 0, 0.0, True
 
     def handle(self, recent: Sequence[Sending]) -> bool:
@@ -95,6 +97,9 @@ class LostDevice:
         if sent:
             self._tell(f"the device stopped responding after {_named(sent[-1])}; waiting for it to come back")
         self._is_back = self._comes_back()
+        if self._is_back:
+            # It may go on with what it did when it was lost.
+            self._stop()
         if not requirement:
             if not self._is_back:
                 run.aborted = "the robot stopped responding"
@@ -203,6 +208,9 @@ class LostDevice:
         if not closed and self._responds(0.0):
             return False
         self._is_back = self._comes_back()
+        if self._is_back:
+            # It may go on with what it did when it was lost.
+            self._stop()
         return True
 
     def _record(self, requirement: str, kind: NoAnswer | None, sent: Sequence[Request], found: _Found) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.stops import send_stops
+from conformance.api.rest.stops import stop_device
 from conformance.commandline.secrecy import SECRETS
 from conformance.documents.readable import unreadable
 from conformance.engine.by_description import fails_by_description
@@ -192,8 +192,7 @@ def look_again(run: Run, connection: Connection, rest: RestInterface | None = No
             finding.again = Again(came_back, _TIMES, judged=by_rule or run.judge.cases(finding.requirement) > cases)
     finally:
         if moves and rest is not None:
-            rest.device.leave_at_rest(rest)
-            send_stops(rest)
+            stop_device(rest)
 
 
 def _may_be_sent(run: Run, exchange: Exchange) -> bool:
@@ -202,7 +201,8 @@ def _may_be_sent(run: Run, exchange: Exchange) -> bool:
         return False
     if request.method in SAFE_METHODS:
         return not request.body
-    return run.allow_motion and exchange.response.status >= HTTPStatus.INTERNAL_SERVER_ERROR
+    may_move = run.allow_motion and not run.stop_undelivered
+    return may_move and exchange.response.status >= HTTPStatus.INTERNAL_SERVER_ERROR
 
 
 def _fails_again(run: Run, finding: Finding, exchange: Exchange, connection: Connection, base_url: str) -> bool:

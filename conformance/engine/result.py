@@ -58,6 +58,7 @@ def result_document(
         "format": RESULT_FORMAT,
         "verdict": value,
         "verdict_line": verdict_line(run, value, verdicts),
+        **({"stop_undelivered": run.stop_undelivered} if run.stop_undelivered else {}),
         **({"accepted_until": accepted_until} if accepted_until else {}),
         **({"refused": run.refused} if run.refused else {}),
         "interrupted": interrupted,

@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TextIO
 
 from conformance.api.call_rules import CallRules
@@ -19,7 +19,7 @@ from conformance.api.interfaces import Interfaces
 from conformance.api.permission import Permission
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.operation_log import OperationLog
-from conformance.api.rest.stops import send_stops
+from conformance.api.rest.stops import stop_device
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
 from conformance.contract.described import SOAP
@@ -28,6 +28,7 @@ from conformance.documents.openapi import operations_of
 from conformance.engine.lost_device import LostDevice
 from conformance.engine.refused import RefusalListener
 from conformance.engine.resending import Recorder
+from conformance.statement.motion_map import MotionMap
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import OF_GATEWAY, Exchange, NoAnswer, NoAnswerError, Request
 from conformance.verdict.run import Run
@@ -124,6 +125,8 @@ class RobotUnderTest:
         if not where.rest:
             return
         self.rest = RestInterface(self.run, HttpClient(where.rest, self.connection), self.alive)
+        if self.run.statement.motion_map is not None and self.run.allow_motion:
+            self.rest.stop_device = partial(_stop_by_map, self.rest, self.run.statement.motion_map)
         if self.run.contract.described:
             self.permission.may_call_ports(self.rest.client.base_url)
             self.log = OperationLog(self.run.contract, self.rest.client.base_url)
@@ -203,14 +206,12 @@ class RobotUnderTest:
             self.connection.pace.usual_s = run.effort.usual_ms / 1000
 
     def leave_at_rest(self) -> None:
-        """Stop the device after the checks, unless that is done; takes at most some seconds, and never raises."""
+        """Stop the device after the checks, unless that is done; the stop is tried for a bounded time. Never raises."""
         self.run.limit.end()
-        if self.is_at_rest or self.rest is None:
-            return
-        self.run.judge.begin("")  # what is sent from here on belongs to no check
-        self.device.leave_at_rest(self.rest)
-        send_stops(self.rest)
-        self.is_at_rest = True
+        if not self.is_at_rest:
+            self.run.judge.begin("")  # what is sent from here on belongs to no check
+            self.stop()
+            self.is_at_rest = True
 
     def has(self, name: Interface) -> bool:
         """Return whether an interface has an address."""
@@ -242,9 +243,19 @@ class RobotUnderTest:
         with self.run.limit.lifted():
             return (not behind_gateway and self._responds(self._grace_s)) or self._comes_back()
 
+    def stop(self) -> None:
+        """Stop the device if the run may have moved it; ``run.stop_undelivered`` says why it may still move."""
+        if self.rest is not None:
+            stop_device(self.rest, self._tell)
+
+    def finish(self) -> None:
+        """Notice if the last request was one too many, and stop the device if it could not be stopped before."""
+        if self.alive() and self.run.stop_undelivered:
+            self.stop()
+
     def _comes_back(self) -> bool:
         """Return whether a device that was lost is back, after recording the loss."""
-        lost = LostDevice(self.run, self.connection, self._responds, self._operation_of, self._tell)
+        lost = LostDevice(self.run, self.connection, self._responds, self._operation_of, self._tell, self.stop)
         goes_on = lost.handle(tuple(self.connection.recent))
         self.connection.recent.clear()
         for client, _ in self._answering():
@@ -336,3 +347,11 @@ class RobotUnderTest:
             if name not in self.run.unreachable
         ]
         return found
+
+
+def _stop_by_map(api: RestInterface, motion: MotionMap) -> str:
+    """Stop a device by its motion map before any scenario has moved it; return why it may still move, or nothing."""
+    from conformance.scenarios.motion.binding import binding_of  # noqa: PLC0415 - as above
+    from conformance.scenarios.motion.mapped import MappedDevice  # noqa: PLC0415 - as above
+
+    return MappedDevice(api, motion, binding=binding_of(api), looks=False).leave_at_rest()

@@ -41,8 +41,8 @@ _WRITTEN = (
     "gl-*.json",
     "annotations.txt",
 )
-# A run that is told to end stops the robot, and writes what it has.
-_GRACE_S = 30.0
+# A run that is told to end stops the robot, which is tried for 20 s, and writes what it has.
+_GRACE_S = 45.0
 _PROGRESS = re.compile(rb"(\d+/\d+) checks[^\n]*\n[^\n]*\Z")
 _SHOWN = 400
 

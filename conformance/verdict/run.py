@@ -62,6 +62,7 @@ class Run:
         wait_s: how long a device that stopped responding is waited for, s; None: as the restart command has it.
         refused: how the device refused the run's credentials, so that nothing, or not all, was judged; or empty.
         unshown: why nothing of a device with a description of its own was shown, or empty.
+        stop_undelivered: why the device may still move after the run; empty: it was stopped, or was not moved.
         unreachable: why an interface was not reachable at the start.
         tally: the generated cases of all explorations, and those that time did not allow.
         limit: the time that the run may take, and what it left out.
@@ -85,6 +86,7 @@ class Run:
     wait_s: float | None = None
     refused: str = ""
     unshown: str = ""
+    stop_undelivered: str = ""
     unreachable: dict[Interface, str] = field(default_factory=dict)
     tally: Tally = field(default_factory=Tally)
     limit: TimeLimit = field(default_factory=TimeLimit)

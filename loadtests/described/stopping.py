@@ -2,11 +2,13 @@
 
 from typing import Self
 
-from conformance.api.rest.stops import send_stops
+import click
+
+from conformance.api.rest.stops import stop_device
 from conformance.scenarios.motion.binding import binding_of
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.scenario import NotPossibleError
-from conformance.transport.exchange import NoAnswerError, NotPermittedError
+from conformance.transport.exchange import NoAnswerError
 from loadtests.clients.failures import CallError
 from loadtests.described.device import Device
 from loadtests.settings.errors import SettingsError
@@ -42,19 +44,5 @@ class Stopping:
             raise CallError("closed", str(none)) from None
 
     def stop(self) -> str:
-        """Send the stop of the motion map and what the description marks as one (x-roaas-stop), and wait for rest.
-
-        Takes at most some ten seconds; never raises.
-
-        Returns:
-            Why the device may still move; empty if it rests, or if no motion map tells whether it does.
-        """
-        api = self._device.api
-        api.client.connection.note("POST")  # the run sent it, over connections of its own
-        send_stops(api)
-        try:
-            if self._mapped is not None:
-                self._mapped.come_to_rest(stop=False)
-        except (NotPossibleError, NoAnswerError, NotPermittedError) as error:
-            return f"the device was told to stop after the load, but may still move: {error}"
-        return ""
+        """Stop the device, as a certification does; return why it may still move, or an empty text."""
+        return stop_device(self._device.api, lambda line: click.echo(f"roaas load: {line}", err=True))

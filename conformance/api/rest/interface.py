@@ -30,7 +30,8 @@ class RestInterface:
         usual_status: status of the survey's last usual request to each operation; 0 without a response.
         streams: operations whose responses do not end.
         slow: operations that once took more than a second to respond.
-        stop_device: stops a device with a motion map; None: it has none, or was not moved.
+        stop_device: stops a device by its motion map, and returns why it may still move, or an empty text; None: it has
+            no map, or may not be moved.
         values: what the survey of a described API knows for parameters and bodies, or None.
         looked: the exchanges by which the run has connected, before anything observed them.
         server: the Server field of the first response that had one; empty: none had.
@@ -48,7 +49,7 @@ class RestInterface:
     usual_status: dict[str, int] = field(default_factory=dict)
     streams: set[str] = field(default_factory=set)
     slow: set[str] = field(default_factory=set)
-    stop_device: Callable[[], Any] | None = None
+    stop_device: Callable[[], str] | None = None
     values: Any = None
     looked: list[Exchange] = field(default_factory=list)
     server: str = ""

@@ -1,41 +1,145 @@
-"""Stop a device that only its description tells of, at the end of a run."""
+"""Stop a device at the end of a run, and say so if it may still move. No other module sends a run's last stop.
 
-import math
+The contract pack (``leave_at_rest``), the motion map or the description (x-roaas-stop) says how a device is stopped.
+The stop is tried again and again, over new connections, for as long as a lost device is waited for: ``--wait``, 20 s by
+default.
+"""
+
 import time
-from contextlib import suppress
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from http import HTTPStatus
 from typing import Final
 
 from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
-from conformance.documents.openapi import operations_of
+from conformance.documents.openapi import Operation, operations_of
+from conformance.transport.client import HttpClient
 from conformance.transport.exchange import NoAnswerError, NotPermittedError
 
+#: What is said of a device that may still move begins with these words.
+UNDELIVERED: Final = "the stop could not be delivered; the robot may still move"
+#: How long the stop is tried by default, s.
+TRIED_S: Final = 20.0
+# Between two tries, s.
+_AGAIN_S: Final = 0.3
+# The deadline of one request, and how many usual responses a slow device gets.
 _DEADLINE_S: Final = 2.0
+_ANSWERS: Final = 4
+# All requests of one try for what the description marks, s.
 _LONGEST_S: Final = 5.0
+_Way = Callable[[], str]
+# What the stop names is over.
+_OVER: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 
 
-def send_stops(api: RestInterface) -> None:
-    """Stop the device by its motion map, or by what the description marks (x-roaas-stop), if it may have been moved.
+def stop_device(api: RestInterface, tell: Callable[[str], None] = lambda _: None) -> str:
+    """Stop the device if the run may have moved it; return why it may still move, or an empty text.
 
-    Each operation is sent with the values that the run knows for it, such as the ids of the newest moves. Takes at most
-    a few seconds; never raises.
+    ``run.stop_undelivered`` says the same, from before the first request on: a run that ends meanwhile has it too.
+    Takes a few seconds more than the stop is tried; raises no exception but KeyboardInterrupt.
+
+    Args:
+        api: the device's REST interface.
+        tell: reports that the stop is tried again.
     """
-    with suppress(NoAnswerError, NotPermittedError):
-        if api.stop_device is not None:
-            api.stop_device()
-    if not api.call_rules.allow or math.isinf(api.client.connection.acted_at):
-        return
+    run = api.run
+    if not (run.allow_motion or api.call_rules.allow):
+        return ""
+    run.stop_undelivered = f"{UNDELIVERED}: the run ended before it was seen to stop"
+    tried_s = run.wait_s or TRIED_S
+    until = time.monotonic() + tried_s
+    ways = [partial(way, api) for way in (_stop_by_pack, _stop_by_map, _stop_as_marked)]
+    open_ = _still_open(ways)
+    if open_:
+        tell(f"the device was not stopped: {'; '.join(open_.values())}. The stop is tried for {tried_s:g} s")
+    while open_ and time.monotonic() < until:
+        time.sleep(_AGAIN_S)
+        with _unheard(api.client):
+            open_ = _still_open(open_)
+    run.stop_undelivered = f"{UNDELIVERED}: {'; '.join(open_.values())}" if open_ else ""
+    return run.stop_undelivered
+
+
+def _still_open(ways: Iterable[_Way]) -> dict[_Way, str]:
+    """Stop the device by each way; return those that did not, with the reasons."""
+    found = {}
+    for way in ways:
+        try:
+            problem = way()
+        except Exception as error:  # noqa: BLE001 - whatever breaks, the device is stopped by the other ways, and again
+            problem = str(error) or type(error).__name__
+        if problem:
+            found[way] = problem
+    return found
+
+
+@contextmanager
+def _unheard(client: HttpClient) -> Iterator[None]:
+    """Send over new connections what nothing judges or counts, and what no hang or slow response before holds back."""
+    connection = client.connection
+    deadline_s = max(_DEADLINE_S, _ANSWERS * connection.pace.usual_s)
+    changed = {
+        "listeners": [],
+        "recent": deque(maxlen=1),
+        "is_away": lambda _exchange: False,
+        "request_rate": None,
+        "timeout_s": min(connection.timeout_s, deadline_s),
+    }
+    kept = {name: getattr(connection, name) for name in changed}
+    for name, value in changed.items():
+        setattr(connection, name, value)
+    client.close()
+    client.forget_hangs()
+    try:
+        yield
+    finally:
+        for name, value in kept.items():
+            setattr(connection, name, value)
+
+
+def _stop_by_pack(api: RestInterface) -> str:
+    return api.device.leave_at_rest(api)
+
+
+def _stop_by_map(api: RestInterface) -> str:
+    return api.stop_device() if api.stop_device is not None else ""
+
+
+def _stop_as_marked(api: RestInterface) -> str:
+    """Send what the description marks as a stop (x-roaas-stop); return what was not accepted, or an empty text."""
+    if not (api.call_rules.allow or api.run.statement.motion_map):
+        return ""
     until = time.monotonic() + _LONGEST_S
-    for operation in operations_of(api.run.contract):
-        for inputs in usual_inputs(operation, api.values or Values()) if operation.stop else ():
-            if time.monotonic() > until:
-                return
-            request = written(operation, inputs)
-            fields = [*request.headers, *([("Content-Type", request.content_type)] if request.content_type else [])]
-            try:
-                api.client.send(
-                    request.method, request.target, headers=fields, body=request.body, timeout_s=_DEADLINE_S
-                )
-            except (NoAnswerError, NotPermittedError):
-                continue
+    marked = (operation for operation in operations_of(api.run.contract) if operation.stop)
+    return "; ".join(filter(None, (_send(api, operation, until) for operation in marked)))
+
+
+def _send(api: RestInterface, operation: Operation, until: float) -> str:
+    """Send a stop with each value that the run knows for it, such as the ids of the newest moves.
+
+    Returns:
+        Why none was accepted, or an empty text.
+    """
+    problem, accepted = f"no request to {operation.label} could be made", False
+    names_one = operation.method == "DELETE" or bool(operation.parameters)
+    for inputs in usual_inputs(operation, api.values or Values()):
+        if time.monotonic() > until:
+            break
+        request = written(operation, inputs)
+        fields = [*request.headers, *([("Content-Type", request.content_type)] if request.content_type else [])]
+        try:
+            exchange = api.client.send(
+                request.method, request.target, headers=fields, body=request.body, timeout_s=_DEADLINE_S
+            )
+        except NotPermittedError:
+            return ""  # the user's --never
+        except NoAnswerError as none:
+            problem = f"{operation.label}: {none}"
+            continue
+        accepted |= exchange.response.ok or (names_one and exchange.response.status in _OVER)
+        problem = f"{operation.label} got {exchange.came}"
+    return "" if accepted else problem

@@ -157,8 +157,8 @@ class Device(device.Device):
 
         return bring_to_rest(api)
 
-    def leave_at_rest(self, api: device.Rest) -> None:
+    def leave_at_rest(self, api: device.Rest) -> str:
         """Stop the robot at the end of a run; never raises, and returns within seconds."""
         from conformance.packs.table1.robot.stopping import leave_at_rest  # noqa: PLC0415 - see the class
 
-        leave_at_rest(api)
+        return leave_at_rest(api)

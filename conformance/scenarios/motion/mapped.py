@@ -1,10 +1,14 @@
-"""A device that is read, commanded and stopped by its motion map."""
+"""A device that is read, commanded and stopped by its motion map.
+
+Over 300 lines because what was commanded, what is read and how it is stopped are one state.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, Final
+from urllib.parse import urlsplit
 
 from conformance.api.rest.interface import RestInterface
 from conformance.observe.clock import WALL_CLOCK, Clock
@@ -14,7 +18,7 @@ from conformance.scenarios.motion.templates import NoValueError, at, filled, num
 from conformance.scenarios.motion.trace import SEVERAL, Command, Leg, Reading, fastest, middle_of
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.motion_map import Goto, MotionMap, Stop, Switch, Velocity, names_in
-from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, NotPermittedError
 
 #: For so long a device that has arrived is watched, s.
 STAYS_S: Final = 0.3
@@ -38,6 +42,7 @@ class MappedDevice:
         motion: its map.
         clock: by which it is watched.
         binding: how its calls become requests; None: JSON over HTTP.
+        looks: whether to read where it is, which moves need; to stop it, nothing need be known.
 
     Attributes:
         home: where it is brought between scenarios: near where it was at first, well within its limits.
@@ -49,15 +54,22 @@ class MappedDevice:
     """
 
     def __init__(
-        self, api: RestInterface, motion: MotionMap, clock: Clock = WALL_CLOCK, binding: Binding | None = None
+        self,
+        api: RestInterface,
+        motion: MotionMap,
+        clock: Clock = WALL_CLOCK,
+        binding: Binding | None = None,
+        *,
+        looks: bool = True,
     ) -> None:
         self.api, self.motion, self.clock = api, motion, clock
         self.binding: Binding = binding or JsonBinding(api)
         self.room = Room(motion)
         self._answer: Any = None
         self._read_at = 0.0
-        self.home = {name: motion.state.axes[name].well_inside(value) for name, value in self.where().items()}
-        api.stop_device = self.stop
+        here = self.where() if looks else {}
+        self.home = {name: motion.state.axes[name].well_inside(value) for name, value in here.items()}
+        api.stop_device = self.leave_at_rest
 
     @property
     def moves(self) -> Goto:
@@ -282,6 +294,31 @@ class MappedDevice:
         if not self.is_near(self.where(), self.home):
             raise NotPossibleError("the device does not come back to the position from which the suite begins")
 
+    def leave_at_rest(self) -> str:
+        """Stop what goes on, and see that the device rests; return why it may still move, or an empty text."""
+        problem = ""
+        try:
+            command = self.stop()
+            if command is None:
+                problem = "the motion map has no stop that can be sent"
+            elif not command.accepted:
+                problem = f"{self._named(command.exchange)} got {command.exchange.came}"
+        except NoAnswerError as none:
+            problem = f"{self._named(none.unanswered)}: {none}"
+        except NotPermittedError as refusal:
+            problem = str(refusal)
+        if not (self.motion.state.axes or self.motion.speeds):
+            return problem
+        try:
+            self.come_to_rest(stop=False)
+        except (NotPossibleError, NoAnswerError) as unseen:
+            return "; ".join(filter(None, (problem, str(unseen))))
+        return ""
+
+    @staticmethod
+    def _named(attempt: Attempt) -> str:
+        return f"{attempt.request.method} {urlsplit(attempt.request.url).path}"
+
     def come_to_rest(self, *, stop: bool = True) -> None:
         """Stop what goes on, unless that is done already, and wait until the device rests.
 
@@ -291,10 +328,11 @@ class MappedDevice:
         """
         if stop:
             self.stop()
-        until = self.clock.now() + _RESTS_S
+        until = self.clock.now() + max(_RESTS_S, self.motion.stop.rests_within_s if self.motion.stop else 0.0)
         while self.clock.now() <= until:
             before = self.where()
             seen = self.watch(self.clock.now() + STAYS_S)
-            if self.is_near(self.where(), before) and not fastest(seen, self.motion):
+            stays = self.is_near(self.where(), before) if before else any(one.speeds for one in seen)
+            if stays and not fastest(seen, self.motion):
                 return
         raise NotPossibleError("the device does not come to rest")

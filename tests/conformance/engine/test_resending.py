@@ -52,9 +52,8 @@ def _sent_again(monkeypatch, run, answer=_GOOD):
     """What is put down of a finding, and whether the robot was left at rest."""
     stopped = []
     monkeypatch.setattr(resending, "send_again", lambda request, _: Exchange(request, answer))
-    device = SimpleNamespace(leave_at_rest=stopped.append)
-    monkeypatch.setattr(resending, "send_stops", stopped.append)
-    look_again(run, Connection(), SimpleNamespace(device=device))
+    monkeypatch.setattr(resending, "stop_device", stopped.append)
+    look_again(run, Connection(), SimpleNamespace())
     return next(iter(run.judge.evidence["http/head"].findings.values())).again, bool(stopped)
 
 

@@ -52,13 +52,16 @@ def halt(api: RestInterface) -> None:
         _Stiller(api.client, _slowest(api)).halt(_CANCEL_S)
 
 
-def leave_at_rest(api: RestInterface) -> None:
+def leave_at_rest(api: RestInterface) -> str:
     """Stop the robot at the end of a run, even an interrupted one, and even if it hardly responds.
 
     Does nothing where no request could have moved the robot. Takes at most a few seconds; never raises.
+
+    Returns:
+        Why the robot may still move, or an empty text.
     """
     if not api.run.allow_motion:
-        return
+        return ""
     try:
         # A client of its own: no listener judges any more, an endpoint that hung once is asked again all the same, and
         # nothing is late.
@@ -66,11 +69,11 @@ def leave_at_rest(api: RestInterface) -> None:
         connection = replace(api.client.connection, timeout_s=timeout_s, listeners=[], pace=Pace(math.inf))
         client = HttpClient(api.client.base_url, connection)
         try:
-            _Stiller(client, _slowest(api)).bring(_LAST_S, _LAST_S)
+            return _Stiller(client, _slowest(api)).bring(_LAST_S, _LAST_S)
         finally:
             client.close()
-    except Exception:  # noqa: BLE001 - the run is over: what was found must be reported whatever happens here
-        return
+    except Exception as error:  # noqa: BLE001 - the run is over: what was found must be reported whatever happens here
+        return str(error) or type(error).__name__
 
 
 def _slowest(api: RestInterface) -> Velocity:
