@@ -93,6 +93,7 @@ def _known(item: Requirement, contract: Contract, sets: Mapping[str, Requirement
     ids = {item.id, *item.aliases}
     return {
         "level": item.level,
+        "text": item.text,
         "classes": list(item.classes),
         "aliases": list(item.aliases),
         "sets": [name for name, one in sets.items() if not ids.isdisjoint(one.requirements)],

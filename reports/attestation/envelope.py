@@ -19,6 +19,7 @@ from reports.errors import EnvelopeRefusedError, ResultMissingError, ResultUnrea
 ENVELOPE_NAME = "certificate.intoto.json"
 _MOST_BYTES = 4 << 20
 """A certificate has some kilobytes; a larger file is not parsed."""
+_ASK = f"Ask the vendor for the file {ENVELOPE_NAME} as `roaas sign` wrote it"
 
 
 class _Signature(msgspec.Struct, forbid_unknown_fields=True):
@@ -69,17 +70,17 @@ def open_envelope(octets: bytes) -> Opened:
         EnvelopeRefusedError: the envelope is larger than 4 MiB, malformed, or not as `signature.seal` writes envelopes.
     """
     if len(octets) > _MOST_BYTES:
-        raise EnvelopeRefusedError(f"not a certificate: the file is larger than {_MOST_BYTES} bytes")
+        raise EnvelopeRefusedError(f"not a certificate: the file is larger than {_MOST_BYTES} bytes. {_ASK}")
     try:
         envelope = msgspec.json.decode(octets, type=_Envelope)
         strict_json(octets)
     except (ValueError, RecursionError) as error:
-        raise EnvelopeRefusedError(f"not an envelope with one signature: {error}") from error
+        raise EnvelopeRefusedError(f"not an envelope with one signature: {error}. {_ASK}") from error
     if envelope.payload_type != PAYLOAD_TYPE:
-        raise EnvelopeRefusedError(f"the payload type is {envelope.payload_type[:80]!r}, not {PAYLOAD_TYPE}")
+        raise EnvelopeRefusedError(f"the payload type is {envelope.payload_type[:80]!r}, not {PAYLOAD_TYPE}. {_ASK}")
     signature = envelope.signatures[0]
     if not signature.keyid:
-        raise EnvelopeRefusedError("the signature names no key")
+        raise EnvelopeRefusedError(f"the signature names no key. {_ASK}")
     return Opened(_octets(envelope.payload, "payload"), signature.keyid, _octets(signature.sig, "signature"))
 
 
@@ -93,10 +94,10 @@ def statement_in(opened: Opened) -> Statement:
         statement = msgspec.json.decode(opened.payload, type=Statement)
         strict_json(opened.payload)
     except (ValueError, RecursionError) as error:
-        raise EnvelopeRefusedError(f"the signed content is not a certificate of a run: {error}") from error
+        raise EnvelopeRefusedError(f"the signed content is not a certificate of a run: {error}. {_ASK}") from error
     for found, wanted in ((statement.type, STATEMENT_TYPE), (statement.predicate_type, PREDICATE_TYPE)):
         if found != wanted:
-            raise EnvelopeRefusedError(f"the signed content is of type {found[:80]!r}, not {wanted}")
+            raise EnvelopeRefusedError(f"the signed content is of type {found[:80]!r}, not {wanted}. {_ASK}")
     return statement
 
 
@@ -123,7 +124,7 @@ def _octets(text: str, what: str) -> bytes:
     try:
         octets = base64.b64decode(text, validate=True)
     except (binascii.Error, ValueError) as error:
-        raise EnvelopeRefusedError(f"the {what} is not base64: {error}") from error
+        raise EnvelopeRefusedError(f"the {what} is not base64: {error}. {_ASK}") from error
     if base64.b64encode(octets).decode() != text:
-        raise EnvelopeRefusedError(f"the {what} is not canonical base64")
+        raise EnvelopeRefusedError(f"the {what} is not canonical base64. {_ASK}")
     return octets

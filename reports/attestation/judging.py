@@ -16,7 +16,7 @@ from reports.attestation.outcomes import (
 from reports.attestation.policy import OWN, Known, Policy
 from reports.attestation.statement import CONTRACT_SUBJECT, STATEMENT_SUBJECT, Run, Statement, passed, seed_of
 
-_SKEW = dt.timedelta(minutes=5)
+SKEW = dt.timedelta(minutes=5)
 """How far the vendor's clock may be ahead of ours."""
 
 
@@ -272,7 +272,7 @@ def _time(run: Run, policy: Policy, now: dt.datetime) -> Iterator[Point]:
         age = now - run.ended
         text = f"the run ended on {run.ended:%Y-%m-%d %H:%M} UTC"
         text += f", {age.days} days ago" if age.days > 0 else ""
-        met = -_SKEW <= age <= dt.timedelta(days=policy.max_age_days)
+        met = -SKEW <= age <= dt.timedelta(days=policy.max_age_days)
     yield Point("max_age_days", met, text, demanded_age, "ask the vendor to certify again")
     if policy.nonce is None:
         text, fresh = "you gave no nonce", True

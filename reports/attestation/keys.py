@@ -8,7 +8,7 @@ import hashlib
 import os
 from pathlib import Path
 
-from cryptography.exceptions import UnsupportedAlgorithm
+from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 from cryptography.hazmat.primitives.serialization import (
     Encoding,
@@ -22,6 +22,9 @@ from reports.errors import KeyUnusableError
 
 PRIVATE_NAME = "signing-key.pem"
 PUBLIC_NAME = "public-key.pem"
+_FITS_MANY = b"\1" + bytes(63)
+"""A signature with the neutral point and zero. For a key of order 8, it fits one content in eight."""
+_TRIES = 128
 
 
 def generate(directory: Path) -> str:
@@ -68,13 +71,29 @@ def public_key(path: Path) -> SSlibKey:
     Raises:
         KeyUnusableError: the file cannot be read, or does not hold an Ed25519 public key.
     """
+    octets = _octets(path)
     try:
-        key = load_pem_public_key(_octets(path))
+        key = load_pem_public_key(octets)
     except (ValueError, UnsupportedAlgorithm) as error:
-        raise KeyUnusableError(f"{path}: not a public key in PEM") from error
+        raise KeyUnusableError(f"{path}: not a public key in PEM; `roaas keygen` writes one, {PUBLIC_NAME}") from error
     if not isinstance(key, Ed25519PublicKey):
-        raise KeyUnusableError(f"{path}: not an Ed25519 key")
+        raise KeyUnusableError(f"{path}: not an Ed25519 key; ask the signer for the key that `roaas keygen` wrote")
+    if octets.count(b"-----BEGIN") != 1:
+        raise KeyUnusableError(f"{path}: more than one key; give a file with the one key that you trust")
+    if _is_weak(key):
+        raise KeyUnusableError(f"{path}: a weak key, for which anybody can sign; do not trust it")
     return _named(key)
+
+
+def _is_weak(key: Ed25519PublicKey) -> bool:
+    """Return whether a public key is a point of small order: one signature then fits many contents."""
+    for number in range(_TRIES):
+        try:
+            key.verify(_FITS_MANY, b"%d" % number)
+        except InvalidSignature:
+            continue
+        return True
+    return False
 
 
 def fingerprint(key: Ed25519PublicKey) -> str:

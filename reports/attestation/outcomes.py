@@ -27,6 +27,7 @@ class Entry(msgspec.Struct, frozen=True):
     Attributes:
         level: MUST, SHOULD or MAY.
         classes: the classes that it binds, its own first.
+        text: the rule.
         aliases: ids that it had before.
         sets: names of the requirement sets that contain it.
         decides: whether a class cannot pass unless it was tested, or does not apply to the robot.
@@ -35,6 +36,7 @@ class Entry(msgspec.Struct, frozen=True):
 
     level: str
     classes: tuple[str, ...]
+    text: str = ""
     aliases: tuple[str, ...] = ()
     sets: tuple[str, ...] = ()
     decides: bool = False

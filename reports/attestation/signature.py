@@ -25,10 +25,16 @@ def unseal(octets: bytes, key: Key) -> Statement:
     """
     opened = open_envelope(octets)
     if opened.keyid != key.keyid:
-        raise EnvelopeRefusedError(f"foreign key: it is signed by {opened.keyid[:64]!r}, but your key is {key.keyid}")
+        raise EnvelopeRefusedError(
+            f"foreign key: it is signed by {opened.keyid[:64]!r}, but your key is {key.keyid}. "
+            "If the vendor has a new key, compare its fingerprint over a second channel, and give that key with --key"
+        )
     signature = Signature(opened.keyid, opened.signature.hex())
     try:
         Envelope(opened.payload, PAYLOAD_TYPE, {opened.keyid: signature}).verify([key], 1)
     except VerificationError as error:
-        raise EnvelopeRefusedError("the signature was not made by your key over this content") from error
+        raise EnvelopeRefusedError(
+            "the signature was not made by your key over this content: somebody changed it, or signed it "
+            "with another key. Do not rely on it; ask the vendor for the file as `roaas sign` wrote it"
+        ) from error
     return statement_in(opened)

@@ -57,7 +57,7 @@ class Notary:
             problems.append("the run was interrupted")
         if run.suite.digest == known.suite and run.requirement_set is not None:
             problems += departures(run, known.ledger, run.requirement_set.name, same=True)
-            problems += _moved(result, known.ledger)
+            problems += _unlike(result, known.ledger)
         if problems:
             raise ResultUnsignableError(
                 f"{path}: not signed. Only the complete and unchanged result of one run is. Found: "
@@ -101,13 +101,23 @@ def _replaced(directory: Path, result: Mapping[str, Any]) -> list[str]:
     return [f"the device was not judged by these files: {named(other)}"] if other else []
 
 
-def _moved(result: Mapping[str, Any], ledger: Mapping[str, Entry]) -> list[str]:
-    """Return which requirements of a result are in another class than the ledger has them, in words."""
-    return [
-        f"{item['id']} is in class {item['class']}, not {ledger[item['id']].classes[0]}"
-        for item in result["requirements"]
-        if item["id"] in ledger and item["class"] != ledger[item["id"]].classes[0]
-    ]
+def _unlike(result: Mapping[str, Any], ledger: Mapping[str, Entry]) -> list[str]:
+    """Return what a result says of requirements that the ledger does not say, or that no run writes, in words."""
+    found, claims = [], frozenset(result["statement"]["claims"])
+    for item in result["requirements"]:
+        id_, entry = item["id"], ledger.get(item["id"])
+        if entry is None:
+            continue
+        if item["class"] != entry.classes[0]:
+            found.append(f"{id_} is in class {item['class']}, not {entry.classes[0]}")
+        if item["text"] != entry.text:
+            found.append(f"{id_} has another text than in the ledger")
+        unclaimed = item["verdict"] == "not-claimed"
+        if claims.isdisjoint(entry.classes) and not unclaimed:
+            found.append(f"{id_} ended with {item['verdict']!r}, although its class is not claimed")
+        if unclaimed and item["cases"] and not claims.isdisjoint(entry.classes):
+            found.append(f"{id_} is not claimed, although its class is, and {item['cases']} cases were tried")
+    return found
 
 
 def _disagreeing(result: Mapping[str, Any]) -> list[str]:
@@ -117,8 +127,6 @@ def _disagreeing(result: Mapping[str, Any]) -> list[str]:
         id_, verdict, findings = item["id"], item["verdict"], len(item["failures"])
         if verdict == "pass" and not item["cases"]:
             found.append(f"{id_} passed without a case")
-        if verdict == "fail" and not findings:
-            found.append(f"{id_} failed without a finding")
         if findings and (verdict in {"skip", "not-claimed"} or (verdict == "pass" and item["level"] != "MAY")):
             found.append(f"{id_} has {findings} findings, but ended with {verdict!r}")
     if (result["finished"] or result["started"]) < result["started"]:

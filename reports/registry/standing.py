@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from reports.attestation.judging import Point, judge
+from reports.attestation.judging import SKEW, Point, judge
 from reports.attestation.policy import Known, Policy
 from reports.attestation.statement import passed, sha256
 from reports.registry.entries import Certificate
@@ -109,7 +109,7 @@ def histories(certificates: Iterable[Certificate], policy: Policy, known: Known,
     """Group certificates by robot (name and vendor), judge each by the policy, and return the robots sorted by name.
 
     A later certificate always supersedes an earlier one, whichever trusted key signed it and whatever its verdict: an
-    older result may no longer hold.
+    older result may no longer hold. Only a certificate that is dated in the future supersedes none.
     """
     by_robot: dict[tuple[str, str], list[Certificate]] = defaultdict(list)
     for certificate in certificates:
@@ -117,11 +117,16 @@ def histories(certificates: Iterable[Certificate], policy: Policy, known: Known,
         by_robot[robot.name or "", robot.vendor or ""].append(certificate)
     found = []
     for _, group in sorted(by_robot.items()):
-        latest_first = sorted(group, key=lambda one: (one.run.ended or _LONG_AGO, one.digest), reverse=True)
+        latest_first = sorted(group, key=lambda one: (_past(one.run.ended, now), one.digest), reverse=True)
         found.append(
             History(tuple(_standing(one, policy, known, now, first=not at) for at, one in enumerate(latest_first)))
         )
     return found
+
+
+def _past(ended: dt.datetime | None, now: dt.datetime) -> dt.datetime:
+    """Return when a run ended; long ago if that is not known or in the future, so that it supersedes nothing."""
+    return ended if ended is not None and ended <= now + SKEW else _LONG_AGO
 
 
 def _standing(certificate: Certificate, policy: Policy, known: Known, now: dt.datetime, *, first: bool) -> Standing:
