@@ -13,7 +13,13 @@ class Door:
     def known(_pack=None) -> dict[str, Any]:
         """Return what the suite knows."""
         ledger = {
-            id_: {"level": level, "classes": [id_.partition("/")[0]], "sets": ["1.2"], "decides": level == "MUST"}
+            id_: {
+                "level": level,
+                "text": "It does.",
+                "classes": [id_.partition("/")[0]],
+                "sets": ["1.2"],
+                "decides": level == "MUST",
+            }
             for id_, level in (("http/a", "MUST"), ("http/b", "MUST"), ("safety/c", "SHOULD"), ("describe/d", "MAY"))
         }
         return {
