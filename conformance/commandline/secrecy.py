@@ -15,7 +15,7 @@ import gzip
 import re
 import zlib
 from base64 import b64encode
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import takewhile
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -27,7 +27,10 @@ _SHORTEST_WORD: Final = 8
 # The beginning of a secret that is recognized where the text is cut after it, and how long such a secret is at least.
 _BEGINNING: Final = 8
 _LONG: Final = 12
-_CUT: Final = re.compile(r"\Z|\.\.\.|[\s…\"'`<\\]")
+_CUT: Final = re.compile(r"\Z|[\s\"'`<\\]")
+# Before an ellipsis, less of it is recognized.
+_ELLIPSIS: Final = re.compile(r"…|\.\.\.")
+_SHORTEST_CUT: Final = 4
 # An escape may itself be escaped; hostile text is not searched deeper than this.
 _DEPTH: Final = 4
 _ESCAPE: Final = re.compile(
@@ -172,9 +175,11 @@ class Secrets:
         lowered = text.lower()
         if len(lowered) != len(text):
             lowered = "".join(small if len(small := char.lower()) == 1 else char for char in text)
+        cuts = [found.start() for found in _ELLIPSIS.finditer(text)]
         for forms, where in ((self._folded, lowered), (self._exact, text)):
             for form in forms:
                 yield from _found(form, where)
+                yield from _cut_short(form, where, cuts)
         for unit in (_UNITS if depth == 0 else _UNITS[:1]) if depth < _DEPTH else ():
             plain = unit.sub(_decoded, text)
             if len(plain) != len(text) and (inner := [*self._spans(plain, depth + 1)]):
@@ -226,6 +231,15 @@ def _found(form: _Form, text: str) -> Iterator[tuple[int, int, str]]:
         if end - begin == len(form.whole) or _CUT.match(text, end):
             yield begin, end, form.variable
         begin = text.find(form.beginning, end)
+
+
+def _cut_short(form: _Form, text: str, cuts: Iterable[int]) -> Iterator[tuple[int, int, str]]:
+    """Yield where a text has some of a form of a secret before an ellipsis."""
+    for end in cuts:
+        for length in range(min(len(form.whole), end), _SHORTEST_CUT - 1, -1):
+            if text.startswith(form.whole[:length], end - length):
+                yield end - length, end, form.variable
+                break
 
 
 def _decoded(unit: re.Match[str]) -> str:

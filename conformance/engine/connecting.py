@@ -1,10 +1,13 @@
 """Make the settings of a connection from a statement: deadline, TLS, credentials, and a login where there is one."""
 
+import re
 from pathlib import Path
 from typing import Any, Final
+from urllib.parse import parse_qsl
 
 import msgspec
 
+from conformance.commandline.secrecy import SECRETS
 from conformance.documents.json_text import read_json
 from conformance.statement.endpoints import Auth, Endpoints
 from conformance.statement.statement import StatementError
@@ -15,6 +18,11 @@ from conformance.transport.reach import Trust
 
 # Places in which a description may want an API key (OpenAPI 3.1, Security Scheme Object).
 _PLACES: Final = frozenset({Kind.HEADER, Kind.QUERY, Kind.COOKIE})
+# The names of what proves who somebody is in a login and in its response: refresh_token, clientSecret, PIN.
+_PROOF: Final = re.compile(
+    r"(?:pass(?:word|wd|phrase|code)?|pwd|secret|\bpin|token|key|code|assertion|session|lease|ticket)(?:_?id)?$",
+    re.IGNORECASE,
+)
 
 
 def connection_of(where: Endpoints) -> Connection:
@@ -83,6 +91,7 @@ def _logged_in(auth: Auth, base_url: str, connection: Connection) -> Credential:
 
     method, target = auth.login.split(" ", 1)
     content = Path(auth.body_file).read_bytes() if auth.body_file else b""
+    _keep_parts(content)
     headers = [("Accept", "application/json"), *([("Content-Type", auth.content_type)] if content else [])]
     client = HttpClient(base_url, connection)
     try:
@@ -102,7 +111,22 @@ def _logged_in(auth: Auth, base_url: str, connection: Connection) -> Credential:
     if not isinstance(token, str) or not token.isprintable() or not token:
         raise StatementError(f"[auth] token = {auth.token!r}: the response to {auth.login} has no text there")
     place, _, name = auth.send_as.partition(" ")
-    return Credential(Kind(place), token, name)
+    found = Credential(Kind(place), token, name)
+    _keep_parts(response.body)
+    return found
+
+
+def _keep_parts(content: bytes) -> None:
+    """Mask the parts of a login's request or response that prove who somebody is, by their names: JSON or a form."""
+    waiting: list[tuple[str, Any]] = [("", read_json(content).value), *parse_qsl(content.decode("utf-8", "replace"))]
+    while waiting:
+        name, value = waiting.pop()
+        if isinstance(value, dict):
+            waiting += value.items()
+        elif isinstance(value, list):
+            waiting += [(name, one) for one in value]
+        elif isinstance(value, str) and _PROOF.search(name):
+            SECRETS.keep(value, "$ROAAS_LOGIN")
 
 
 def _secret(path: str) -> str:

@@ -61,6 +61,8 @@ _FORMS = {
     "mime": lambda s: base64.encodebytes(b"#" * 50 + s.encode() + b"#" * 20).decode(),
     "latin-1 header": lambda s: s.encode().decode("latin-1"),
     "cut": lambda s: f"{s[:-3]}…",
+    "cut after four": lambda s: f"{s[:4]}...",
+    "cut in json": lambda s: json.dumps(f"{s[:7]}…"),
     "cut in quotes": lambda s: f"`{s[:-2]}`",
 }
 _FORMS |= {
