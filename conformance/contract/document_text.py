@@ -12,9 +12,17 @@ from typing import Any, Final
 
 import yaml
 
-# An alias may repeat a large part; a few lines of them could name more nodes than a machine can hold.
-_MOST_NODES: Final = 5_000_000
-_DEEPEST: Final = 1_000
+# What a description may hold. The largest known ones have 12 MB, 500,000 values, and lie 60 deep.
+_MOST_OCTETS: Final = 32 * 1024 * 1024
+_MOST_NODES: Final = 1_000_000
+_DEEPEST: Final = 200
+_LONGEST_NAME: Final = 8_192
+# Each value of a JSON text but the first one follows one of these marks, which texts hold too.
+_MARKS_OF_VALUES: Final = ",[{"
+# A whole number with more digits is beyond every double.
+_MOST_DIGITS: Final = 400
+# Of names in a place, so many characters are shown, and so many names.
+_SHOWN: Final = 60
 _PLAIN: Final = "roaas:plain"
 _TAG: Final = "tag:yaml.org,2002:"
 _MARKS: Final = (
@@ -27,15 +35,8 @@ _WHOLE: Final = re.compile(r"[-+]?(?:0|[1-9][0-9]*)")
 _BASED: Final = re.compile(r"0(?:o[0-7]+|x[0-9a-fA-F]+)")
 _REAL: Final = re.compile(r"[-+]?(?:\.[0-9]+|(?:0|[1-9][0-9]*)(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _INFINITE: Final = re.compile(r"[-+]?\.(?:inf|Inf|INF)")
-# A list in a list in a list ... on one line, which the parser would follow to the end of its stack.
-_NESTED_LISTS: Final = re.compile(rf"(?:[-?:] +){{{_DEEPEST}}}")
-
-
-class _Loader(getattr(yaml, "CBaseLoader", yaml.BaseLoader)):  # type: ignore[misc] # libyaml's, where there is one
-    """Composes nodes; it marks plain scalars, whose type their text decides."""
-
-
-_Loader.add_implicit_resolver(_PLAIN, re.compile(""), None)
+# libyaml's, where there is one.
+_Loader: Final[Any] = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
 
 def parsed(octets: bytes, source: str = "") -> Any:
@@ -46,24 +47,57 @@ def parsed(octets: bytes, source: str = "") -> Any:
         source: its URL or path; one that ends with .json holds no YAML.
 
     Raises:
-        ValueError: it is neither, or is nested too deeply, or its aliases repeat too much.
+        ValueError: it is neither, or is longer or nested deeper than any description; the message names the place.
     """
+    if len(octets) > _MOST_OCTETS:
+        raise ValueError(f"it has {len(octets):,} bytes; the limit is {_MOST_OCTETS:,}")
     text = octets.decode(next((name for mark, name in _MARKS if octets.startswith(mark)), "utf-8"))
+    if not text.lstrip().startswith("{"):
+        return _yaml(text)
     try:
-        if not text.lstrip().startswith("{"):
-            return _yaml(text)
-        try:
-            return json.loads(text, parse_constant=_refused, parse_float=_real)
-        except ValueError:
-            if source.lower().endswith(".json"):
-                raise
-            return _yaml(text)
+        return _json(text)
+    except json.JSONDecodeError:
+        if source.lower().endswith(".json"):
+            raise
+        return _yaml(text)
+
+
+def _json(text: str) -> Any:
+    if sum(map(text.count, _MARKS_OF_VALUES)) > 4 * _MOST_NODES:
+        raise ValueError(f"it holds more than {_MOST_NODES:,} values")
+    try:
+        value = json.loads(text, parse_constant=_refused, parse_float=_real, parse_int=_whole)
     except RecursionError as error:
-        raise ValueError("it is nested too deeply") from error
+        raise ValueError(f"it is nested too deeply; the limit is {_DEEPEST} levels") from error
+    # Each entry: a value, and the names of those that hold it, the innermost first.
+    waiting: list[tuple[Any, Any, int]] = [(value, None, 0)]
+    nodes = 1
+    while waiting:
+        part, trail, depth = waiting.pop()
+        nodes += len(part)
+        if depth > _DEEPEST or nodes > _MOST_NODES:
+            over = f"more than {_MOST_NODES:,} values" if nodes > _MOST_NODES else f"more than {_DEEPEST} levels"
+            raise ValueError(f"it holds {over}, at {_pointer(trail)}")
+        for name, item in part.items() if isinstance(part, dict) else enumerate(part):
+            if isinstance(name, str) and len(name) > _LONGEST_NAME:
+                raise ValueError(
+                    f"a name has {len(name):,} characters; the limit is {_LONGEST_NAME:,}, at {_pointer(trail)}"
+                )
+            if item and isinstance(item, dict | list):
+                waiting.append((item, (name, trail), depth + 1))
+    return value
+
+
+def _pointer(trail: Any) -> str:
+    names: list[str] = []
+    while trail is not None:
+        name, trail = trail
+        names.append(str(name)[:_SHOWN].replace("~", "~0").replace("/", "~1"))
+    return "#/" + "/".join(names[: -_SHOWN - 1 : -1])
 
 
 def _refused(name: str) -> float:
-    raise ValueError(f"{name} is no number of JSON")
+    raise json.JSONDecodeError(f"{name} is no number of JSON", name, 0)
 
 
 def _real(text: str) -> float:
@@ -71,55 +105,134 @@ def _real(text: str) -> float:
     return max(-sys.float_info.max, min(sys.float_info.max, float(text)))
 
 
+def _whole(text: str) -> int | float:
+    return int(text, 0) if len(text) <= _MOST_DIGITS else _real(f"{text[:1] if text[0] == '-' else ''}9e999")
+
+
 def _yaml(text: str) -> Any:
-    depth = 0
-    for found in re.finditer(r"[\[{]|[\]}]", text):
-        depth = depth + 1 if found[0] in "[{" else max(0, depth - 1)
-        if depth > _DEEPEST:
-            raise ValueError("it is nested too deeply")
-    if _NESTED_LISTS.search(text):
-        raise ValueError("it is nested too deeply")
+    reader = _Reader(text)
     try:
-        node = yaml.compose(text, _Loader)
+        return reader.document()
     except yaml.YAMLError as error:
         raise ValueError(" ".join(str(error).replace('in "<unicode string>", ', "at ").split())) from error
-    if node is None:
-        return None
-    if _size(node, {}) > _MOST_NODES:
-        raise ValueError(f"its aliases repeat more than {_MOST_NODES:,} nodes")
-    return _value(node)
+    finally:
+        reader.close()
 
 
-def _size(node: yaml.Node, known: dict[int, int]) -> int:
-    """Return the number of nodes below a node, where each alias counts as often as it stands."""
-    if isinstance(node, yaml.ScalarNode):
-        return 1
-    if id(node) not in known:
-        known[id(node)] = _MOST_NODES + 1  # of a node inside itself
-        parts = [part for pair in node.value for part in pair] if isinstance(node, yaml.MappingNode) else node.value
-        known[id(node)] = 1 + sum(_size(part, known) for part in parts)
-    return known[id(node)]
+class _Reader:
+    """Makes values of YAML's events, one after the other, so that what they hold is counted as it comes."""
 
+    def __init__(self, text: str) -> None:
+        self._loader = _Loader(text)
+        self._event: Any = None
+        # The value of each anchor, with the nodes and the octets that an alias repeats.
+        self._anchors: dict[str, tuple[Any, int, int]] = {}
+        self._nodes = self._octets = 0
 
-def _value(node: yaml.Node) -> Any:
-    if isinstance(node, yaml.SequenceNode):
-        return [_value(item) for item in node.value]
-    if not isinstance(node, yaml.MappingNode):
-        return _scalar(node.tag, node.value)
-    own: dict[str, Any] = {}
-    merged: dict[str, Any] = {}
-    for key, item in node.value:
-        if not isinstance(key, yaml.ScalarNode):
-            raise ValueError(f"a key that is no text at line {key.start_mark.line + 1}")  # noqa: TRY004 - of the text
-        value = _value(item)
-        # YAML 1.2 has no merge key, but the tools that write and read descriptions do.
-        parts = value if isinstance(value, list) else [value]
-        if key.tag == _PLAIN and key.value == "<<" and all(isinstance(part, dict) for part in parts):
-            for part in parts:
-                merged = {**part, **merged}
+    def close(self) -> None:
+        self._loader.dispose()
+
+    def document(self) -> Any:
+        """Return the value of the only document; None if there is none."""
+        self._next()
+        if isinstance(self._next(), yaml.StreamEndEvent):
+            return None
+        self._next()
+        value = self._value(0)
+        self._next()
+        if not isinstance(self._next(), yaml.StreamEndEvent):
+            raise ValueError(f"a second document at line {self._line}")  # noqa: TRY004 - of the text
+        return value
+
+    @property
+    def _line(self) -> int:
+        return int(self._event.start_mark.line) + 1
+
+    def _next(self) -> Any:
+        self._event = self._loader.get_event()
+        return self._event
+
+    def _count(self, nodes: int, octets: int, depth: int) -> None:
+        self._nodes += nodes
+        self._octets += octets
+        over = {
+            f"{_MOST_NODES:,} values": self._nodes > _MOST_NODES,
+            f"{_MOST_OCTETS:,} characters": self._octets > _MOST_OCTETS,
+            f"{_DEEPEST} levels": depth > _DEEPEST,
+        }
+        if any(over.values()):
+            limit = next(limit for limit, is_over in over.items() if is_over)
+            raise ValueError(f"it holds more than {limit}, with what its aliases repeat, at line {self._line}")
+
+    def _value(self, depth: int) -> Any:
+        """Return the value that begins with the event at hand, which its last event follows."""
+        event, nodes, octets = self._event, self._nodes, self._octets
+        if isinstance(event, yaml.AliasEvent):
+            if event.anchor not in self._anchors:
+                raise ValueError(f"the alias *{event.anchor} of nothing, or of what holds it, at line {self._line}")
+            value, nodes, octets = self._anchors[event.anchor]
+            self._count(nodes, octets, depth)
+            return _copied(value)
+        is_scalar = isinstance(event, yaml.ScalarEvent)
+        self._count(1, len(event.value) if is_scalar else 0, depth)
+        if event.anchor is not None:
+            self._anchors.pop(event.anchor, None)
+        if is_scalar:
+            value = _scalar(_tag_of(event), event.value)
+        elif isinstance(event, yaml.SequenceStartEvent):
+            value = []
+            while not isinstance(self._next(), yaml.SequenceEndEvent):
+                value.append(self._value(depth + 1))
         else:
-            own[key.value] = value
-    return {**merged, **own}
+            value = self._mapping(depth + 1)
+        if event.anchor is not None:
+            self._anchors[event.anchor] = value, self._nodes - nodes, self._octets - octets
+        return value
+
+    def _mapping(self, depth: int) -> dict[str, Any]:
+        own: dict[str, Any] = {}
+        merged: dict[str, Any] = {}
+        while not isinstance(self._next(), yaml.MappingEndEvent):
+            tag, key = _PLAIN, self._key()
+            if isinstance(self._event, yaml.ScalarEvent):
+                tag = _tag_of(self._event)
+            self._count(0, len(key), depth)
+            if len(key) > _LONGEST_NAME:
+                raise ValueError(f"a key of {len(key):,} characters at line {self._line}")
+            self._next()
+            value = self._value(depth)
+            # YAML 1.2 has no merge key, but the tools that write and read descriptions do.
+            parts = value if isinstance(value, list) else [value]
+            if tag == _PLAIN and key == "<<" and all(isinstance(part, dict) for part in parts):
+                for part in parts:
+                    merged = {**part, **merged}
+            else:
+                own[key] = value
+        return {**merged, **own}
+
+    def _key(self) -> str:
+        event = self._event
+        if isinstance(event, yaml.ScalarEvent):
+            if event.anchor is not None:
+                self._anchors[event.anchor] = event.value, 1, len(event.value)
+            return str(event.value)
+        value, _, _ = self._anchors.get(event.anchor or "", (None, 0, 0))
+        if not isinstance(event, yaml.AliasEvent) or not isinstance(value, str):
+            raise ValueError(f"a key that is no text at line {self._line}")  # noqa: TRY004 - of the text
+        return value
+
+
+def _tag_of(event: Any) -> str:
+    """Return a scalar's tag; that of a plain one, whose type its text decides, is `_PLAIN`."""
+    if event.tag is not None and event.tag != "!":
+        return str(event.tag)
+    return _PLAIN if event.implicit[0] else _TAG + "str"
+
+
+def _copied(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_copied(item) for item in value]
+    return {key: _copied(item) for key, item in value.items()} if isinstance(value, dict) else value
 
 
 def _scalar(tag: str, text: str) -> Any:
@@ -129,9 +242,9 @@ def _scalar(tag: str, text: str) -> Any:
     if _NULL.fullmatch(text) or _BOOLEAN.fullmatch(text):
         return {"true": True, "false": False}.get(text.lower())
     if _WHOLE.fullmatch(text):
-        return int(text)
+        return _whole(text.removeprefix("+"))
     if _BASED.fullmatch(text):
-        return int(text, 0)
+        return _whole(text)
     if _REAL.fullmatch(text):
         return _real(text)
     return _real(text.replace(".", "")) if _INFINITE.fullmatch(text) else text

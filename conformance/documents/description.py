@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from os.path import normpath
@@ -15,6 +16,7 @@ from conformance.contract.document_text import parsed
 from conformance.documents.description_faults import unresolved
 from conformance.documents.json_schema import Schema, UnresolvedError
 from conformance.documents.overlay import OverlayError, overlaid
+from conformance.documents.schema_budget import crowd_in
 from conformance.documents.schema_places import DATA, FILES, make_plain
 from conformance.documents.schema_words import in_one_version
 from conformance.documents.sent_parameters import not_called, with_sent
@@ -22,7 +24,10 @@ from conformance.documents.swagger import as_openapi_3
 from conformance.documents.unreadable_parts import without_unreadable
 from conformance.transport.reach import ElsewhereError, Trust, is_same
 
+# All files of a description together: their number, their octets, and the time to fetch them, s.
 _MOST_FILES: Final = 5_000
+_MOST_OCTETS: Final = 64 * 1024 * 1024
+_MOST_S: Final = 120.0
 # Objects whose members have names that an author chose.
 _BY_NAME: Final = frozenset({"properties", "patternProperties", "dependentSchemas", "$defs", "definitions", "schemas"})
 _VARIABLE: Final = re.compile(r"\{([^{}]+)\}")
@@ -75,7 +80,7 @@ def read_description(source: str, load: Load, overlays: Iterable[str] = (), trus
         DescriptionError: it cannot be read, or is neither OpenAPI 3 nor Swagger 2.0.
     """
     try:
-        return _description(source, load, overlays, trust or Trust.of(source))
+        return _description(source, _within_budget(load), overlays, trust or Trust.of(source))
     except RecursionError as error:
         raise DescriptionError(f"{source} cannot be read: it is nested too deeply") from error
 
@@ -99,6 +104,8 @@ def _description(source: str, load: Load, overlays: Iterable[str], trust: Trust)
         raise DescriptionError(f"{source} is no OpenAPI description: it has neither 'openapi: 3...' nor 'swagger: 2.0'")
     if not isinstance(document.get("paths"), dict):
         raise DescriptionError(f"{source} describes no operation: it has no 'paths'")
+    if crowd := crowd_in(document):
+        raise DescriptionError(f"{source} cannot be read with its overlays: {crowd}")
     broken = unresolved(document)
     document = _without(document, frozenset(broken)) if broken else document
     uncalled: tuple[str, ...] = ()
@@ -151,7 +158,25 @@ def _parsed(source: str, load: Load) -> Schema:
         markup = octets.lstrip(_BLANK).startswith(b"<")
         what = ", but HTML or XML, such as a page for people, a login or a WSDL" if markup else ""
         raise DescriptionError(f"{source} is no description: it holds no object{what}")
+    if crowd := crowd_in(document):
+        raise DescriptionError(f"{source} cannot be read: {crowd}")
     return document
+
+
+def _within_budget(load: Load) -> Load:
+    """Return a function that loads as `load` does, until a description's files are too many octets or take too long."""
+    left, until = _MOST_OCTETS, time.monotonic() + _MOST_S
+
+    def loaded(source: str) -> bytes:
+        nonlocal left
+        if left < 0 or time.monotonic() > until:
+            limit = f"{_MOST_OCTETS:,} bytes" if left < 0 else f"{_MOST_S:g} s"
+            raise ValueError(f"the limit of a description's files is {limit}")
+        octets = load(source)
+        left -= len(octets)
+        return octets
+
+    return loaded
 
 
 @dataclass

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import copy
-from typing import Any
+import time
+from typing import Any, Final
 
 from conformance.documents.json_schema import Schema
+
+# So many places may the actions of an overlay change, and so many values may they add, in all; and how long, s.
+_MOST_PLACES: Final = 50_000
+_MOST_NODES: Final = 1_000_000
+_MOST_S: Final = 10.0
 
 
 class OverlayError(ValueError):
@@ -25,17 +31,31 @@ def overlaid(document: Schema, overlay: Schema) -> Schema:
     if "overlay" not in overlay or not isinstance(overlay.get("actions"), list):
         raise OverlayError("it is no overlay: it needs 'overlay' and a list of 'actions'")
     changed = copy.deepcopy(document)
+    places = nodes = 0
+    until = time.monotonic() + _MOST_S
     for number, action in enumerate(overlay["actions"]):
         if not isinstance(action, dict) or not isinstance(action.get("target"), str):
             raise OverlayError(f"actions[{number}] has no 'target'")
+        size = _size(action.get("update"))
         try:
-            matches = list(jsonpath.finditer(action["target"], changed))
+            matches = []
+            for match in jsonpath.finditer(action["target"], changed):
+                places, nodes = places + 1, nodes + size
+                if places > _MOST_PLACES or nodes > _MOST_NODES or time.monotonic() > until:
+                    limits = f"{_MOST_PLACES:,} places, {_MOST_NODES:,} values and {_MOST_S:g} s"
+                    raise OverlayError(f"actions[{number}] goes beyond the limit of an overlay: {limits}")
+                matches.append(match)
         except JSONPathError as error:
             raise OverlayError(f"actions[{number}] target {action['target']!r} is no JSONPath: {error}") from error
         # The last first, so that removing an item of a list does not move the next one.
         for match in reversed(matches):
             _apply(changed, list(match.parts), action)
     return changed
+
+
+def _size(value: Any) -> int:
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return 1 + sum(map(_size, parts))
 
 
 def _apply(document: Schema, parts: list[Any], action: Schema) -> None:

@@ -10,10 +10,14 @@ import jsonschema_rs
 
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed, resolved
 from conformance.documents.openapi import methods_of, read_operations
+from conformance.documents.schema_budget import Growth
 from conformance.documents.schema_places import schema_places
 from conformance.documents.schema_words import in_extension
 
 _UNREADABLE: Final = (UnresolvedError, AttributeError, TypeError, KeyError, ValueError)
+# Of a place so many characters are shown, and so many lines are.
+_SHOWN: Final = 300
+_LINES: Final = 200
 _META: Final = jsonschema_rs.validator_for({"$ref": "https://json-schema.org/draft/2020-12/schema"})
 
 
@@ -28,8 +32,12 @@ def without_unreadable(document: Schema) -> tuple[Schema, list[str]]:
         read_operations(bare)
     except _UNREADABLE:
         found, more = _without_operations(document, bare)
-        return found, [*lines, *more]
-    return document, lines
+        return found, _some([*lines, *more])
+    return document, _some(lines)
+
+
+def _some(lines: list[str]) -> list[str]:
+    return lines if len(lines) <= _LINES else [*lines[:_LINES], f"{len(lines) - _LINES:,} more are not judged"]
 
 
 def _bare(value: Any) -> Any:
@@ -42,15 +50,24 @@ def _bare(value: Any) -> Any:
 
 
 def _without_schemas(document: Schema) -> tuple[Schema, list[str]]:
-    if all(not _fault(schema) for schema in _outermost(document)):
+    growth = Growth(document)
+    every = (holder[key] for holder, key, pointer in schema_places(document) if not in_extension(pointer))
+    if not any(map(_fault, _outermost(document))) and not any(map(growth.fault, every)):
         return document, []
     found: Schema = deepcopy(document)
+    growth = Growth(found)
     lines = []
     # Inner ones first, so that as little as possible is left out.
     for holder, key, pointer in reversed(list(schema_places(found))):
-        if not in_extension(pointer) and (fault := _fault(holder[key])):
+        if in_extension(pointer):
+            continue
+        if fault := _fault(holder[key]):
+            fault = f"it is no JSON Schema: {fault}"
+        elif fault := growth.fault(holder[key]):
+            fault = f"it is too large: {fault}"
+        if fault:
             holder[key] = {}
-            lines.append(f"{pointer}: not judged: it is no JSON Schema: {fault}")
+            lines.append(f"{pointer[:_SHOWN]}: not judged: {fault}")
     return found, lines[::-1]
 
 

@@ -22,6 +22,9 @@ from conformance.transport.exchange import Exchange
 JSON = "application/json"
 XML = "application/xml"
 _DEPTH = 12
+# No value has more items or characters, whatever its schema demands.
+_MOST_ITEMS = 64
+_LONGEST = 1 << 16
 # What is there again in so many seconds is worth waiting for.
 _MOMENT_S = 2
 
@@ -177,11 +180,11 @@ def minimal(schema: Schema, depth: int = 0) -> Any:
         names = schema.get("required", ()) if depth < _DEPTH else ()
         return {name: minimal(schema.get("properties", {}).get(name, {}), depth + 1) for name in names}
     if kind == "array":
-        return [minimal(schema.get("items", {}), depth + 1) for _ in range(schema.get("minItems", 0))]
+        return [minimal(schema.get("items", {}), depth + 1) for _ in range(min(_MOST_ITEMS, schema.get("minItems", 0)))]
     if kind in {"number", "integer"}:
         least = schema.get("minimum", schema.get("exclusiveMinimum", 0) + (1 if "exclusiveMinimum" in schema else 0))
         return max(least, min(1, schema.get("maximum", max(least, 1))))
-    return True if kind == "boolean" else "a" * max(1, schema.get("minLength", 1))
+    return True if kind == "boolean" else "a" * min(_LONGEST, max(1, schema.get("minLength", 1)))
 
 
 def _without_null(schema: Schema) -> Schema:

@@ -127,7 +127,7 @@ def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:
         items = schema.get("items")
         one = sample(items if isinstance(items, dict) else {})
         yield [copy.deepcopy(one) for _ in range(schema["maxItems"] + 1)], "with more items than its maxItems"
-    if isinstance(schema.get("minItems"), int) and schema["minItems"] > 0:
+    if isinstance(schema.get("minItems"), int) and 0 < schema["minItems"] <= _MOST_ITEMS:
         items = schema.get("items")
         one = sample(items if isinstance(items, dict) else {})
         yield [copy.deepcopy(one) for _ in range(schema["minItems"] - 1)], "with fewer items than its minItems"
@@ -137,7 +137,7 @@ def _beyond_texts(schema: Schema) -> Iterator[tuple[Any, str]]:
     """Yield texts just outside a schema's bounds."""
     if isinstance(schema.get("maxLength"), int) and schema["maxLength"] <= LONG:
         yield "a" * (schema["maxLength"] + 1), "longer than its maxLength"
-    if isinstance(schema.get("minLength"), int) and schema["minLength"] > 0:
+    if isinstance(schema.get("minLength"), int) and 0 < schema["minLength"] <= LONG:
         yield "a" * (schema["minLength"] - 1), "shorter than its minLength"
     if isinstance(schema.get("pattern"), str):
         yield "~ roaas ~", "which its pattern excludes"

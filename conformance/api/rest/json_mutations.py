@@ -36,6 +36,8 @@ _NO_NUMBERS = (
 )
 _DEPTH = 100_000
 _DIGITS = 5_000
+# No text or list is made longer, wherever its bound lies.
+_LONGEST = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -238,16 +240,16 @@ def _of_bounds(whole: Any, place: Place) -> Iterator[Mutation[bytes]]:
     for key, step in (("minimum", -1), ("exclusiveMinimum", 0), ("maximum", 1), ("exclusiveMaximum", 0)):
         if isinstance(schema.get(key), int | float) and not isinstance(schema.get(key), bool):
             beyond.append((f"beyond its {key}", schema[key] + step))
-    if schema.get("minLength", 0) > 0:
+    if 0 < schema.get("minLength", 0) <= _LONGEST:
         beyond.append(("a text too short", "a" * (schema["minLength"] - 1)))
-    if "maxLength" in schema:
+    if schema.get("maxLength", _LONGEST) < _LONGEST:
         beyond.append(("a text too long", "a" * (schema["maxLength"] + 1)))
     if "pattern" in schema or "enum" in schema or "const" in schema:
         integers = kind_of(schema) == "integer"
         beyond.append(("a value that is not one of those allowed", 2**31 - 1 if integers else STRANGE_TEXT))
     if schema.get("minItems", 0) > 0 and isinstance(place.value, list):
         beyond.append(("too few items", place.value[: schema["minItems"] - 1]))
-    if "maxItems" in schema and isinstance(place.value, list) and place.value:
+    if schema.get("maxItems", _LONGEST) < _LONGEST and isinstance(place.value, list) and place.value:
         beyond.append(("too many items", [place.value[0]] * (schema["maxItems"] + 1)))
     if kind_of(schema) == "integer":
         beyond.append(("a fraction", 0.5))

@@ -11,6 +11,9 @@ from conformance.documents.pattern_python import for_python
 from conformance.documents.representation import discriminator_of, flat
 
 _DEPTH = 6
+# A value with so many members and items gets no more optional members; with so many more, it gets nothing else.
+_ENOUGH = 2_000
+_MOST = 20_000
 #: A value of each format that JSON Schema and OpenAPI name.
 FORMATS: Mapping[str, str] = {
     "uuid": "3fa85f64-5717-4562-b3fc-2c963f66afa6",
@@ -44,6 +47,12 @@ def sample(schema: Schema, depth: int = 0, *, whole: bool = False) -> Any:
         depth: how deep the value lies in another one.
         whole: whether objects get their optional members too.
     """
+    return _made(schema, depth, [_ENOUGH], whole=whole)
+
+
+def _made(schema: Schema, depth: int, room: list[int], *, whole: bool) -> Any:
+    """Return a value; ``room`` holds how many more members and items it may have."""
+    room[0] -= 1
     schema = flat(_not_null(schema))
     named = [schema[key] for key in ("example", "const", "default") if key in schema]
     named += [value for key in ("examples", "enum") if isinstance(schema.get(key), list) for value in schema[key]]
@@ -52,9 +61,9 @@ def sample(schema: Schema, depth: int = 0, *, whole: bool = False) -> Any:
         return chosen
     kinds = kinds_of(schema)
     if "object" in kinds:
-        return _object(schema, depth, whole=whole)
+        return _object(schema, depth, room, whole=whole)
     if "array" in kinds:
-        return _array(schema, depth, whole=whole)
+        return _array(schema, depth, room, whole=whole)
     if kinds & {"number", "integer"}:
         return _number(schema, "integer" if "number" not in kinds else "number")
     if kinds == {"boolean"}:
@@ -81,12 +90,14 @@ def _not_null(schema: Schema) -> Schema:
     return {**schema, **{key: parts for key, parts in kept.items() if parts}}
 
 
-def _object(schema: Schema, depth: int, *, whole: bool) -> dict[str, Any]:
+def _object(schema: Schema, depth: int, room: list[int], *, whole: bool) -> dict[str, Any]:
     properties = schema.get("properties", {})
     required = [name for name in schema.get("required", ()) if not properties.get(name, {}).get("readOnly")]
     optional = [name for name in properties if name not in required and not properties[name].get("readOnly")]
-    names = required + (optional if whole else []) if depth < _DEPTH else []
-    made = {name: sample(properties.get(name, {}), depth + 1, whole=whole) for name in names}
+    made: dict[str, Any] = {}
+    for name in required + (optional if whole else []) if depth < _DEPTH else []:
+        if room[0] > 0 or (name in required and room[0] > -_MOST):
+            made[name] = _made(properties.get(name, {}), depth + 1, room, whole=whole)
     return {**made, **_discriminating(schema, made)}
 
 
@@ -96,13 +107,15 @@ def _discriminating(schema: Schema, made: dict[str, Any]) -> dict[str, Any]:
     return {name: known[0]} if known and name in made and made[name] not in known else {}
 
 
-def _array(schema: Schema, depth: int, *, whole: bool) -> list[Any]:
+def _array(schema: Schema, depth: int, room: list[int], *, whole: bool) -> list[Any]:
     prefix = schema.get("prefixItems", [])
     least = max(int(schema.get("minItems", 0)), 1 if whole else 0)
-    items = [sample(part, depth + 1) for part in prefix]
+    items = [_made(part, depth + 1, room, whole=False) for part in prefix]
     rest = schema.get("items") if isinstance(schema.get("items"), dict) else {}
     for _ in range(min(least, schema.get("maxItems", least), 64) - len(items)):
-        item = sample(rest or {}, depth + 1)
+        if room[0] <= -_MOST:
+            break
+        item = _made(rest or {}, depth + 1, room, whole=False)
         items.append(_another(rest or {}, item, items) if schema.get("uniqueItems") else item)
     return items
 

@@ -1,0 +1,215 @@
+"""Find what no validator can judge by, because it unrolls to more parts than any memory holds.
+
+Ten references of each schema to the next, over ten schemas, are a file of a few kilobytes, and ten billion parts.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from typing import Any, Final
+
+from conformance.documents.json_schema import Schema, UnresolvedError, pointed
+
+# So many schemas may bind one value at once, by allOf, anyOf, oneOf, not, if, then, else and references.
+_MOST_AT_ONCE: Final = 5_000
+# The smallest value of a schema may have so many parts: members, items and characters.
+_LARGEST: Final = 1_000_000
+# So many references may follow each other, and so often schemas are looked at again.
+_DEEPEST: Final = 60
+_MOST_STEPS: Final = 50_000
+# A pattern may have so many characters, and quantifiers within quantifiers may repeat so often.
+_LONGEST_PATTERN: Final = 20_000
+_MOST_REPEATS: Final = 10_000
+# The patterns of a document may have so many states together: some 50 bytes each in an automaton.
+_MOST_STATES: Final = 3_000_000
+_STATES_OF_ONE: Final = 200_000
+_PART: Final = re.compile(r"\\.|\[(?:\\.|[^\]\\])*\]|\{(\d{1,9})(?:,(\d{0,9}))?\}|.", re.DOTALL)
+_SCHEMAS: Final = frozenset({"schema", "schemas", "definitions", "example", "value"})
+_SHOWN: Final = 60
+# Objects of a description, outside of its schemas, that a request or a response is made of; each may have so many.
+_CROWDS: Final = {
+    "paths": 10_000, "parameters": 1_000, "responses": 1_000, "content": 1_000, "headers": 1_000, "callbacks": 1_000,
+    "links": 1_000, "security": 1_000, "servers": 1_000, "encoding": 1_000, "examples": 10_000,
+    "securitySchemes": 1_000,
+}  # fmt: skip
+_SEVERAL: Final = ("allOf", "anyOf", "oneOf")
+_ONE: Final = ("not", "if", "then", "else")
+
+# Yields the schemas that count for a schema.
+Parts = Callable[[Schema], Iterator[Any]]
+
+
+class Growth:
+    """Judges the schemas of one document; what is beyond the budget counts as 1 for the schemas that refer to it."""
+
+    def __init__(self, document: Schema) -> None:
+        self._document = document
+        self._weights: dict[int, int] = {}
+        self._sizes: dict[int, int] = {}
+        self._patterns: dict[str, str] = {}
+        self._states = 0
+        self._seen: set[int] = set()
+        self._steps = 0
+        self._kept: list[Any] = []  # an id stands for its schema as long as that is kept
+
+    def fault(self, schema: Any) -> str:
+        """Return why nothing can be judged by a schema; empty if it can. Ask for inner schemas first."""
+        if not isinstance(schema, dict):
+            return ""
+        self._kept.append(schema)
+        if self._weight(schema, [])[0] > _MOST_AT_ONCE:
+            self._weights[id(schema)] = 1
+            return f"more than {_MOST_AT_ONCE:,} schemas bind one value, by allOf, anyOf, oneOf and references"
+        if self._size(schema, [])[0] > _LARGEST:
+            self._sizes[id(schema)] = 1
+            return f"its smallest value has more than {_LARGEST:,} parts"
+        names = schema.get("patternProperties")
+        patterns = [schema.get("pattern"), *(names if isinstance(names, dict) else ())]
+        return next(filter(None, (self._pattern_fault(one) for one in patterns if isinstance(one, str))), "")
+
+    def _pattern_fault(self, pattern: str) -> str:
+        if pattern not in self._patterns:
+            states, repeats = _unrolled(pattern) if len(pattern) <= _LONGEST_PATTERN else (0, 0)
+            self._states += min(states, _STATES_OF_ONE)
+            fault = f"a pattern of {len(pattern):,} characters" if len(pattern) > _LONGEST_PATTERN else ""
+            if repeats > _MOST_REPEATS:
+                fault = f"the nested quantifiers of a pattern repeat more than {_MOST_REPEATS:,} times"
+            if self._states > _MOST_STATES:
+                fault = f"the patterns of the document have more than {_MOST_STATES:,} parts"
+            self._patterns[pattern] = fault
+        return self._patterns[pattern]
+
+    def _target(self, schema: Schema) -> Any:
+        """Return what a schema refers to; None if it refers to nothing."""
+        try:
+            return pointed(self._document, schema["$ref"]) if isinstance(schema.get("$ref"), str) else None
+        except UnresolvedError:
+            return None
+
+    def _weight(self, schema: Any, trail: list[int]) -> tuple[int, int]:
+        """Return how many schemas bind a value of a schema, and how far up the trail the schema refers, if it does."""
+        return self._sum(schema, trail, self._weights, _MOST_AT_ONCE, self._weight_of)
+
+    def _size(self, schema: Any, trail: list[int]) -> tuple[int, int]:
+        """Return how many parts the smallest value of a schema has, likewise."""
+        return self._sum(schema, trail, self._sizes, _LARGEST, self._size_of)
+
+    def _sum(
+        self,
+        schema: Any,
+        trail: list[int],
+        known: dict[int, int],
+        most: int,
+        count: Callable[[Schema, list[int], list[int]], int],
+    ) -> tuple[int, int]:
+        if not isinstance(schema, dict):
+            return 1, len(trail)
+        if (found := known.get(id(schema))) is not None:
+            return found, len(trail)
+        if id(schema) in trail:
+            return 1, trail.index(id(schema))
+        self._steps += id(schema) in self._seen
+        self._seen.add(id(schema))
+        if len(trail) > _DEEPEST or self._steps > _MOST_STEPS:
+            return most + 1, len(trail)
+        lows = [len(trail)]
+        trail.append(id(schema))
+        total = count(schema, trail, lows)
+        trail.pop()
+        low = min(lows)
+        # A sum that left out what is on the trail holds for this trail alone.
+        if low >= len(trail):
+            known[id(schema)] = total
+        return total, low
+
+    def _weight_of(self, schema: Schema, trail: list[int], lows: list[int]) -> int:
+        total = 1
+        for part in self._at_once(schema):
+            weight, low = self._weight(part, trail)
+            lows.append(low)
+            total += weight
+            if total > _MOST_AT_ONCE:
+                break
+        return total
+
+    def _at_once(self, schema: Schema) -> Iterator[Any]:
+        if (target := self._target(schema)) is not None:
+            yield target
+        for key in _SEVERAL:
+            yield from schema[key] if isinstance(schema.get(key), list) else ()
+        yield from (schema[key] for key in _ONE if key in schema)
+        dependent = schema.get("dependentSchemas")
+        yield from dependent.values() if isinstance(dependent, dict) else ()
+
+    def _size_of(self, schema: Schema, trail: list[int], lows: list[int]) -> int:
+        def size(part: Any) -> int:
+            found, low = self._size(part, trail)
+            lows.append(low)
+            return found
+
+        sizes = [1, _number(schema, "minLength"), _number(schema, "minProperties")]
+        if least := _number(schema, "minItems"):
+            sizes.append(least * size(schema.get("items")))
+        required, properties = schema.get("required"), schema.get("properties")
+        if isinstance(required, list):
+            members = properties if isinstance(properties, dict) else {}
+            total = 1
+            for name in required:
+                total += size(members.get(name) if isinstance(name, str) else None)
+                if total > _LARGEST:
+                    break
+            sizes.append(total)
+        if (target := self._target(schema)) is not None:
+            sizes.append(size(target))
+        sizes += [size(part) for part in _list(schema, "allOf")]
+        for key in ("anyOf", "oneOf"):
+            if parts := _list(schema, key):
+                sizes.append(min(map(size, parts)))
+        return max(sizes)
+
+
+def _number(schema: Schema, word: str) -> int:
+    found = schema.get(word)
+    return int(found) if isinstance(found, int | float) and found > 0 else 0
+
+
+def _list(schema: Schema, word: str) -> list[Any]:
+    found = schema.get(word)
+    return found if isinstance(found, list) else []
+
+
+def _unrolled(pattern: str) -> tuple[int, int]:
+    """Return how many states a pattern has with its quantifiers unrolled, and how often nested ones repeat."""
+    # For each open group its parts: their states, repeats, and how deep quantifiers are nested in them.
+    groups: list[list[tuple[int, int, int]]] = [[]]
+    nested = 1
+    for found in _PART.finditer(pattern):
+        if found[0] == "(":
+            groups.append([])
+        elif found[0] == ")" and len(groups) > 1:
+            inner = groups.pop() or [(1, 1, 0)]
+            groups[-1].append((sum(one[0] for one in inner), *max(one[1:] for one in inner)))
+        elif found[1] and groups[-1] and (times := int(found[2] or found[1])) > 1:
+            states, repeats, depth = groups[-1].pop()
+            repeats = min(repeats * times, 10**9)
+            nested = max(nested, repeats if depth else 1)
+            groups[-1].append((min(states * times, 10**9), repeats, depth + 1))
+        else:
+            groups[-1].append((1, 1, 0))
+    return sum(one[0] for group in groups for one in group), nested
+
+
+def crowd_in(document: Schema) -> str:
+    """Return the place of a list or object with more members than a description has; empty if there is none."""
+    waiting: list[tuple[Any, str]] = [(document, "#")]
+    while waiting:
+        value, place = waiting.pop()
+        for name, part in value.items() if isinstance(value, dict) else enumerate(value):
+            if not isinstance(part, dict | list) or name in _SCHEMAS:
+                continue
+            most = _CROWDS.get(str(name))
+            if most is not None and len(part) > most:
+                return f"{place}/{name} has {len(part):,} members; the limit is {most:,}"
+            waiting.append((part, f"{place}/{str(name)[:_SHOWN]}"))
+    return ""
