@@ -142,7 +142,7 @@ class FrontDoor:
         try:
             code: int = pages.tell_change(old, new, threshold)
         except import_module("reports.errors").ReportError as error:
-            click.echo(f"not compared: {error}", err=True)
+            click.echo(f"not compared: {error.format_message()}", err=True)
             return int(pages.EXIT_INVALID)
         return code
 
@@ -153,7 +153,7 @@ class FrontDoor:
             for path in import_module("reports.latency.history").write_history(folder):
                 click.echo(f"history: {path}")
         except import_module("reports.errors").ReportError as error:
-            click.echo(f"no history: {error}", err=True)
+            click.echo(f"no history: {error.format_message()}", err=True)
 
     @staticmethod
     def description_changes(old: str, new: str) -> list[tuple[bool | None, str, str]]:

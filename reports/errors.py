@@ -6,11 +6,19 @@ and ends with exit code 2.
 
 from click import ClickException
 
+from reports.pages.untrusted import on_a_line
+
+_MOST = 1000
+
 
 class ReportError(ClickException):
     """The base class of these errors: no report can be written, or two results cannot be compared."""
 
     exit_code = 2
+
+    def format_message(self) -> str:
+        """Return the message for a terminal, on one line, as it may quote a file from anybody."""
+        return on_a_line(self.message, _MOST)
 
 
 class ResultMissingError(ReportError):

@@ -3,19 +3,14 @@
 import json
 from functools import cache
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import jsonschema_rs
 from jsonschema import Draft202012Validator
 from jsonschema.exceptions import ValidationError, best_match
 
-from reports.errors import (
-    ResultFormatError,
-    ResultGarbledError,
-    ResultInvalidError,
-    ResultMissingError,
-    ResultUnreadableError,
-)
+from reports.errors import ResultFormatError, ResultGarbledError, ResultInvalidError, ResultUnreadableError
+from reports.given_files import parsed, read_octets
 from reports.pages.untrusted import excerpt
 
 SCHEMA_DIR = Path(__file__).parent / "schemas"
@@ -80,20 +75,17 @@ def _read(path: Path, expected: str) -> dict[str, Any]:
 
 
 def _text(path: Path) -> str:
+    octets = read_octets(path, root=path.parent)
     try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise ResultMissingError(f"{path}: no such file") from error
+        return octets.decode("utf-8")
     except UnicodeDecodeError as error:
         octet = error.object[error.start]
         raise ResultUnreadableError(f"{path}: byte {error.start} (0x{octet:02x}) is not UTF-8") from error
-    except OSError as error:
-        raise ResultUnreadableError(f"{path}: {error.strerror or error}") from error
 
 
 def _parse(path: Path, text: str) -> Any:
     try:
-        return json.loads(text, parse_constant=_refuse_constant)
+        return parsed(text)
     except json.JSONDecodeError as error:
         near = excerpt(text[max(0, error.pos - 20) : error.pos + 20], 60)
         raise ResultGarbledError(
@@ -103,10 +95,6 @@ def _parse(path: Path, text: str) -> Any:
         raise ResultGarbledError(f"{path}: {error}") from error
     except RecursionError as error:
         raise ResultGarbledError(f"{path}: nested too deeply for a result") from error
-
-
-def _refuse_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is not a JSON number (RFC 8259, section 6)")
 
 
 def _where(error: ValidationError) -> str:

@@ -13,6 +13,7 @@ from reports.certificate.seal import Seal
 from reports.errors import ReportError, ResultMissingError, ResultUnsignableError
 from reports.fleet.page import fleet_html, fleet_markdown
 from reports.formats.catalogue import FORMATS
+from reports.given_files import read_octets, showing
 from reports.latency.junit import latency_junit
 from reports.pages.page import write_pages
 from reports.reading import FLEET_NAME, LATENCY_NAME, RESULT_NAME, read_fleet, read_latency, read_result
@@ -52,7 +53,9 @@ def render(directory: Path, notary: "Notary | None" = None) -> list[Path]:
     problems: list[ReportError] = []
     for path in found:
         try:
-            written += write_pages(directory, pages[path.name](path))
+            with showing(path):
+                made = pages[path.name](path)
+            written += write_pages(directory, made)
         except ReportError as error:
             problems.append(error)
             if isinstance(error, ResultUnsignableError):
@@ -68,7 +71,10 @@ def render_formats(directory: Path, names: Sequence[str]) -> list[Path]:
     Raises:
         ReportError: as for `render`.
     """
-    return write_pages(directory, _in_formats(read_result(directory / RESULT_NAME), names))
+    path = directory / RESULT_NAME
+    with showing(path):
+        made = _in_formats(read_result(path), names)
+    return write_pages(directory, made)
 
 
 def _in_formats(result: Mapping[str, Any], names: Sequence[str]) -> dict[str, str]:
@@ -77,7 +83,7 @@ def _in_formats(result: Mapping[str, Any], names: Sequence[str]) -> dict[str, st
 
 def _conformance(path: Path, notary: "Notary | None") -> dict[str, str]:
     document = read_result(path)
-    octets = path.read_bytes()
+    octets = read_octets(path, root=path.parent)
     digest = sha256(octets)
     if notary:
         notary.check(path, octets, document)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import msgspec
 
 from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
 from conformance.commandline.exit_codes import ExitCode
@@ -16,11 +16,11 @@ from conformance.commandline.terminal import inert
 from conformance.contract.described import copy_as_data
 from conformance.contract.locating import ContractError, is_installed
 from conformance.contract.pack import DEFAULT_PACK, Contract
+from conformance.engine.stored_result import MALFORMED, StoredResultError, not_well_made, read_result
 
 if TYPE_CHECKING:
     from conformance.statement.statement import Statement
 
-_FORMAT = "roaas-result/1"
 _TIMEOUT_S = 10.0
 _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
 
@@ -91,12 +91,15 @@ def replay(  # noqa: C901 - one branch for each way to judge
     end_like_ctrl_c()
     end_with_parent()
     folder = result if result.is_dir() else result.parent
-    document = _read(folder / "result.json" if result.is_dir() else result)
+    try:
+        document = read_result(result / "result.json" if result.is_dir() else result)
+    except StoredResultError as error:
+        raise click.UsageError(str(error)) from error
     token = Path(token_file).read_text(encoding="utf-8").strip() if token_file else None
     connection = Connection(timeout_s=timeout_s or _TIMEOUT_S, ca_file=Path(ca_file) if ca_file else None, token=token)
-    if recorded:
-        return _judge_recorded(document, folder, statement_file, pack, requirement)
     try:
+        if recorded:
+            return _judge_recorded(document, folder, statement_file, pack, requirement)
         chosen = list(findings(document, requirement))
         if not chosen:
             raise click.UsageError(f"{result} has no finding" + (f" of {requirement}" if requirement else ""))
@@ -105,27 +108,28 @@ def replay(  # noqa: C901 - one branch for each way to judge
             requirements = {id_ for id_, _ in chosen}
             contract = None if _names_description(statement_file) and not pack else _contract_of(document, pack, folder)
             return _judge_again(document, contract, statement_file, given, requirements, allow_motion=allow_motion)
-        acting = [] if allow_motion else [failure for _, failure in chosen if moves(failure)]
-        chosen = [one for one in chosen if one[1] not in acting]
+        # The contract at hand judges what was judged by it.
+        contract = _contract_of(document, pack, folder)
+        rest = document["target"].get("rest") if contract else None
+        sure = [allow_motion or not moves(failure, contract, rest or "") for _, failure in chosen]
+        acting = [failure for (_, failure), may in zip(chosen, sure, strict=True) if not may]
+        chosen = [one for one, may in zip(chosen, sure, strict=True) if may]
         if not chosen:
             raise click.UsageError("these requests may move the robot: add --allow-motion, or name one that only reads")
         if token:
             _check_addresses([failure for _, failure in chosen], trusted)
-        # The contract at hand judges what was judged by it.
-        contract = _contract_of(document, pack, folder)
-        rest = document["target"].get("rest") if contract else None
         replayed = [send_again(id_, failure, connection, rest, contract) for id_, failure in chosen]
-    except (KeyError, TypeError, ValueError) as error:
-        raise click.UsageError(f"{result} is no well-made {_FORMAT}: {error!r}") from error
+    except MALFORMED as error:
+        raise click.UsageError(str(not_well_made(result, error))) from error
     for one in replayed:
         now = f"now {one.came}" if one.came else ""
         if one.sent:
             judged = f" (judged {one.told_by})" if one.told_by else ""
             now += f", after {one.sent} request{'' if one.sent == 1 else 's'}{judged}"
         told = ". ".join(filter(None, (one.why, now, f"In the run: {one.message}")))
-        click.echo(f"{one.outcome}: {one.requirement}: {inert(told)}")
+        click.echo(f"{one.outcome}: {inert(one.requirement)}: {inert(told)}")
     if acting:
-        numbers = ", ".join(str(failure.get("number", "")) for failure in acting)
+        numbers = inert(", ".join(str(failure.get("number", "")) for failure in acting))
         click.echo(f"not sent, because they may move the robot: finding {numbers}; --allow-motion sends them")
     outcomes = {one.outcome for one in replayed}
     if Outcome.STILL_THERE in outcomes:
@@ -142,8 +146,6 @@ def _judge_again(
     *,
     allow_motion: bool,
 ) -> CommandResult:
-    import msgspec  # noqa: PLC0415 - as above
-
     from conformance.documents.description import DescriptionError  # noqa: PLC0415
     from conformance.engine.replay import judged_by_checks  # noqa: PLC0415
     from conformance.statement.statement import StatementError, load_statement  # noqa: PLC0415
@@ -169,7 +171,7 @@ def _judge_again(
             effort=document["effort"],
         )
     except UnreachableError as error:
-        click.echo(f"cannot tell: the device does not respond: {error}")
+        click.echo(f"cannot tell: the device does not respond: {inert(str(error))}")
         return CommandResult(ExitCode.INCONCLUSIVE)
     except (StatementError, ContractError, DescriptionError, OSError) as error:
         raise click.UsageError(str(error)) from error
@@ -280,16 +282,6 @@ def _contract_of(document: dict[str, Any], pack: str | None, folder: Path) -> Co
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return contract if document["suite"]["contract"] == contract.label else None
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise click.UsageError(f"{path} cannot be read: {error}") from error
-    if not isinstance(document, dict) or document.get("format") != _FORMAT:
-        raise click.UsageError(f"{path} is no {_FORMAT}")
-    return document
 
 
 def _counted(cases: int) -> str:

@@ -55,6 +55,6 @@ class ResultCommand(click.Command):
                         click.echo(f"report: {path}")
             except (OSError, click.ClickException) as error:
                 # The verdict stands without its pages.
-                said = error.message if isinstance(error, click.ClickException) else error
+                said = error.format_message() if isinstance(error, click.ClickException) else error
                 click.echo(f"the pages could not be written or signed: {said}. {result.file} is kept", err=True)
         ctx.exit(result.exit_code)

@@ -10,12 +10,16 @@ from pathlib import Path
 from typing import Any, Final
 
 from conformance.commandline.atomic_write import write_atomically, write_json
+from conformance.commandline.given_files import read_json, read_octets
 from conformance.contract.locating import MANIFEST
 from conformance.contract.toml_file import basic_string
 
 DOCUMENT_NAME: Final = "openapi.json"
 ORIGINAL_NAME: Final = "original.json"
 UNRESOLVED_NAME: Final = "unresolved.json"
+# What a run writes of a description into its result: data, and nothing else is read of it.
+_DATA_NAMES: Final = (DOCUMENT_NAME, ORIGINAL_NAME, UNRESOLVED_NAME, "wsdl.json")
+_MOST_MANIFEST: Final = 64 * 1024
 #: How the contract is called in verdicts: "keeps its own description".
 TITLE: Final = "its own description"
 #: The class that a motion map claims.
@@ -89,14 +93,15 @@ def copy_as_data(pack: Path, folder: Path) -> Path:
     Raises:
         OSError, ValueError, KeyError, TypeError: the pack is malformed.
     """
-    given = tomllib.loads((pack / MANIFEST).read_text(encoding="utf-8"))
+    given = tomllib.loads(read_octets(pack / MANIFEST, most=_MOST_MANIFEST).decode("utf-8"))
     lines = [f"{key} = {basic_string(str(given[key]))}" for key in ("name", "version", "title")]
     lines += ["closed_answers = true", "described = true"]
     lines += [f"without = {json.dumps([str(one) for one in given.get('without', ())])}"]
     lines += [f"\n[[class]]\nname = {basic_string(str(one['name']))}" for one in given["class"]]
     (folder / MANIFEST).write_text("\n".join(lines) + "\n", encoding="utf-8")
-    for file in pack.glob("*.json"):
-        (folder / file.name).write_text(json.dumps(json.loads(file.read_text(encoding="utf-8"))), encoding="utf-8")
+    for file in (path for path in map(pack.joinpath, _DATA_NAMES) if path.exists()):
+        text = json.dumps(read_json(read_octets(file)))
+        (folder / file.name).write_text(text, encoding="utf-8")
     return folder
 
 

@@ -1,9 +1,12 @@
-"""Compare two descriptions of an API, from URLs or files."""
+"""Compare two descriptions of an API, from URLs, files or results."""
 
+from pathlib import Path
+
+from conformance.commandline.given_files import read_octets
 from conformance.documents.compatibility import Change, changes
-from conformance.documents.description import DescriptionError
+from conformance.documents.description import Description, DescriptionError, read_description
 from conformance.documents.json_schema import UnresolvedError
-from conformance.engine.describing import fetch_description
+from conformance.engine.describing import FOLDER, fetch_description
 from conformance.transport.client import Connection
 
 
@@ -15,7 +18,10 @@ def compared(old: str, new: str) -> list[Change]:
         UnreachableError: a server does not respond.
     """
     connection = Connection()
-    descriptions = [fetch_description(source, (), connection) for source in (old, new)]
+    descriptions = [
+        _of_result(source) if _is_of_result(source) else fetch_description(source, (), connection)
+        for source in (old, new)
+    ]
     # What a reference leads to may have changed, even if the reference did not.
     unread = [
         Change(None, source, f"not compared: {reference}")
@@ -26,3 +32,24 @@ def compared(old: str, new: str) -> list[Change]:
         return [*changes(*(one.document for one in descriptions)), *unread]
     except (UnresolvedError, AttributeError, TypeError, KeyError) as error:
         raise DescriptionError(f"{old} and {new} cannot be compared, one is malformed: {error!r}") from error
+
+
+def _is_of_result(source: str) -> bool:
+    """Return whether a file is the description that a run wrote into its result: nothing that it refers to is read."""
+    folder = Path(source).parent
+    return folder.name == FOLDER and (folder.parent / "result.json").exists()
+
+
+def _of_result(source: str) -> Description:
+    """Return the description in a result, which is a whole one.
+
+    Raises:
+        DescriptionError: it cannot be used.
+    """
+
+    def load(place: str) -> bytes:
+        if place != source:
+            raise OSError("the description of a result leads nowhere else")
+        return read_octets(Path(source))
+
+    return read_description(source, load)

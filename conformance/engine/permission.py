@@ -8,27 +8,50 @@ import re
 from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any, Final
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
+import msgspec
+
+from conformance.api.call_rules import CallRules
+from conformance.api.permission import Permission
 from conformance.contract.pack import Contract
-from conformance.engine.resending import read_request
+from conformance.documents.openapi import Operation
+from conformance.engine.resending import read_sequence
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import empty_statement
 from conformance.transport.exchange import SAFE_METHODS, Request
+from conformance.verdict.run import Run
 
-# Servers differ in where they see one request end and the next one begin, so a method that writes counts wherever it
-# stands; and some take the method from a field (X-HTTP-Method-Override).
-_WRITES: Final = re.compile(rb"(?:PUT|POST|DELETE|PATCH)[ \t]|method", re.IGNORECASE)
+# By these a server may take another method than the request line's, in the query or in a field: _method=PUT,
+# X-HTTP-Method-Override.
+_OVERRIDES: Final = re.compile(r"method|(?:PUT|POST|DELETE|PATCH)[ \t]", re.IGNORECASE)
+# Fields by which a server may take another target, or see the request end elsewhere: X-Original-URL, Transfer-Encoding.
+_ALTERS: Final = re.compile(
+    r"transfer|trailer|upgrade|expect|settings|destination"
+    r"|(?:original|rewrite|forwarded)[-_]?(?:url|uri|path|prefix)",
+    re.IGNORECASE,
+)
 _PORTS: Final = {"http": 80, "https": 443}
 
 
-def moves(failure: Mapping[str, Any]) -> bool:
+def moves(failure: Mapping[str, Any], contract: Contract | None = None, base_url: str = "") -> bool:
     """Return whether sending a finding's requests again may move the robot.
+
+    Args:
+        failure: the finding, as in result.json.
+        contract: the contract that judged, whose operations may say that a GET moves the robot; None: unknown.
+        base_url: of the robot's REST interface.
 
     Raises:
         ValueError, KeyError, TypeError: the finding is malformed.
     """
-    requests = (read_request(item) for item in failure.get("sequence") or ())
     # What was too large to be kept is not sent.
-    return any(request is not None and not _only_reads(request) for request in requests)
+    requests = read_sequence(failure.get("sequence") or ())
+    permission = None
+    if contract is not None and base_url:
+        statement = msgspec.structs.replace(empty_statement(contract), endpoints=Endpoints(rest=base_url))
+        permission = Permission(Run(statement, contract))
+    return not all(_only_reads(request, permission) for request in requests)
 
 
 def strangers(failure: Mapping[str, Any], trusted: Iterable[str]) -> list[str]:
@@ -55,30 +78,46 @@ def origin(url: str) -> str:
     return f"{parts.scheme}://{host}:{parts.port or _PORTS[parts.scheme]}"
 
 
-def _only_reads(request: Request) -> bool:
-    if request.raw is not None:
-        return not _WRITES.search(request.raw)
-    if any(_WRITES.search(f"{name}: {value}".encode()) for name, value in request.headers):
+def _only_reads(request: Request, permission: Permission | None) -> bool:
+    """Return whether a request provably reads: by its method, its target, its fields, and no body to hide another in.
+
+    Raw bytes never do: each server reads them in its own way.
+    """
+    parts = (unquote(urlsplit(request.url).query), *(part for pair in request.headers for part in pair))
+    alters = any(map(_OVERRIDES.search, parts)) or any(_ALTERS.search(name) for name, _ in request.headers)
+    if request.raw is not None or alters:
         return False
-    return request.method in SAFE_METHODS or (request.method == "POST" and _asks(request.body))
+    if request.method == "POST":
+        return _asks(request)
+    path = unquote(urlsplit(request.url).path)
+    harmless = CallRules().decide(Operation(path, request.method, path)).may
+    allowed = permission is None or not permission.refusal(request.method, request.url)
+    return request.method in SAFE_METHODS and not request.body and harmless and allowed
 
 
-def _asks(body: bytes) -> bool:
-    """Return whether a body is a SOAP message for one of the contract's read-only operations."""
+def _asks(request: Request) -> bool:
+    """Return whether a request is a SOAP message for a read-only operation of the contract, to the service's path."""
     # Imported late: lxml and xmlschema cost a third of a second that a REST finding need not pay.
     from conformance.api.soap.envelope import NotSoapError, read  # noqa: PLC0415
 
     try:
-        message = read(body)
+        message = read(request.body)
     except NotSoapError:
         return False
-    return len(message.payload) == 1 and str(message.payload[0].tag) in _questions()
+    places, questions = _questions()
+    asked = {str(one.tag) for one in message.payload}
+    return urlsplit(request.url).path in places and len(message.payload) == 1 and asked <= questions
 
 
 @cache
-def _questions() -> frozenset[str]:
-    """Return the input elements of the operations of the contract's subscribers service."""
+def _questions() -> tuple[frozenset[str], frozenset[str]]:
+    """Return the paths of the contract's subscribers service, and the input elements of its operations."""
     from conformance.documents.wsdl import read_file  # noqa: PLC0415 - as above
 
-    operations = read_file(path).operations if (path := Contract.load().subscribers_path) else ()
-    return frozenset(operation.request for operation in operations if operation.request)
+    path = Contract.load().subscribers_path
+    found = read_file(path) if path else None
+    if found is None:
+        return frozenset(), frozenset()
+    places = (str(element.get("location")) for element in found.all("w:service/w:port/s:address"))
+    inputs = (operation.request for operation in found.operations)
+    return frozenset(urlsplit(place).path for place in places), frozenset(filter(None, inputs))

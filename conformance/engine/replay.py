@@ -19,7 +19,7 @@ from conformance.engine.by_description import SECURITY, fails_by_description
 from conformance.engine.certification import certify
 from conformance.engine.connecting import connection_of
 from conformance.engine.refused import is_refused
-from conformance.engine.resending import read_request, send_again
+from conformance.engine.resending import read_sequence, send_again
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.statement import Statement, empty_statement
 from conformance.transport.client import Connection, HttpClient
@@ -110,7 +110,7 @@ def replay(
         ValueError, KeyError, TypeError: the result is malformed.
     """
     message, sequence = str(failure["message"]), failure.get("sequence") or []
-    requests = [request for item in sequence if (request := read_request(item)) is not None]
+    requests = read_sequence(sequence)
     if failure["response"] is None or not requests or len(requests) < len(sequence):
         return Replayed(id_, message, Outcome.UNKNOWN, why=_ALONE)
     came: list[Attempt] = []

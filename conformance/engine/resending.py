@@ -36,6 +36,7 @@ from conformance.verdict.run import Run
 # Octets of one request in a result, compressed; and as they are sent: twice the contract's limit and a half.
 _MOST = 64 * 1024
 _MOST_SENT = 25 * 1024 * 1024
+_MOST_IN_ALL = 4 * _MOST_SENT
 # What a request is made of on the wire (RFC 9110 5.6.2, 5.5; RFC 9112 3.2): no place for another request in it.
 _TOKEN = re.compile(r"[!#$%&'*+.^_`|~0-9A-Za-z-]+")
 _TARGET = re.compile(r"https?://[\x21-\x7e]+")
@@ -120,6 +121,23 @@ def read_request(item: dict[str, Any]) -> Request | None:
         if not pattern.fullmatch(text):
             raise ValueError(f"{text[:80]!r} cannot be a part of a request")
     return Request(method, url, headers, body, octets)
+
+
+def read_sequence(items: Iterable[dict[str, Any]]) -> list[Request]:
+    """Return the requests of a finding from their JSON, without those that were too large to be stored.
+
+    Raises:
+        ValueError, KeyError, TypeError: the JSON is malformed, or the requests are larger in all than a run stores.
+    """
+    found: list[Request] = []
+    octets = 0
+    for request in map(read_request, items):
+        if request is not None:
+            found.append(request)
+            octets += len(request.body) + len(request.raw or b"")
+        if octets > _MOST_IN_ALL:
+            raise ValueError(f"requests of more than {_MOST_IN_ALL:,} octets")
+    return found
 
 
 def send_again(request: Request, connection: Connection) -> Attempt:

@@ -31,10 +31,10 @@ from conformance.transport.pace import time_for
 
 # What a recipient may forgive in a header section, and a server must not send (RFC 9112 2.2, 5.2).
 _FORGIVEN = re.compile(rb"(?<!\r)\n|\r(?!\n)|\n[ \t]")
-# A request line, wherever it stands (a body may end without a line end), and one that writes without a version.
+# A request line wherever it stands, with any whitespace that servers may forgive (RFC 9112 3); one without a version.
 _REQUEST_LINE = re.compile(
-    rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+)[ \t]+([^ \t\r\n]+)[ \t]+HTTP/"
-    rb"|(?:\A|[\r\n])[ \t]*(PUT|POST|DELETE|PATCH)[ \t]+([^ \t\r\n]+)"
+    rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+)[ \t\v\f\r]+([^ \t\v\f\r\n]+)[ \t\v\f\r]+HTTP/|(?:\A|[\r\n])[ \t\v\f]*"
+    rb"((?:PUT|POST|DELETE|PATCH)(?=[ \t\v\f])|[A-Za-z-]+(?=[ \t\v\f]+(?:/|https?:)))[ \t\v\f]+([^ \t\v\f\r\n]+)"
 )
 _MOST = 4 * 1024 * 1024
 # The least that a connection is waited for, s.

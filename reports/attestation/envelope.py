@@ -14,7 +14,8 @@ from typing import Annotated, Any, NamedTuple
 import msgspec
 
 from reports.attestation.statement import PAYLOAD_TYPE, PREDICATE_TYPE, STATEMENT_TYPE, Statement
-from reports.errors import EnvelopeRefusedError, ResultMissingError, ResultUnreadableError
+from reports.errors import EnvelopeRefusedError
+from reports.given_files import read_octets
 
 ENVELOPE_NAME = "certificate.intoto.json"
 _MOST_BYTES = 4 << 20
@@ -52,15 +53,9 @@ def read_envelope(path: Path) -> bytes:
 
     Raises:
         ResultMissingError: the file does not exist.
-        ResultUnreadableError: the file cannot be read.
+        ResultUnreadableError: the file cannot be read, or is no regular file.
     """
-    try:
-        with path.open("rb") as file:
-            return file.read(_MOST_BYTES + 1)
-    except FileNotFoundError as error:
-        raise ResultMissingError(f"{path}: no such file") from error
-    except OSError as error:
-        raise ResultUnreadableError(f"{path}: {error.strerror or error}") from error
+    return read_octets(path, _MOST_BYTES + 1, cut=True)
 
 
 def open_envelope(octets: bytes) -> Opened:

@@ -18,8 +18,10 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from securesystemslib.signer import CryptoSigner, SSlibKey
 
-from reports.errors import KeyUnusableError
+from reports.errors import KeyUnusableError, ReportError
+from reports.given_files import read_octets
 
+_MOST_BYTES = 1 << 20
 PRIVATE_NAME = "signing-key.pem"
 PUBLIC_NAME = "public-key.pem"
 _FITS_MANY = b"\1" + bytes(63)
@@ -107,6 +109,6 @@ def _named(key: Ed25519PublicKey) -> SSlibKey:
 
 def _octets(path: Path) -> bytes:
     try:
-        return path.read_bytes()
-    except OSError as error:
-        raise KeyUnusableError(f"{path}: {error.strerror or error}") from error
+        return read_octets(path, _MOST_BYTES)
+    except ReportError as error:
+        raise KeyUnusableError(error.message) from error

@@ -9,7 +9,10 @@ from typing import Annotated, Literal
 import msgspec
 
 from reports.attestation.outcomes import Entry
-from reports.errors import PolicyUnusableError
+from reports.errors import PolicyUnusableError, ReportError
+from reports.given_files import read_octets
+
+_MOST_BYTES = 1 << 20
 
 _Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
 OWN = "installed"
@@ -88,10 +91,10 @@ def read_policy(path: Path, known: Known) -> Policy:
             profile.
     """
     try:
-        policy = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Policy)
-    except OSError as error:
-        raise PolicyUnusableError(f"{path}: {error.strerror or error}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+        policy = msgspec.convert(tomllib.loads(read_octets(path, _MOST_BYTES).decode("utf-8")), Policy)
+    except ReportError as error:
+        raise PolicyUnusableError(error.message) from error
+    except (ValueError, RecursionError) as error:  # no UTF-8, no TOML, or another type
         raise PolicyUnusableError(f"{path}: {error}") from error
     if policy.classes is None and policy.profile not in known.profiles:
         raise PolicyUnusableError(f"{path}: profile = {policy.profile!r} must be one of {', '.join(known.profiles)}")

@@ -17,7 +17,8 @@ from reports.attestation.judging import Point, judge
 from reports.attestation.policy import Known, Policy
 from reports.attestation.signature import unseal
 from reports.attestation.statement import RESULT_SUBJECT, Statement, run_of
-from reports.errors import ResultMissingError, ResultUnreadableError
+from reports.errors import ResultMissingError
+from reports.given_files import read_octets
 
 PROVED = (
     "Proved: the holder of this key vouches that this run took place and gave this result, and nothing was changed "
@@ -82,11 +83,9 @@ def _result_in(directory: Path) -> Any:
     """Return the content of result.json as it was parsed, without validation; None if it is not JSON."""
     path = directory / RESULT_SUBJECT
     try:
-        return strict_json(path.read_bytes())
-    except FileNotFoundError as error:
+        return strict_json(read_octets(path, root=directory))
+    except ResultMissingError as error:
         raise ResultMissingError(f"{path}: no such file. --result DIR is the folder that the vendor sent") from error
-    except OSError as error:
-        raise ResultUnreadableError(f"{path}: {error.strerror or error}") from error
     except (ValueError, RecursionError):
         return None
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from reports.pages.page import html_page, markdown_page
-from reports.pages.untrusted import excerpt
+from reports.pages.untrusted import on_a_line
 
 _NAMED = 5
 _SHOWN = 200
@@ -69,7 +69,9 @@ def changes_text(found: DescriptionChanges) -> str:
     lines = [found.headline]
     for heading, changes in found.groups:
         lines += ["", f"{heading} ({len(changes)}):"]
-        lines += [f"  {excerpt(_named(operations), 400)}: {excerpt(text, 400)}" for text, operations in changes.items()]
+        lines += [
+            f"  {on_a_line(_named(operations), 400)}: {on_a_line(text, 400)}" for text, operations in changes.items()
+        ]
     return "\n".join(lines)
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 from reports.certificate.difference import MEANINGS, Difference, Kind
 from reports.pages.page import html_page, markdown_page, opened
-from reports.pages.untrusted import excerpt
+from reports.pages.untrusted import on_a_line
 
 SHOWN = 50
 """Requirements of one kind of change that are listed; the rest are counted."""
@@ -27,14 +27,14 @@ def difference_text(found: Difference) -> str:
     for kind, changes in found.groups.items():
         lines += ["", f"{opened(kind)} ({len(changes)}). {MEANINGS[kind]}"]
         for change in changes[:SHOWN]:
-            lines.append(f"  {change.id} ({change.course})")
+            lines.append(f"  {on_a_line(change.id)} ({on_a_line(change.course)})")
             if change.reason and kind in {Kind.NEW_FAILURE, Kind.LOST, Kind.NEW_WARNING}:
-                lines.append(f"      {excerpt(change.reason, 200)}")
+                lines.append(f"      {on_a_line(change.reason, 200)}")
         if len(changes) > SHOWN:
             lines.append(f"  and {len(changes) - SHOWN} more")
     if found.circumstances:
         lines += ["", "The runs differ:"]
-        lines += [f"  {name}: {excerpt(old, 100)} → {excerpt(new, 100)}" for name, old, new in found.circumstances]
+        lines += [f"  {name}: {on_a_line(old, 100)} → {on_a_line(new, 100)}" for name, old, new in found.circumstances]
     return "\n".join(lines)
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import gzip
-import json
 import math
+import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
+
+from reports.errors import ReportError
+from reports.given_files import parsed, read_octets, unzipped
 
 TRACES_NAME: Final = "traces.json.gz"
 # So many pictures at most; so many points of a line; size of the drawing of one axis, in CSS pixels.
@@ -66,7 +68,8 @@ def pictures(folder: Path, result: Mapping[str, Any]) -> list[Picture]:
         result: the run's result, with the class ``motion``.
     """
     try:
-        traces = json.loads(gzip.decompress((folder / TRACES_NAME).read_bytes()))
+        octets = unzipped(read_octets(folder / TRACES_NAME, root=folder), zlib.MAX_WBITS | 16)
+        traces = parsed(octets.decode("utf-8"))
         named = [
             failure.get("message", "")
             for one in result["requirements"]
@@ -76,7 +79,7 @@ def pictures(folder: Path, result: Mapping[str, Any]) -> list[Picture]:
         moves = list(_moves(traces))
         ranges = _ranges(moves)
         drawn = [_picture(one, named, ranges) for one in moves]
-    except (OSError, EOFError, ValueError, LookupError, TypeError, AttributeError):
+    except (ReportError, ArithmeticError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return []
     return sorted(filter(None, drawn), key=lambda one: not one.failed)[:_MOST]
 

@@ -14,7 +14,7 @@ from reports.attestation.verifying import NOT_PROVED, PROVED, Verification
 from reports.attestation.verifying import verify as verified
 from reports.cli.options import CONTRACT, FILE, FOLDER, FrontDoor, policy_of
 from reports.errors import EnvelopeRefusedError
-from reports.pages.untrusted import excerpt
+from reports.pages.untrusted import on_a_line
 
 EXIT_REFUSED = 1
 
@@ -61,7 +61,7 @@ def verify(
     try:
         found = verified(read_envelope(file), trusted, wanted, known, now=dt.datetime.now(dt.UTC), directory=result)
     except EnvelopeRefusedError as error:
-        click.echo(f"REFUSED: {excerpt(str(error), 500)}\n\nNothing is proved.")
+        click.echo(f"REFUSED: {on_a_line(str(error), 500)}\n\nNothing is proved.")
         raise SystemExit(EXIT_REFUSED) from error
     _print(found, trusted.keyid)
     if not found.accepted:
@@ -70,15 +70,15 @@ def verify(
 
 def _print(found: Verification, key: str) -> None:
     click.echo(f"signed by key  sha256:{key}")
-    click.echo(f"result         sha256:{found.statement.digest_of(RESULT_SUBJECT)}\n")
+    click.echo(f"result         sha256:{on_a_line(str(found.statement.digest_of(RESULT_SUBJECT)), 64)}\n")
     for point in found.points:
-        click.echo(f"  {'ok     ' if point.met else 'REFUSED'}  {point.name:<17} {excerpt(point.found, 400)}")
+        click.echo(f"  {'ok     ' if point.met else 'REFUSED'}  {point.name:<17} {on_a_line(point.found, 400)}")
         if not point.met:
             click.echo(
-                f"{'':11}demanded: {excerpt(point.demanded, 400)}\n{'':11}what to do: {excerpt(point.remedy, 400)}"
+                f"{'':11}demanded: {on_a_line(point.demanded, 400)}\n{'':11}what to do: {on_a_line(point.remedy, 400)}"
             )
     for remark in found.remarks:
-        click.echo(f"\n{fill(excerpt(remark, 400), 100)}")
+        click.echo(f"\n{fill(on_a_line(remark, 400), 100)}")
     refused = [point.name for point in found.points if not point.met]
     for words in (PROVED, NOT_PROVED):
         click.echo(f"\n{fill(words, 100)}")

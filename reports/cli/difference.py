@@ -1,6 +1,5 @@
 """Define the command `roaas diff`."""
 
-import json
 from pathlib import Path
 
 import click
@@ -9,6 +8,8 @@ from reports.certificate.description_changes import changes_pages, changes_text,
 from reports.certificate.difference import difference
 from reports.certificate.difference_page import difference_html, difference_markdown, difference_text
 from reports.cli.options import FOLDER, FrontDoor
+from reports.errors import ReportError
+from reports.given_files import parsed, read_octets, showing
 from reports.pages.page import write_pages
 from reports.reading import RESULT_NAME, read_result
 
@@ -36,10 +37,13 @@ def diff(door: FrontDoor, old: str, new: str, out: Path | None) -> None:
     if not (_is_description(old) or _is_description(new)):
         paths = [path / RESULT_NAME if path.is_dir() else path for path in map(Path, (old, new))]
         names = str(paths[0]), str(paths[1])
-        found = difference(read_result(paths[0]), read_result(paths[1]))
-        worse = bool(found.regressions)
-        pages = {"diff.html": difference_html(found, names), "diff.md": difference_markdown(found, names)}
-        click.echo(difference_text(found))
+        results = read_result(paths[0]), read_result(paths[1])
+        with showing(f"{names[0]} and {names[1]}"):
+            found = difference(*results)
+            worse = bool(found.regressions)
+            pages = {"diff.html": difference_html(found, names), "diff.md": difference_markdown(found, names)}
+            text = difference_text(found)
+        click.echo(text)
     described = _described(old), _described(new)
     if described[0] and described[1]:
         changed = description_changes(door.description_changes(*described))
@@ -61,8 +65,8 @@ def _is_description(source: str) -> bool:
 
 def _is_result(path: Path) -> bool:
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        document = parsed(read_octets(path).decode("utf-8"))
+    except (ReportError, ValueError, RecursionError):
         return path.name == RESULT_NAME
     return not isinstance(document, dict) or not {"openapi", "swagger"} & document.keys()
 

@@ -6,8 +6,9 @@ import click
 
 from reports.cli.options import FOLDER, PATH
 from reports.formats.catalogue import FORMATS
+from reports.given_files import showing
 from reports.pages.page import write_pages
-from reports.pages.untrusted import visible
+from reports.pages.untrusted import on_a_line
 from reports.reading import LATENCY_NAME, read_latency
 from reports.rendering import render, render_formats
 
@@ -73,19 +74,21 @@ def tell_change(old: Path, new: Path, threshold: float, out: Path | None = None)
 
     paths = [path / LATENCY_NAME if path.is_dir() else path for path in (old, new)]
     names = str(paths[0]), str(paths[1])
-    found = comparison.compare(read_latency(paths[0]), read_latency(paths[1]), names, threshold)
-    if out is not None:
-        pages = {
-            "compare.html": comparison_page.comparison_html(found, names),
-            "compare.md": comparison_page.comparison_markdown(found, names),
-        }
-        for path in write_pages(out, pages):
-            click.echo(path, err=True)
-    verdict = comparison_page.verdict(found)
-    click.echo(comparison_page.table(found))
+    results = read_latency(paths[0]), read_latency(paths[1])
+    pages = {}
+    with showing(f"{names[0]} and {names[1]}"):
+        found = comparison.compare(*results, names, threshold)
+        if out is not None:
+            pages["compare.html"] = comparison_page.comparison_html(found, names)
+            pages["compare.md"] = comparison_page.comparison_markdown(found, names)
+        verdict = comparison_page.verdict(found)
+        table = comparison_page.table(found)
+    for path in write_pages(out, pages) if out is not None else ():
+        click.echo(path, err=True)
+    click.echo(table)
     for remark in found.remarks:
-        click.echo(f"\n{visible(remark)}", nl=False)
-    click.echo(f"\n{verdict.words}. {visible(verdict.sentence)}")
+        click.echo(f"\n{on_a_line(remark)}", nl=False)
+    click.echo(f"\n{verdict.words}. {on_a_line(verdict.sentence)}")
     if not found.valid:
         return EXIT_INVALID
     return EXIT_SLOWER if found.slower else EXIT_OK

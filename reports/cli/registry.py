@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from reports.cli.options import CONTRACT, FILE, FOLDER, PATH, FrontDoor, policy_of
-from reports.pages.untrusted import excerpt
+from reports.pages.untrusted import on_a_line
 from reports.registry.entries import Certificate, Refused, find_envelopes, read_entries, read_keys
 from reports.registry.site import INDEX, write_site
 from reports.registry.standing import histories
@@ -55,7 +55,7 @@ def build(
     for path in private:
         click.echo(f"{path} is a private key. It was not used; keep it somewhere else.", err=True)
     for one in refused:
-        click.echo(f"refused: {excerpt(one.detail, 400)}", err=True)
+        click.echo(f"refused: {on_a_line(one.detail, 400)}", err=True)
     counting = sum(history.current.stands for history in found)
     click.echo(f"{counting} of {len(found)} robots with a certificate that counts, {len(refused)} refused")
     click.echo(f"site: {out / INDEX}")

@@ -10,7 +10,9 @@ from reports.latency.figures.ratios import Ratio, ratios
 from reports.latency.findings import Verdict
 from reports.latency.numbers import NONE, interval, ms, ratio, share
 from reports.pages.page import html_page, markdown_page
+from reports.pages.untrusted import on_a_line
 
+_CELL = 200
 QUANTILE_WORDS = {"p50": "50 %", "p99": "99 %"}
 _TONES = {"slower": "bad", "faster": "good", "same": "quiet", "unclear": "warning", "no figure": "quiet"}
 _SIGNS = {"slower": "✗", "faster": "✓", "same": "=", "unclear": "?", "no figure": NONE}
@@ -48,7 +50,7 @@ def sentence(of: Change) -> str:
 
 def table(comparison: Comparison) -> str:
     """Return all compared quantiles as a table in aligned columns, for a terminal."""
-    rows = [_HEAD, *(_row(one) for one in comparison.changes)]
+    rows = [_HEAD, *([on_a_line(cell, _CELL) for cell in _row(one)] for one in comparison.changes)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(_HEAD))]
     # Words are aligned to the left, numbers to the right.
     lines = (

@@ -4,6 +4,7 @@ A histogram holds whole microseconds in HdrHistogram's V2 encoding, compressed, 
 arrays in milliseconds, from which every curve is drawn.
 """
 
+import base64
 import math
 import zlib
 from collections.abc import Mapping
@@ -16,12 +17,18 @@ from hdrh.histogram import HdrHistogram
 from numpy.typing import NDArray
 
 from reports.errors import ResultInvalidError
+from reports.given_files import unzipped
 from reports.pages.untrusted import excerpt
 
 Floats = NDArray[np.float64]
 _US_PER_MS = 1000.0
 _TAIL = 0.025
 """Share beyond each bound of a two-sided 95 % interval."""
+_HEADER, _DIGITS = 8, 15
+"""Bytes before the compressed part of an encoding; where in it the number of significant digits is."""
+_MOST_BYTES, _MOST_DIGITS = 4 << 20, 4
+"""Of the unpacked encoding; with 5 digits a histogram takes 50 MB, and `roaas load` writes 3."""
+_MOST_SERIES = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +83,16 @@ def distribution(encoded: str, where: str) -> Distribution | None:
     if not encoded:
         return None
     try:
+        if unzipped(base64.b64decode(encoded)[_HEADER:], zlib.MAX_WBITS, _MOST_BYTES)[_DIGITS] > _MOST_DIGITS:
+            raise ValueError(f"more than {_MOST_DIGITS} significant digits")  # noqa: TRY301 - as all others
         histogram = HdrHistogram.decode(encoded)
         # The library's own iterator visits every empty bucket, which is slow.
         held = np.flatnonzero(np.asarray(histogram.counts))
         values = [histogram.get_value_from_index(int(index)) for index in held]
-    except (HdrCookieException, HdrLengthException, zlib.error, TypeError, ValueError, IndexError) as error:
+    except (
+        HdrCookieException, HdrLengthException, AssertionError, ArithmeticError, LookupError, RuntimeError, TypeError,
+        ValueError, zlib.error,
+    ) as error:  # fmt: skip
         raise ResultInvalidError(
             f"{where}: no HDR histogram (V2, base64): {error} (value: {excerpt(encoded, 40)!r})"
         ) from error
@@ -130,6 +142,8 @@ def all_series(result: Mapping[str, Any], path: str) -> AllSeries:
     The wire client comes before zeep, and REST before SOAP. `path` is the result's file, for error messages.
     """
     found = {}
+    if len(result["series"]) > _MOST_SERIES:
+        raise ResultInvalidError(f"{path}: at $.series: more than {_MOST_SERIES:,} series")
     for index, data in enumerate(result["series"]):
         where = f"{path}: at $.series[{index}]"
         series = Series(

@@ -11,6 +11,7 @@ import hashlib
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from secrets import token_hex
 from typing import Any
 
 from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, StrictUndefined
@@ -60,9 +61,14 @@ def write_pages(directory: Path, pages: dict[str, str]) -> list[Path]:
     try:
         directory.mkdir(parents=True, exist_ok=True)
         for name, text in pages.items():
-            draft = directory / f".{name}.part"
-            draft.write_text(text, encoding="utf-8")
-            draft.replace(directory / name)
+            # A name that nobody can know, opened as a new file: a link of that name would lead elsewhere.
+            draft = directory / f".{name}.{token_hex(4)}.part"
+            try:
+                with draft.open("x", encoding="utf-8") as file:
+                    file.write(text)
+                draft.replace(directory / name)
+            finally:
+                draft.unlink(missing_ok=True)
     except OSError as error:
         raise ResultUnreadableError(f"{directory}: cannot write there: {error.strerror or error}") from error
     return [directory / name for name in pages]

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from markupsafe import Markup, escape
 
 _KEPT = "\n\t"
+_COMMAND = re.compile(r"^(?=\s*::)|(?<=#)#(?=\w*\[)")
 
 
 def visible(text: str) -> str:
@@ -45,6 +46,15 @@ def excerpt(text: str, limit: int) -> str:
     """Return the text on one line, with escapes and cut to about `limit` characters, for messages and table cells."""
     line = " ".join(visible(text[: limit + 1]).split())
     return line if len(text) <= limit else f"{line[:limit]}…"
+
+
+def on_a_line(text: str, limit: int = 2000) -> str:
+    """Return an excerpt for a terminal or the log of a CI job, which runs nothing of it as a command.
+
+    A text such as `::error::` (GitHub, at the beginning of a line), `##[group]` or `##vso[…]` (GitHub, Azure, anywhere)
+    gets a backslash before it.
+    """
+    return _COMMAND.sub(lambda found: f"\\{found[0]}", excerpt(text, limit))
 
 
 @dataclass(frozen=True, slots=True)

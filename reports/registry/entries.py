@@ -15,9 +15,17 @@ from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, read_enve
 from reports.attestation.keys import public_key
 from reports.attestation.signature import unseal
 from reports.attestation.statement import Run, Statement, sha256
-from reports.errors import EnvelopeRefusedError, KeyUnusableError, ResultMissingError
+from reports.errors import (
+    EnvelopeRefusedError,
+    KeyUnusableError,
+    ReportError,
+    ResultMissingError,
+    ResultUnreadableError,
+)
+from reports.given_files import read_octets
 
 _PRIVATE = b"PRIVATE KEY-----"
+_MOST_KEY = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -67,6 +75,7 @@ def find_envelopes(places: Iterable[Path]) -> list[Path]:
 
     Raises:
         ResultMissingError: a folder holds no certificate.
+        ResultUnreadableError: a certificate in a folder is a link that leads out of it.
     """
     found: dict[Path, None] = {}
     for place in places:
@@ -74,6 +83,8 @@ def find_envelopes(places: Iterable[Path]) -> list[Path]:
         inside = sorted(filter(Path.is_file, place.rglob(ENVELOPE_NAME))) if place.is_dir() else [place]
         if not inside:
             raise ResultMissingError(f"{place}: it holds no {ENVELOPE_NAME}")
+        if place.is_dir() and (leads := [one for one in inside if not one.resolve().is_relative_to(place.resolve())]):
+            raise ResultUnreadableError(f"{leads[0]}: it is a link to a file outside {place}")
         found |= dict.fromkeys(inside)
     return list(found)
 
@@ -88,11 +99,11 @@ def read_keys(directory: Path) -> tuple[dict[str, SSlibKey], list[Path]]:
     private: list[Path] = []
     for path in sorted(directory.glob("*.pem")):
         try:
-            if _PRIVATE in path.read_bytes():
+            if _PRIVATE in read_octets(path, _MOST_KEY):
                 private.append(path)
                 continue
-        except OSError as error:
-            raise KeyUnusableError(f"{path}: {error.strerror or error}") from error
+        except ReportError as error:
+            raise KeyUnusableError(error.message) from error
         key = public_key(path)
         keys[key.keyid] = key
     if not keys:

@@ -120,8 +120,8 @@ def test_the_token_goes_to_no_address_that_the_user_did_not_name(robot, tmp_path
     assert f"--token-for http://127.0.0.1:{robot.server_port}" in refused.output
 
 
-def _moves(method="GET", headers=(), body=b"", raw=None):
-    (item,) = written([Sent(0.0, Request(method, "http://r2/", headers, body, raw))])
+def _moves(method="GET", headers=(), body=b"", raw=None, path="/"):
+    (item,) = written([Sent(0.0, Request(method, f"http://r2{path}", headers, body, raw))])
     return moves({"sequence": [item]})
 
 
@@ -145,12 +145,13 @@ def test_octets_that_hold_another_request_move_the_robot(raw):
 
 
 def test_what_moves_is_told_by_what_is_sent():
-    heads = b"GET /a HTTP/1.1\r\nHost: r2\r\n\r\nHEAD /b HTTP/1.1\r\nHost: r2\r\n\r\n"
-    assert not any((_moves(), _moves("HEAD"), _moves(raw=heads), _moves("POST", body=_soap("GetPose"))))
+    reading = "/turtlesim_subscriber_ws"
+    assert not any((_moves(), _moves("HEAD"), _moves("POST", body=_soap("GetPose"), path=reading)))
     assert _moves(headers=(("X-HTTP-Method-Override", "PUT"),))
-    assert _moves("POST", body=_soap("ExecuteDeliveryRequest"))
-    assert _moves("POST", body=_soap("GetPose").replace(b"</e:Body>", b"<x/></e:Body>"))
-    assert _moves("POST", body=b"<")
+    assert _moves("POST", body=_soap("ExecuteDeliveryRequest"), path=reading)
+    assert _moves("POST", body=_soap("GetPose").replace(b"</e:Body>", b"<x/></e:Body>"), path=reading)
+    assert _moves("POST", body=b"<", path=reading)
+    assert _moves("POST", body=_soap("GetPose"), path="/start")
 
 
 @pytest.mark.parametrize(
