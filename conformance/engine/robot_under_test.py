@@ -17,6 +17,7 @@ from conformance.api.call_rules import CallRules
 from conformance.api.device import Device, device_of
 from conformance.api.interfaces import Interfaces
 from conformance.api.permission import Permission
+from conformance.api.rest.guard import Guard
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.operation_log import OperationLog
 from conformance.api.rest.stops import stop_device
@@ -66,6 +67,7 @@ class RobotUnderTest:
     permission: Permission = field(init=False)
     refusals: RefusalListener = field(init=False)
     is_at_rest: bool = True
+    _guard: Guard | None = None
     _services: SoapServices | None = None
     _progress: TextIO | None = None
 
@@ -127,6 +129,9 @@ class RobotUnderTest:
         self.rest = RestInterface(self.run, HttpClient(where.rest, self.connection), self.alive)
         if self.run.statement.motion_map is not None and self.run.allow_motion:
             self.rest.stop_device = partial(_stop_by_map, self.rest, self.run.statement.motion_map)
+        if self.run.allow_motion or self.run.statement.calls.allow:
+            self._guard = Guard(self.rest)
+            self.connection.before_sending = self._guard.before_sending
         if self.run.contract.described:
             self.permission.may_call_ports(self.rest.client.base_url)
             self.log = OperationLog(self.run.contract, self.rest.client.base_url)
@@ -212,6 +217,9 @@ class RobotUnderTest:
             self.run.judge.begin("")  # what is sent from here on belongs to no check
             self.stop()
             self.is_at_rest = True
+        if self._guard is not None:
+            # It goes on trying where the stop could not be delivered.
+            self._guard.release(stopped=not self.run.stop_undelivered)
 
     def has(self, name: Interface) -> bool:
         """Return whether an interface has an address."""

@@ -7,10 +7,12 @@ import math
 import ssl
 import time
 from collections import defaultdict, deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
 from urllib.parse import urlsplit
 
 import h11
@@ -48,7 +50,15 @@ _CHALLENGE = 401
 _ATTEMPTS = 2
 # The last requests that are kept.
 _RECENT: Final = 60
+_NOTHING_THERE: Final = 404
 _CRASHED: Final = "the server closed the connection without a response, and accepts no other connection"
+
+
+class BeforeSending(Protocol):
+    """What a connection calls before each message."""
+
+    def __call__(self, *, acts: bool) -> None:
+        """Prepare for a message; ``acts``: whether a request in it has an unsafe method."""
 
 
 @dataclass
@@ -73,6 +83,7 @@ class Connection:
         resends: whether any request is sent again that met the end of a kept connection, also one that may act twice.
         recent: the last requests, in the order in which they were answered or given up.
         is_away: returns whether a gateway sent a response in the place of a device that is away.
+        before_sending: is called before each message, after the wait for ``request_rate``.
         permit: is called with method and absolute URL before each request; returns an empty text if the request may be
             sent, else why not. By default everything may be sent.
     """
@@ -90,6 +101,7 @@ class Connection:
     resends: bool = False
     recent: deque[Sending] = field(default_factory=lambda: deque(maxlen=_RECENT))
     is_away: Callable[[Exchange], bool] = lambda _exchange: False
+    before_sending: BeforeSending = lambda *, acts: None  # noqa: ARG005 - see the protocol
     permit: Permit = lambda _method, _url: ""
     credentials: Credentials = field(default_factory=Credentials)
     certificate: tuple[Path, Path | None] | None = None
@@ -129,6 +141,7 @@ class Connection:
             self._next_slot = max(now, self._next_slot) + 1 / self.request_rate
         for method, _ in requests:
             self.note(method)
+        self.before_sending(acts=any(method not in SAFE_METHODS for method, _ in requests))
 
     def note(self, method: str) -> None:
         """Update ``acted_at`` if the method is unsafe: called when a request is sent, answered or given up."""
@@ -208,6 +221,10 @@ class HttpClient:
             sent = credentials.added(fields, method, self.prefix + target)
             shown = tuple(credentials.added(shown, shown=True))
         request = Request(method, self.url(path), shown, body, query=query)
+        if (drafts := _drafts.get()) is not None:
+            return self._drafted(
+                method, target, tuple(pair for pair in sent if pair[0] != "Connection"), request, drafts
+            )
         endpoint = request.endpoint
         if sum(time.monotonic() - at < _HANGS_WITHIN_S for at in self._hangs[endpoint]) >= _HANGS:
             hung = endpoint.replace(f"{self.scheme}://{self.authority}", "", 1)
@@ -236,6 +253,25 @@ class HttpClient:
         for listener in self.connection.listeners:
             listener.answered(exchange)
         return exchange
+
+    def _drafted(self, method: str, target: str, fields: Headers, request: Request, drafts: list["Draft"]) -> Exchange:
+        """Keep a request that is not sent; return it with the response of a device that has no such resource.
+
+        Raises:
+            NotPermittedError: it may not be sent in this run.
+        """
+        if reason := self.connection.permit(method, request.url):
+            raise NotPermittedError(reason)
+        head = [
+            f"{method} {self.prefix + target or '/'} HTTP/1.1",
+            *map(": ".join, fields),
+            "Connection: close",
+            "",
+            "",
+        ]
+        octets = "\r\n".join(head).encode("utf-8", "surrogateescape") + request.body
+        drafts.append(Draft(self, method, octets))
+        return Exchange(request, Response(_NOTHING_THERE, (), b"", 0.0))
 
     def _unanswered(self, request: Request, problem: str, kind: NoAnswer) -> NoAnswerError:
         """Report a request without a response; return the exception to be raised."""
@@ -297,6 +333,40 @@ class HttpClient:
             finally:
                 self._connections.give_back(connection, keep=keep)
         raise AssertionError("unreachable: the last attempt returns or raises")
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A request that was not sent.
+
+    Attributes:
+        client: would have sent it.
+        method: of the request.
+        octets: the whole request, for a connection of its own.
+    """
+
+    client: HttpClient
+    method: str
+    octets: bytes
+
+
+_drafts: ContextVar[list[Draft] | None] = ContextVar("drafts", default=None)
+
+
+def is_drafting() -> bool:
+    """Return whether what clients in this thread would send is only kept."""
+    return _drafts.get() is not None
+
+
+@contextmanager
+def drafted() -> Iterator[list[Draft]]:
+    """Send nothing: yield a list that gets what clients in this thread would have sent. Each gets a response 404."""
+    drafts: list[Draft] = []
+    token = _drafts.set(drafts)
+    try:
+        yield drafts
+    finally:
+        _drafts.reset(token)
 
 
 class _SilenceError(Exception):

@@ -1,17 +1,26 @@
 """However a command ends, the robot that it moved is at rest, and from the first request on there is a result."""
 
+import base64
 import json
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
+from aiohttp import web
 from moving_device import DESCRIPTION, MAP, Mover
-from small_device import small_device
+from processes import ended
+from small_device import REFUSED, answers, described, error, reading, small_device
 
+import conformance.api.rest.guard
+from conformance.selftest.variants import certificate
+
+_GUARD = Path(conformance.api.rest.guard.__file__).with_name("guard_process.py")
 _CERTIFY = (sys.executable, "-m", "roaas", "certify")
 _OPTIONS = ("--allow-motion", "--effort", "quick", "--class", "motion", "--timeout", "5")
 # A process that starts a command, writes its pid, and waits for its end.
@@ -98,3 +107,165 @@ def test_a_run_ends_with_the_process_that_started_it(tmp_path):
             parent.communicate(timeout=120)  # the run's stdout is the parent's: it is closed at its end
         assert device.velocity == 0
     assert "interrupted by the end of its parent process" in " ".join(_result(out)["notes"])
+
+
+class _MovesById:
+    """A device whose moves have ids: only the newest is stopped, by its id and with the token."""
+
+    description = described(
+        {
+            "/state": reading({"type": "object", "properties": {"moves": {"type": "boolean"}}}),
+            "/moves": {"post": {"responses": {"201": answers({"type": "object"}), "4XX": REFUSED}}},
+            "/moves/{move_id}": {
+                "delete": {
+                    "x-roaas-stop": True,
+                    "parameters": [{"name": "move_id", "in": "path", "required": True, "schema": {"type": "string"}}],
+                    "responses": {"200": answers({"type": "object"}), "4XX": REFUSED},
+                }
+            },
+        }
+    )
+
+    def __init__(self) -> None:
+        self.moves, self.number, self.is_known = False, 0, threading.Event()
+        self.stopped = threading.Event()
+
+    @property
+    def routes(self):
+        return {
+            "/state": {"GET": self._state},
+            "/moves": {"POST": self._move},
+            "/moves/{move_id}": {"DELETE": self._stop},
+        }
+
+    async def _state(self, _):
+        if self.number >= 2:
+            self.is_known.set()  # the response to the move has arrived before
+        return web.json_response({"moves": self.moves})
+
+    async def _move(self, _):
+        if self.is_known.is_set():
+            return error(409, "no further move")  # the run, which is being killed, would not learn its id
+        self.moves, self.number = True, self.number + 1
+        self.stopped.clear()
+        return web.json_response({"move_id": f"m{self.number}"}, status=201)
+
+    async def _stop(self, request):
+        if (
+            request.match_info["move_id"] != f"m{self.number}"
+            or request.headers.get("Authorization") != "Bearer s3same"
+        ):
+            return error(404, "no such move")
+        self.moves = False
+        self.stopped.set()
+        return web.json_response({})
+
+
+def _guards() -> set[str]:
+    """Return command and environment of each process that guards a device."""
+    shown = ended("ps", "axeww", "-o", "pid=,command=").stdout.splitlines()
+    return {line for line in shown if str(_GUARD) in line}
+
+
+def test_a_run_that_is_killed_leaves_the_device_at_rest(tmp_path):
+    device, out = Mover(), tmp_path / "out"
+    with small_device(DESCRIPTION, device.routes) as url:
+        command = (*_CERTIFY, _statement(tmp_path, url), *_OPTIONS, "--out", out)
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, text=True) as process:
+            assert device.await_that(_drives(2), process)
+            process.kill()
+        assert device.await_that(lambda mover: mover.velocity == 0)
+    assert "it was killed" in " ".join(_result(out)["notes"])
+
+
+def test_a_killed_run_stops_the_newest_move_and_shows_the_token_to_nobody(tmp_path):
+    device, token = _MovesById(), tmp_path / "token"
+    token.write_text("s3same", encoding="utf-8")
+    token.chmod(0o600)
+    with small_device(device.description, device.routes) as url:
+        command = (*_CERTIFY, url, "--call", "POST /moves", "--token-file", token, "--out", tmp_path / "out")
+        before = _guards()
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+            assert device.is_known.wait(120)
+            shown = _guards() - before
+            process.kill()
+        assert device.stopped.wait(60)
+    assert shown
+    assert not any("s3same" in one for one in shown)
+
+
+@dataclass(frozen=True)
+class Told:
+    """What a guard gets from the process that it outlives.
+
+    Attributes:
+        name: of the case.
+        last: what follows the stop on its standard input.
+        statuses: how the device responds to one stop after another; the last one stays; 0: it closes the connection.
+        stops: how many stops the device gets at least; 0: none at all.
+        tls: whether the device speaks TLS.
+    """
+
+    name: str
+    last: bytes
+    statuses: tuple[int, ...] = (200,)
+    stops: int = 3
+    tls: bool = False
+
+
+TOLD = (
+    Told("the run is killed", b""),
+    Told("the run is done", b"done\n", stops=0),
+    Told("the run is killed while it writes", b'{"stops": ['),
+    Told("the run is killed while it ends", b"do"),
+    Told("the device is busy", b"", (503, 0, 429, 500, 0, 408, 200), 7),
+    Told("the device speaks TLS", b"", tls=True),
+)
+
+
+class _Stopped(BaseHTTPRequestHandler):
+    def do_PUT(self):
+        octets = self.rfile.read(int(self.headers["Content-Length"]))
+        statuses = self.server.statuses
+        status = statuses.pop(0) if len(statuses) > 1 else statuses[0]
+        self.server.stops.append((self.path, octets))
+        self.server.first.set()
+        if status:
+            self.send_response(status)
+            self.send_header("Content-Length", "0")
+            self.end_headers()
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.mark.parametrize("told", TOLD, ids=lambda told: told.name)
+def test_a_guard_stops_the_device_unless_that_is_done(told, tmp_path):
+    server = ThreadingHTTPServer(("127.0.0.1", 0), _Stopped)
+    server.statuses, server.stops, files = list(told.statuses), [], None
+    server.first = threading.Event()
+    if told.tls:
+        context, ca_file = certificate(tmp_path)
+        server.socket = context.wrap_socket(server.socket, server_side=True)
+        files = json.dumps([str(ca_file), None, None])
+    request = b"PUT /v HTTP/1.1\r\nHost: robot\r\nContent-Length: 1\r\nConnection: close\r\n\r\n0"
+    stop = {
+        "host": "localhost" if told.tls else "127.0.0.1",
+        "port": server.server_port,
+        "tls": files,
+        "request": base64.b64encode(request).decode(),
+    }
+    given = json.dumps({"stops": [stop], "for_s": 60, "deadline_s": 10}).encode() + b"\n"
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    with subprocess.Popen((sys.executable, "-I", "-S", _GUARD), stdin=subprocess.PIPE) as guard:
+        guard.stdin.write(given + told.last)
+        guard.stdin.close()
+        if told.stops:
+            assert server.first.wait(120)
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+                guard.send_signal(number)
+        assert guard.wait(120) == 0
+    server.shutdown()
+    server.server_close()
+    assert len(server.stops) >= told.stops
+    assert {*server.stops} == ({("/v", b"0")} if told.stops else set())

@@ -52,8 +52,7 @@ def stop_device(api: RestInterface, tell: Callable[[str], None] = lambda _: None
     run.stop_undelivered = f"{UNDELIVERED}: the run ended before it was seen to stop"
     tried_s = run.wait_s or TRIED_S
     until = time.monotonic() + tried_s
-    ways = [partial(way, api) for way in (_stop_by_pack, _stop_by_map, _stop_as_marked)]
-    open_ = _still_open(ways)
+    open_ = stop_once(api)
     if open_:
         tell(f"the device was not stopped: {'; '.join(open_.values())}. The stop is tried for {tried_s:g} s")
     while open_ and time.monotonic() < until:
@@ -62,6 +61,11 @@ def stop_device(api: RestInterface, tell: Callable[[str], None] = lambda _: None
             open_ = _still_open(open_)
     run.stop_undelivered = f"{UNDELIVERED}: {'; '.join(open_.values())}" if open_ else ""
     return run.stop_undelivered
+
+
+def stop_once(api: RestInterface) -> dict[_Way, str]:
+    """Stop the device by each way that it has; return those that did not stop it, with the reasons."""
+    return _still_open([partial(way, api) for way in (_stop_by_pack, _stop_by_map, _stop_as_marked)])
 
 
 def _still_open(ways: Iterable[_Way]) -> dict[_Way, str]:

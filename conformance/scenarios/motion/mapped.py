@@ -18,6 +18,7 @@ from conformance.scenarios.motion.templates import NoValueError, at, filled, num
 from conformance.scenarios.motion.trace import SEVERAL, Command, Leg, Reading, fastest, middle_of
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.motion_map import Goto, MotionMap, Stop, Switch, Velocity, names_in
+from conformance.transport.client import is_drafting
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, NotPermittedError
 
 #: For so long a device that has arrived is watched, s.
@@ -307,7 +308,7 @@ class MappedDevice:
             problem = f"{self._named(none.unanswered)}: {none}"
         except NotPermittedError as refusal:
             problem = str(refusal)
-        if not (self.motion.state.axes or self.motion.speeds):
+        if is_drafting() or not (self.motion.state.axes or self.motion.speeds):
             return problem
         try:
             self.come_to_rest(stop=False)

@@ -1,0 +1,123 @@
+"""Keep a process that stops the device when this one is killed: no handler runs after ``kill -9``."""
+
+import base64
+import contextlib
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Final
+
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.stops import TRIED_S, stop_once
+from conformance.transport.client import Draft, drafted
+from conformance.transport.exchange import SAFE_METHODS
+
+_PROGRAM: Final = Path(__file__).with_name("guard_process.py")
+# The deadline of each of its requests, and how long its end is awaited, s.
+_DEADLINE_S: Final = 3.0
+_ENDS_S: Final = 2.0
+# Making the stops again and again takes at most this share of the run's time, and so long in all before it counts, s.
+_SHARE: Final = 0.05
+_FREE_S: Final = 0.1
+
+
+class Guard:
+    """Tells a process of its own how the device is stopped, from before the first request on that may move it.
+
+    Args:
+        api: its stops are sent, if the run may send them.
+    """
+
+    def __init__(self, api: RestInterface) -> None:
+        self._api = api
+        self._lock = threading.Lock()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._told: list[dict[str, Any]] = []
+        self._is_stale = True
+        self._began, self._spent_s = time.monotonic(), 0.0
+
+    def before_sending(self, *, acts: bool) -> None:
+        """Tell how the device is stopped now: before a request that acts, and before the next one after it.
+
+        What the device has responded to a move may be a part of its stop.
+        """
+        if not (acts or self._is_stale) or (self._process is None and not acts):
+            return
+        with self._lock:
+            self._is_stale, started = True, time.monotonic()
+            # A contract pack stops its device always in the same way.
+            is_dear = self._spent_s > _FREE_S + _SHARE * (started - self._began)
+            if is_dear or (self._is_alive and not self._api.run.contract.described):
+                return
+            self._is_stale = acts
+            stops = [_told_of(one) for one in self._drafts() if one.method not in SAFE_METHODS]
+            self._spent_s += time.monotonic() - started
+            if stops and (stops != self._told or not self._is_alive):
+                self._tell(stops)
+
+    @property
+    def _is_alive(self) -> bool:
+        return self._process is not None and self._process.poll() is None
+
+    def start(self) -> int | None:
+        """Start the process; return the descriptor that other processes which move the device inherit, or None."""
+        self.before_sending(acts=True)
+        process = self._process
+        return process.stdin.fileno() if process is not None and process.stdin is not None else None
+
+    def release(self, *, stopped: bool = True) -> None:
+        """End the process; if the device was not stopped, the process goes on trying for a while."""
+        with self._lock:
+            process, self._process, self._told = self._process, None, []
+        if process is None or process.stdin is None:
+            return
+        with contextlib.suppress(OSError):
+            if stopped:
+                process.stdin.write(b"done\n")
+            process.stdin.close()
+        if stopped:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(_ENDS_S)
+
+    def _drafts(self) -> Iterable[Draft]:
+        """Return the requests that stop the device, as the end of the run would send them now."""
+        with self._api.run.limit.lifted(), drafted() as drafts:
+            stop_once(self._api)
+        return drafts
+
+    def _tell(self, stops: list[dict[str, Any]]) -> None:
+        """Write the stops to the process, which is started if there is none; a run without it goes on."""
+        message = {"stops": stops, "for_s": self._api.run.wait_s or TRIED_S, "deadline_s": _DEADLINE_S}
+        try:
+            if not self._is_alive:
+                # Isolated, in a session of its own. The credentials in the stops go through the pipe alone.
+                self._process = subprocess.Popen(  # noqa: S603 - our own program
+                    [sys.executable, "-I", "-S", str(_PROGRAM)],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                    bufsize=0,
+                    start_new_session=True,
+                )
+            if self._process is not None and self._process.stdin is not None:
+                self._process.stdin.write(json.dumps(message).encode() + b"\n")
+            self._told = stops
+        except OSError:
+            self._told = []
+
+
+def _told_of(draft: Draft) -> dict[str, Any]:
+    """Return a request as the process reads it."""
+    connection = draft.client.connection
+    certificate, key = connection.certificate or (None, None)
+    files = [one and str(one.absolute()) for one in (connection.ca_file, certificate, key)]
+    return {
+        "host": draft.client.host.encode("idna").decode("ascii"),
+        "port": draft.client.port,
+        "tls": None if draft.client.tls is None else json.dumps(files),
+        "request": base64.b64encode(draft.octets).decode(),
+    }
