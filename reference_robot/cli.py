@@ -84,7 +84,7 @@ _NEEDED: Final = {
 def robot(**options: object) -> None:
     """Run the reference robot.
 
-    When both interfaces are ready, the command prints their addresses in one line. SIGINT and SIGTERM stop the robot.
+    When both interfaces are ready, the command prints their addresses in one line. SIGINT, SIGTERM and SIGHUP stop it.
     Arguments after --ros-args are passed to ROS: namespaces, remappings, parameters such as use_sim_time, enclaves.
     """
     for module, remedy in _NEEDED.items():

@@ -19,6 +19,7 @@ import click
 import msgspec
 from rclpy.logging import get_logging_directory
 
+from conformance.commandline.endings import ending_signals
 from conformance.commandline.exit_codes import ExitCode
 from conformance.contract.toml_file import TomlFileError
 from reference_robot.ending import Ending
@@ -86,7 +87,7 @@ class Options:
 
 
 def run(options: Options) -> None:
-    """Run the robot until SIGINT or SIGTERM.
+    """Run the robot until SIGINT, SIGTERM or another signal that ends the process.
 
     Raises:
         UnusableError: A file, port or address cannot be used.
@@ -158,7 +159,7 @@ def _listening(options: Options) -> Listening:
 
 
 def _deliver(options: Options) -> None:
-    """Run the delivery application until SIGINT or SIGTERM, for any robot that accepts NavigateToPose goals."""
+    """Run the delivery application until a signal ends it, for any robot that accepts NavigateToPose goals."""
     ending = Ending()
     try:
         names = load_configuration(options.config)
@@ -173,17 +174,17 @@ def _deliver(options: Options) -> None:
 
 
 class _Stopped(BaseException):
-    """A SIGINT or SIGTERM that arrived while no event loop was running to handle it."""
+    """A signal that arrived while no event loop was running to handle it."""
 
 
 @contextlib.contextmanager
 def _stopped_by_signals() -> Iterator[None]:
-    """Raise _Stopped on SIGINT and SIGTERM, so that everything started inside the block is cleaned up."""
+    """Raise _Stopped on each signal that ends the process, so that what was started inside the block is cleaned up."""
 
     def stop(_number: int, _frame: FrameType | None) -> None:
         raise _Stopped
 
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in ending_signals():
         signal.signal(number, stop)
     yield
 

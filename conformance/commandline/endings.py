@@ -23,10 +23,9 @@ _parent_ended = threading.Event()
 
 def ending_signals() -> tuple[signal.Signals, ...]:
     """Return the signals that end this process, without those that it ignores, as ``nohup`` makes it ignore SIGHUP."""
-    handled = {signal.SIG_DFL, signal.default_int_handler}
     usual = (signal.Signals[name] for name in _USUALLY if name in signal.Signals.__members__)
     always = (signal.Signals[name] for name in _ALWAYS)
-    return (*always, *(number for number in usual if signal.getsignal(number) in handled))
+    return (*always, *(number for number in usual if signal.getsignal(number) not in {signal.SIG_IGN, None}))
 
 
 def end_like_ctrl_c() -> None:

@@ -1,7 +1,8 @@
 """The program that simulates the robot: ``python -m reference_robot.simulation``.
 
-It prints ``ready`` on stdout when the robot is running. It ends with exit code 0 on SIGINT and SIGTERM. If its standard
-input is a pipe, it also ends when the pipe closes, so that the simulation never outlives the program that started it.
+It prints ``ready`` on stdout when the robot is running. It ends with exit code 0 on SIGINT, SIGTERM and SIGHUP. If its
+standard input is a pipe, it also ends when the pipe closes, so that the simulation never outlives the program that
+started it.
 """
 
 import contextlib

@@ -5,7 +5,6 @@ import contextlib
 import gc
 import os
 import resource
-import signal
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from typing import Final
 
 import uvloop
 
+from conformance.commandline.endings import ending_signals
 from reference_robot.ros import RosRuntime
 from reference_robot.webservices.assembly import Endpoints, interfaces
 from reference_robot.webservices.configuration import Configuration
@@ -43,7 +43,7 @@ class RobotWebServiceNodesRunner:
     ros_arguments: Sequence[str] = ()
 
     def run(self, ready: Callable[[Endpoints], None], *, wait_for_robot: bool) -> None:
-        """Serve until SIGINT or SIGTERM; call ``ready`` once, when both interfaces accept requests.
+        """Serve until a signal ends the process; call ``ready`` once, when both interfaces accept requests.
 
         Raises:
             PortInUseError: A port cannot be bound.
@@ -81,7 +81,7 @@ class RobotWebServiceNodesRunner:
 async def _serve_until_signalled(publisher: EndpointPublisher, ready: Callable[[], None]) -> None:
     stop, started = asyncio.Event(), asyncio.Event()
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in ending_signals():
         loop.add_signal_handler(number, stop.set)
     async with asyncio.TaskGroup() as group:
         group.create_task(publisher.serve(stop, started))

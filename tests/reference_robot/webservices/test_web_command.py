@@ -30,7 +30,13 @@ def alive(pid: int) -> bool:
         return False
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def segments(*pids: int) -> set[Path]:
+    """Return the files in shared memory through which Fast DDS sends what processes publish, half a megabyte each."""
+    maps = "".join(Path(f"/proc/{pid}/maps").read_text() for pid in pids)
+    return set(map(Path, re.findall(r"/\S+/fastrtps_[0-9a-f]{16}\b", maps)))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
 def test_one_line_and_a_clean_end(domain_id, number):
     with subprocess.Popen(
         [*COMMAND, f"--domain-id={domain_id}"],
@@ -41,12 +47,15 @@ def test_one_line_and_a_clean_end(domain_id, number):
     ) as process:
         assert READY.fullmatch(process.stdout.readline())[1] == str(domain_id)
         (child,) = children(process.pid)
+        used = segments(process.pid, child)
         process.send_signal(number)
         stdout, stderr = process.communicate(timeout=240)
         assert process.returncode == 0, stderr
         assert stdout == ""
         assert "Traceback" not in stderr
     eventually(lambda: not alive(child))
+    assert used
+    assert not [path for path in used if path.exists()]
 
 
 def test_a_signal_while_starting_ends_it_cleanly(domain_id):
