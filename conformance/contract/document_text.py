@@ -15,7 +15,7 @@ import yaml
 # What a description may hold. The largest known ones have 12 MB, 500,000 values, and lie 60 deep.
 _MOST_OCTETS: Final = 32 * 1024 * 1024
 _MOST_NODES: Final = 1_000_000
-_DEEPEST: Final = 200
+_DEEPEST: Final = 100
 _LONGEST_NAME: Final = 8_192
 # Each value of a JSON text but the first one follows one of these marks, which texts hold too.
 _MARKS_OF_VALUES: Final = ",[{"

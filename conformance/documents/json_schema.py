@@ -101,7 +101,11 @@ class _Resolver:
             return value
         if isinstance(value.get("$ref"), str):
             return self._referred(value, value["$ref"], trail)
-        return {key: self.copy(item, trail) for key, item in value.items()}
+        # The values of an enum are data, whatever they look like.
+        return {
+            key: item if key == "enum" and isinstance(item, list) else self.copy(item, trail)
+            for key, item in value.items()
+        }
 
     def _referred(self, value: Schema, reference: str, trail: tuple[str, ...]) -> Any:
         found = pointed(self._document, reference)

@@ -92,8 +92,11 @@ def _fault(schema: Any) -> str:
 def _without_operations(document: Schema, bare: Schema) -> tuple[Schema, list[str]]:
     lines, paths = [], {}
     for path, item in document["paths"].items():
-        whole = pointed(document, item["$ref"]) if isinstance(item, dict) and "$ref" in item else item
-        broken = dict(_broken(bare, path)) if isinstance(whole, dict) else {"": "it is no object"}
+        try:
+            whole = pointed(document, item["$ref"]) if isinstance(item, dict) and "$ref" in item else item
+            broken = dict(_broken(bare, path)) if isinstance(whole, dict) else {"": "it is no object"}
+        except _UNREADABLE as error:
+            whole, broken = None, {"": f"{type(error).__name__}: {error}"}
         lines += [f"{f'{method} {path}'.strip()}: not judged: {reason}" for method, reason in broken.items()]
         if not broken:
             paths[path] = item

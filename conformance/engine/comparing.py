@@ -30,6 +30,8 @@ def compared(old: str, new: str) -> list[Change]:
     ]
     try:
         return [*changes(*(one.document for one in descriptions)), *unread]
+    except RecursionError as error:
+        raise DescriptionError(f"{old} and {new} cannot be compared, one is nested too deeply") from error
     except (UnresolvedError, AttributeError, TypeError, KeyError) as error:
         raise DescriptionError(f"{old} and {new} cannot be compared, one is malformed: {error!r}") from error
 
