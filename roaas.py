@@ -167,6 +167,12 @@ class FrontDoor:
             raise click.UsageError(str(error)) from error
 
     @staticmethod
+    def is_installed(pack: str) -> bool:
+        """Return whether a name is that of a contract pack that comes with the suite or that a package installed."""
+        found: bool = import_module("conformance.contract.locating").is_installed(pack)
+        return found
+
+    @staticmethod
     def known(pack: str | None) -> dict[str, Any]:
         """Return what the installed suite contains for a contract pack: digest, requirement sets, profiles."""
         try:

@@ -49,8 +49,8 @@ class Notary:
         Raises:
             ResultUnsignableError: it is not, for example because somebody edited it.
         """
-        known = msgspec.convert(self._known(), Known)
         problems = [*_edited(octets, result), *_disagreeing(result), *_replaced(path.parent, result)]
+        known = msgspec.convert(self._known(), Known)
         run = run_of(result)
         problems += contradictions(run)
         if run.interrupted:

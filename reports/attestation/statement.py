@@ -10,7 +10,7 @@ import datetime as dt
 import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
@@ -23,6 +23,9 @@ RESULT_SUBJECT = "result.json"
 STATEMENT_SUBJECT = "statement"
 CONTRACT_SUBJECT = "contract/"
 """Prefix of a contract file among the subjects."""
+
+_MOST_CLASSES = 200
+"""A registry has a column for each class that a certificate names."""
 
 Text = str | None
 
@@ -109,7 +112,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     robot: Robot
     verdict: str
     interrupted: bool
-    classes: dict[str, str]
+    classes: Annotated[dict[str, str], msgspec.Meta(max_length=_MOST_CLASSES)]
     requirements: dict[str, int]
     accepted: list[str]
     accepted_until: Text

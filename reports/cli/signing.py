@@ -7,6 +7,7 @@ import click
 from reports.attestation.files import DESCRIPTION
 from reports.attestation.signing import Notary
 from reports.cli.options import CONTRACT, FILE, FOLDER, FrontDoor
+from reports.pages.untrusted import excerpt
 from reports.reading import RESULT_NAME, read_result
 from reports.rendering import render
 
@@ -22,8 +23,21 @@ def sign(door: FrontDoor, directory: Path, key: Path, pack: str | None) -> None:
     Exit code 2: DIR has no result; the result is incomplete, was edited, or lies beside files of another run; or the
     key cannot be used.
     """
-    result = read_result(directory / RESULT_NAME) if pack is None else {}
-    described = str(directory / DESCRIPTION)
-    by = pack or (described if "api" in result else result.get("pack", {}).get("name"))
+    by = _pack_of(door, directory) if pack is None else pack
     for path in render(directory, Notary(key, lambda: door.known(by))):
         click.echo(path)
+
+
+def _pack_of(door: FrontDoor, directory: Path) -> str | None:
+    """Return the contract pack of a result: the description beside it, or an installed pack; None for the default."""
+    result = read_result(directory / RESULT_NAME)
+    if "api" in result:
+        return str(directory / DESCRIPTION)
+    name: str | None = result.get("pack", {}).get("name")
+    # A result is data: a name in it leads to no folder.
+    if name is not None and not door.is_installed(name):
+        raise click.UsageError(
+            f"the robot was judged by the contract pack {excerpt(name, 80)!r}, which is not installed: "
+            "give its folder with --contract"
+        )
+    return name

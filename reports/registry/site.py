@@ -31,23 +31,26 @@ def write_site(site: Path, found: Sequence[History], refused: Sequence[Refused],
     Raises:
         ResultUnreadableError: the folder cannot be written to.
     """
-    files = {
-        ROBOTS: {history.page: _robot_html(history, now) for history in found},
-        ENVELOPES: {
-            _envelope(standing): standing.certificate.octets.decode()
-            for history in found
-            for standing in history.standings
-            if standing.certificate.publishable
-        },
+    robots = {history.page: history for history in found}
+    envelopes = {
+        _envelope(standing): standing.certificate
+        for history in found
+        for standing in history.standings
+        if standing.certificate.publishable
     }
     try:
-        for folder, names in files.items():
+        for folder, names in ((ROBOTS, robots), (ENVELOPES, envelopes)):
             for path in (site / folder).glob("*"):
                 if path.name not in names and _OURS[folder].fullmatch(path.name):
                     path.unlink()
     except OSError as error:
         raise ResultUnreadableError(f"{site}: cannot write there: {error.strerror or error}") from error
-    written = [path for folder, pages in files.items() if pages for path in write_pages(site / folder, pages)]
+    # One after the other: the pages of ten thousand robots do not fit into memory at once.
+    written: list[Path] = []
+    for name, history in robots.items():
+        written += write_pages(site / ROBOTS, {name: _robot_html(history, now)})
+    for name, certificate in envelopes.items():
+        written += write_pages(site / ENVELOPES, {name: certificate.octets.decode()})
     return [*write_pages(site, {INDEX: _index_html(found, refused, now)}), *written]
 
 

@@ -19,6 +19,8 @@ from reports.attestation.statement import PAYLOAD_TYPE, sha256, statement_of
 from roaas import main
 
 _EXAMPLE = Path(__file__).parents[1] / "reports" / "data" / "result-example.json"
+COUNT = len(known()["ledger"])
+"""Number of requirements of the installed suite's default contract."""
 Changing = Callable[[dict[str, Any]], object]
 
 

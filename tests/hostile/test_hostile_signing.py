@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from signed_results import Vendor, conformant, failures, roaas
+from lxml import html
+from signed_results import COUNT, Vendor, conformant, failures, roaas
 from small_device import certified, constant, described, reading, small_device
 
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key
@@ -37,7 +38,7 @@ def honest(tmp_path_factory):
 def test_a_complete_result_is_signed_and_accepted(honest):
     done = honest.verify("--result", honest.folder)
     assert (done.exit_code, "ACCEPTED" in done.output) == (0, True), done.output
-    assert "all 267 requirements of the suite" in done.output
+    assert f"all {COUNT} requirements of the suite" in done.output
 
 
 def requirement(place, **members):
@@ -85,8 +86,8 @@ def other_robot(result):
 
 # What is changed in a result, and what `roaas sign` says of it.
 EDITED = [
-    ("one of 267 requirements", only_one, "266 of 267 requirements are not listed"),
-    ("a MUST less", without_a_must, "1 of 267 requirements are not listed"),
+    ("one requirement of all", only_one, f"{COUNT - 1} of {COUNT} requirements are not listed"),
+    ("a MUST less", without_a_must, f"1 of {COUNT} requirements are not listed"),
     ("a requirement twice", twice, "is listed more than once"),
     ("an invented requirement", invented, "the suite has no requirement http/invented"),
     ("another robot's requirements", other_robot, "is listed more than once"),
@@ -127,6 +128,12 @@ def test_a_result_in_which_a_name_occurs_twice_is_not_signed(vendor):
     path.write_text(path.read_text().replace('{"format"', '{"verdict": "not-conformant", "format"', 1))
     done = roaas("sign", vendor.folder, "--key", vendor.keys / PRIVATE_NAME)
     assert (done.exit_code, "'verdict' occurs twice" in done.output) == (2, True), done.output
+
+
+@pytest.mark.parametrize("name", ["/", "../sent", ".", "nowhere"])
+def test_a_name_in_a_result_leads_to_no_folder(vendor, name):
+    done = vendor.sign(conformant() | {"pack": {"name": name, "version": "1", "title": "robot"}})
+    assert (done.exit_code, "give its folder with --contract" in done.output) == (2, True), done.output
 
 
 def run(**members):
@@ -380,7 +387,7 @@ ALTERATIONS = {
 
 
 @settings(max_examples=25)
-@given(alteration=st.sampled_from(sorted(ALTERATIONS)), place=st.integers(0, 266))
+@given(alteration=st.sampled_from(sorted(ALTERATIONS)), place=st.integers(0, COUNT - 1))
 def test_any_alteration_of_a_requirement_is_refused(honest, tmp_path_factory, alteration, place):
     result = conformant()
     ALTERATIONS[alteration](result["requirements"], place)
@@ -545,3 +552,98 @@ def test_another_suite_cannot_know_the_whole_ledger_and_says_so(vendor, tmp_path
     assert vendor.sign(result).exit_code == 0
     done = vendor.verify("--policy", policy)
     assert (done.exit_code, "1 of 267 requirements are not listed" in done.output) == (1, True), done.output
+
+
+HOSTILE = "</td></script><script>alert(1)</script><img src=x onerror=alert(2)>\"'{{7*7}}\x1b[2J\u202e../../x\n"
+
+
+def hostile_everywhere(value):
+    """A value of JSON with a hostile text in place of each text and each name of a map."""
+    match value:
+        case dict():
+            return {f"{HOSTILE}{place}": hostile_everywhere(one) for place, one in enumerate(value.values())}
+        case list():
+            return [hostile_everywhere(one) for one in value]
+        case str():
+            return HOSTILE
+        case _:
+            return value
+
+
+def hostile_facts(document):
+    facts = document["predicate"]["roaas"]
+    for name, value in facts.items():
+        if name in {"robot", "suite", "requirement_set"}:
+            facts[name] = dict.fromkeys(value, HOSTILE)
+        elif name not in {"extent", "requirements", "outcomes", "finished"}:
+            facts[name] = hostile_everywhere(value)
+    facts["outcomes"] = {HOSTILE: {HOSTILE: [HOSTILE]}}
+    facts["requirements"] = {HOSTILE: 1}
+    facts["extent"]["claims"] = [HOSTILE]
+
+
+def registry(folder, *envelopes):
+    """Build a site by the vendors' public keys, which are in a folder beside it."""
+    done = roaas("registry", "build", *envelopes, "--keys", folder / "trusted", "--out", folder / "site")
+    assert "Traceback" not in done.output
+    return done
+
+
+def trusted(folder, *vendors):
+    (folder / "trusted").mkdir()
+    for place, one in enumerate(vendors):
+        shutil.copy(one.keys / PUBLIC_NAME, folder / "trusted" / f"{place}.pem")
+
+
+def test_a_site_shows_what_a_trusted_vendor_wrote_and_runs_none_of_it(vendor, tmp_path):
+    vendor.forge(conformant(), hostile_facts)
+    trusted(tmp_path, vendor)
+    done = registry(tmp_path, vendor.envelope)
+    assert done.stdout.startswith("0 of 1 robots with a certificate that counts, 0 refused"), done.output
+    pages = sorted((tmp_path / "site").rglob("*.html"))
+    assert len(pages) == 2
+    for path in pages:
+        assert path.resolve().is_relative_to(tmp_path / "site")
+        page = html.document_fromstring(path.read_text())
+        assert len(page.xpath("//script")) == 1
+        assert not page.xpath("//img | //*[@onerror]")
+        assert "\x1b" not in path.read_text()
+    said = vendor.verify()
+    assert (said.exit_code, "\x1b" in said.output) == (1, False)
+
+
+def test_a_certificate_of_the_future_supersedes_none(vendor, tmp_path):
+    """Otherwise nothing could ever supersede it."""
+    trusted(tmp_path, vendor)
+    folders = [tmp_path / "future", tmp_path / "now"]
+    future, now = (Vendor(folder, vendor.keys) for folder in folders)
+    future.forge(conformant(), run(finished="2099-01-01T00:00:00Z"))
+    assert now.sign(conformant()).exit_code == 0
+    done = registry(tmp_path, *folders)
+    assert done.stdout.startswith("1 of 1 robots with a certificate that counts"), done.output
+
+
+def test_a_registry_does_not_count_one_requirement_of_all(vendor, tmp_path):
+    trusted(tmp_path, vendor)
+    vendor.forge(conformant(), outcomes(dropped))
+    done = registry(tmp_path, vendor.folder)
+    assert done.stdout.startswith("0 of 1 robots with a certificate that counts"), done.output
+    assert "not the requirements of the suite" in (tmp_path / "site" / "index.html").read_text()
+
+
+def test_a_key_that_was_removed_signs_nothing_any_more(vendor, honest, tmp_path):
+    """A folder of keys is the only trust: what a removed key signed is refused, and links are read as files."""
+    trusted(tmp_path, honest)
+    (tmp_path / "trusted" / "link.pem").symlink_to(vendor.keys / PUBLIC_NAME)
+    assert vendor.sign(conformant()).exit_code == 0
+    assert registry(tmp_path, vendor.folder).exit_code == 0
+    (tmp_path / "trusted" / "link.pem").unlink()
+    done = registry(tmp_path, vendor.folder)
+    assert (done.exit_code, "foreign key" in done.output) == (1, True), done.output
+
+
+def test_a_certificate_with_too_many_classes_is_none(vendor):
+    """A registry has a column for each class."""
+    vendor.forge(conformant(), run(classes={f"class-{number}": "pass" for number in range(201)}))
+    done = vendor.verify()
+    assert (done.exit_code, "length <= 200" in done.output) == (1, True), done.output

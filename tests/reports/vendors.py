@@ -10,6 +10,11 @@ class Door:
     """The front door of an installation with this suite."""
 
     @staticmethod
+    def is_installed(_pack) -> bool:
+        """Return that it is."""
+        return True
+
+    @staticmethod
     def known(_pack=None) -> dict[str, Any]:
         """Return what the suite knows."""
         ledger = {

@@ -6,9 +6,10 @@ import pytest
 
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
-from conformance.contract.requirement_sets import judged_by
-from conformance.engine.suite import JUDGING, known, suite_digest
+from conformance.contract.requirement_sets import judged_by, load_set
+from conformance.engine.suite import JUDGING, contract_digests, known, suite_digest
 from conformance.packs.table1.files import CONTRACT_DIR
+from conformance.verdict.verdicts import holds_back
 
 _OTHERS = ("fleet", "selftest", "cli", "explaining", "mutation", "packs", "commandline")
 
@@ -67,4 +68,14 @@ def test_a_pack_without_frozen_sets_has_the_one_of_its_ledger(tmp_path):
     scored = judged_by(contract, None)
     assert scored is not None
     assert known(str(contract.directory))["requirement_sets"] == {"unfrozen": scored.digest}
-    assert set(known()["requirement_sets"]) == {"1.2"}
+    assert "1.2" in known()["requirement_sets"]
+
+
+def test_a_verifier_knows_the_whole_ledger():
+    contract, found = Contract.load(), known()
+    assert list(found["ledger"]) == list(contract.ledger)
+    decides = {id_ for id_, item in found["ledger"].items() if item["decides"]}
+    assert decides == {id_ for id_, item in contract.ledger.items() if holds_back(item)}
+    frozen = load_set(contract, "1.2").requirements
+    assert {id_ for id_, item in found["ledger"].items() if "1.2" in item["sets"]} == set(frozen)
+    assert found["contract"] == contract_digests(contract)
