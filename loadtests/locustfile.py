@@ -104,7 +104,7 @@ def workload_of(options: Any) -> Workload:
         StopTest: the options do not make a run; the message says why.
     """
     try:
-        robot = with_addresses(settings_of(options).robot)
+        (robot,), _ = with_addresses(settings_of(options).robot)
         locations = {name: robot.wsdl(name) for name in CATALOGUE}
         documents = {name: read_document(location, robot) for name, location in locations.items() if location}
     except (SettingsError, WsdlError, CallError, EndpointError) as error:

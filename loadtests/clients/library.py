@@ -5,6 +5,7 @@ transport for each user. REST goes through `requests`. Both use a urllib3 adapte
 requests for one call are a silent retry, which makes a run invalid.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +20,7 @@ from loadtests.clients.failures import CallError, connect_error, require_good
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values, rest_path
 from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
+from loadtests.clients.wsdl import loader
 
 #: Options and results call it after the library for SOAP; over REST it is requests.
 LIBRARY = Client.ZEEP
@@ -82,15 +84,14 @@ class _Staying(requests.Session):
         return None
 
 
-def new_session(robot: Robot, sent: Sent | None = None, *, staying: bool = False) -> requests.Session:
-    """Return a `requests` session as a user would set it up for this robot.
+def new_session(robot: Robot, sent: Sent | None = None) -> requests.Session:
+    """Return a `requests` session as a user would set it up for this robot; it follows no redirect.
 
     Args:
         robot: its credentials.
         sent: counts the requests.
-        staying: follow no redirect.
     """
-    session = _Staying() if staying else requests.Session()
+    session = _Staying()
     session.trust_env = False  # a proxy from the environment would be measured instead of the robot
     for scheme in ("http://", "https://"):
         session.mount(scheme, _CountingAdapter(sent or Sent()))
@@ -129,7 +130,7 @@ class _TimedTransport(Transport):
 
     def __init__(self, robot: Robot, sent: Sent) -> None:
         super().__init__(  # type: ignore[no-untyped-call]  # zeep annotates the class, not its constructor
-            session=new_session(robot, sent, staying=True), timeout=robot.timeout_s, operation_timeout=robot.timeout_s
+            session=new_session(robot, sent), timeout=robot.timeout_s, operation_timeout=robot.timeout_s
         )
         self.timed = Timed(0, 0, None)
 
@@ -144,13 +145,27 @@ class _TimedTransport(Transport):
         return response
 
 
+class _Documents(Transport):
+    """zeep's transport for a WSDL and what it refers to, which are read from the robot's servers alone."""
+
+    def __init__(self, load: Callable[[str], bytes]) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]  # as above
+        self._load = load
+
+    def load(self, url: str) -> bytes:
+        """Return a document."""
+        return self._load(url)
+
+
 def read_document(location: str, robot: Robot) -> Document:
     """Parse a WSDL for zeep.
 
     Raises:
+        WsdlError: it, or what it refers to, is not there, or is elsewhere.
+        CallError: its server does not respond.
         Exception: of any kind that zeep and lxml raise; the caller words it.
     """
-    transport: Any = Transport(session=new_session(robot), timeout=robot.timeout_s)  # zeep annotates the class itself
+    transport: Any = _Documents(loader(location, robot))  # zeep annotates the class itself
     return Document(location, transport, settings=zeep.Settings())
 
 
@@ -209,7 +224,7 @@ class LibraryRest:
     def __init__(self, robot: Robot, sent: Sent) -> None:
         self._robot = robot
         self._sent = sent
-        self._session = new_session(robot, sent, staying=True)
+        self._session = new_session(robot, sent)
         self._base = (robot.rest or "").rstrip("/")
 
     def call(self, operation: str, values: Values) -> Timed:

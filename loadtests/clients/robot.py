@@ -44,6 +44,7 @@ class Robot:
         credentials: what the requests of these operations carry.
         certificate: client certificate and its key for TLS, as files.
         username_token: the user whose token each message of a described SOAP operation carries.
+        trust_hosts: further servers to which a WSDL may lead.
     """
 
     rest: str | None
@@ -60,6 +61,7 @@ class Robot:
     credentials: tuple[Credential, ...] = ()
     certificate: tuple[str, str | None] | None = None
     username_token: UsernameToken | None = None
+    trust_hosts: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         SECRETS.keep(self.token or "", "$ROAAS_TOKEN")

@@ -1,26 +1,58 @@
 """The address of a service, read from its WSDL (WSDL 1.1 section 3.8, soap:address)."""
 
+import re
+from collections.abc import Callable
 from dataclasses import replace
-from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit, urlunsplit
 
-import requests
-
+from conformance.transport.client import Connection
+from conformance.transport.fetching import Fetcher
+from conformance.transport.reach import Folder, Trust, UnreachableError, is_same, moved, server_of
 from loadtests.clients.endpoint import Endpoint, EndpointError
-from loadtests.clients.library import new_session, request_error
+from loadtests.clients.failures import CallError
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE
 from loadtests.clients.robot import Robot
 from loadtests.clients.xml_reader import XmlError, parse_xml
 
 _WSDL = "http://schemas.xmlsoap.org/wsdl/"
 _SOAP = "http://schemas.xmlsoap.org/wsdl/soap/"
+_PAGE = re.compile(rb"\s*<(!doctype html|html)", re.IGNORECASE)
 _MOST = 4 * 1024 * 1024
 
 
 class WsdlError(ValueError):
     """A WSDL that cannot be used; the message says what is wrong with it."""
+
+
+def trust_of(robot: Robot) -> Trust:
+    """Return the trust in the servers that the user named for a robot."""
+    named = (robot.rest, robot.publishers, robot.subscribers, robot.publishers_wsdl, robot.subscribers_wsdl)
+    return Trust.of(*named, hosts=robot.trust_hosts)
+
+
+def loader(location: str, robot: Robot) -> Callable[[str], bytes]:
+    """Return a function that reads a WSDL, and what it refers to: on the robot's servers, or in the WSDL's folder.
+
+    The function raises WsdlError if there is no such document, or it is elsewhere, and CallError if its server does not
+    respond.
+    """
+    settings = Connection(
+        timeout_s=robot.timeout_s, ca_file=Path(robot.ca_file) if robot.ca_file else None, token=robot.token
+    )
+    fetcher, folder = Fetcher(settings, trust_of(robot)), Folder(location)
+
+    def load(place: str) -> bytes:
+        try:
+            return fetcher(place) if place.lower().startswith(("http://", "https://")) else folder.read(place)
+        except UnreachableError as error:
+            raise CallError("refused", str(error)) from None
+        except OSError as error:
+            raise WsdlError(f"WSDL {place!r}: {error.strerror or error}") from None
+        except ValueError as error:
+            raise WsdlError(f"WSDL {place!r}: {error}") from None
+
+    return load
 
 
 def fetch(location: str, robot: Robot) -> bytes:
@@ -30,33 +62,31 @@ def fetch(location: str, robot: Robot) -> bytes:
         WsdlError: no such file, or the response is not a document.
         CallError: the URL does not respond.
     """
-    if not location.startswith(("http://", "https://")):
-        try:
-            return Path(location).read_bytes()
-        except OSError as error:
-            raise WsdlError(f"WSDL {location!r}: {error.strerror or error}") from None
-    try:
-        with new_session(robot) as session:
-            answer = session.get(location, timeout=robot.timeout_s)
-    except requests.RequestException as error:
-        raise request_error(error, location, robot.timeout_s) from None
-    if answer.status_code != requests.codes.ok:
-        raise WsdlError(f"WSDL {location!r}: status {answer.status_code} instead of a document")
-    return answer.content
+    return loader(location, robot)(location)
 
 
 def address_in(content: bytes, location: str, element: str) -> str:
-    """Return the address of the service whose port type offers an operation.
+    """Return the address of the service whose port type offers an operation, on the server of a WSDL's URL.
 
     Raises:
         WsdlError: not XML, not a WSDL, another service's WSDL, or no address in it.
+    """
+    return _followed(_declared(content, location, element), location, Trust.of(location))
+
+
+def _declared(content: bytes, location: str, element: str) -> str:
+    """Return the address that a WSDL names, whatever its server.
+
+    Raises:
+        WsdlError: as address_in().
     """
     if len(content) > _MOST:
         raise WsdlError(f"WSDL {location!r} is longer than {_MOST} bytes")
     try:
         root = parse_xml(content)
     except XmlError as error:
-        raise WsdlError(f"WSDL {location!r} {error}") from None
+        page = " (an HTML page, such as a login?)" if _PAGE.match(content) else ""
+        raise WsdlError(f"WSDL {location!r} {error}{page}") from None
     if root.tag != f"{{{_WSDL}}}definitions":
         raise WsdlError(f"{location!r} is not a WSDL 1.1: its root element is {root.tag!r}")
     offered = {found.get("name") for found in root.iter(f"{{{_WSDL}}}operation")}
@@ -75,41 +105,45 @@ def address_in(content: bytes, location: str, element: str) -> str:
             Endpoint.parse(url)
         except EndpointError as error:
             raise WsdlError(f"WSDL {location!r}: its soap:address cannot be used: {error}") from None
-        return _reachable(url, location)
+        return url
     raise WsdlError(f"WSDL {location!r} has no soap:address: give the address with --…-endpoint URL")
 
 
-def with_addresses(robot: Robot) -> Robot:
-    """Return the robot with the addresses that only its WSDLs contain.
+def with_addresses(*robots: Robot) -> tuple[tuple[Robot, ...], list[str]]:
+    """Return robots with the addresses that only their WSDLs contain, and remarks on those on other servers.
 
     Raises:
-        WsdlError: a WSDL cannot be used.
+        WsdlError: a WSDL cannot be used, or a file alone would decide where the token goes.
         CallError: a WSDL's URL does not respond.
     """
+    remarks: list[str] = []
+    return tuple(_with_addresses(robot, remarks) for robot in robots), remarks
+
+
+def _with_addresses(robot: Robot, remarks: list[str]) -> Robot:
     found: dict[str, Any] = {}
     for name, operation in CATALOGUE.items():
         location = robot.wsdl(name)
         if location is None or robot.address("soap", name) is not None or operation.service in found:
             continue
-        found[operation.service] = address_in(fetch(location, robot), location, operation.element)
+        declared = _declared(fetch(location, robot), location, operation.element)
+        trust = trust_of(robot)
+        found[operation.service] = used = _followed(declared, location, trust)
+        if not is_same(used, declared):
+            remarks.append(
+                f"the WSDL names the address {declared}, on another server: {used} was measured, on the WSDL's own "
+                f"(--{operation.service}-endpoint and --trust-host change that)"
+            )
+        if robot.token and not trust.trusts(used):
+            raise WsdlError(
+                f"WSDL {location!r} names the address {declared}, and no description decides where a token goes: name "
+                f"the address yourself, as by --{operation.service}-endpoint {declared}"
+            )
     return replace(robot, **found)
 
 
-def _reachable(url: str, location: str) -> str:
-    """Replace the loopback host in a WSDL that was fetched from another machine by that machine."""
-    there, here = urlsplit(url), urlsplit(location)
-    if here.scheme in {"http", "https"} and _is_own(there.hostname) and not _is_own(here.hostname):
-        host = f"[{here.hostname}]" if ":" in (here.hostname or "") else here.hostname
-        return urlunsplit(there._replace(netloc=f"{host}:{there.port}" if there.port else str(host)))
-    return url
-
-
-def _is_own(host: str | None) -> bool:
-    """Return whether a host name means the machine that uses it: a loopback address, or 0.0.0.0 or `::`."""
-    if host is None or host == "localhost":
-        return host is not None
-    try:
-        address = ip_address(host)
-    except ValueError:
-        return False
-    return address.is_loopback or address.is_unspecified
+def _followed(declared: str, location: str, trust: Trust) -> str:
+    """Return the address as it is used: a WSDL from a server names no other server, unless that is trusted."""
+    if trust.trusts(declared):
+        return trust.place(declared)
+    return moved(declared, declared, server_of(trust.place(location))) if "://" in location else declared

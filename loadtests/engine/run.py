@@ -74,13 +74,13 @@ class Run:
             RunAborted: a WSDL is wrong, or the robot does not respond.
         """
         try:
-            self.robots = self.outcome.robots = tuple(map(with_addresses, self.robots))
+            self.robots, remarks = self.outcome.robots, _ = with_addresses(*self.robots)
         except WsdlError as error:
             raise RunAborted(ExitCode.USAGE, str(error)) from None
         except CallError as error:
             raise RunAborted(ExitCode.UNREACHABLE, f"the robot cannot be reached: {error}") from None
         self.plan, notes = duel_plan(self.settings, *self.robots)
-        self.outcome.notes += notes
+        self.outcome.notes += [*remarks, *notes]
 
     def check(self) -> None:
         """Call everything once.

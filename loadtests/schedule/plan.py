@@ -137,7 +137,9 @@ class Plan:
 
     @cached_property
     def _rounds(self) -> list[Segment]:
-        """Return the comparison's blocks in order, without their times."""
+        """Return the comparison's blocks in order, without their times; none where nothing can be called."""
+        if not (self.clients and self.interfaces):
+            return []
         arrivals = _ARRIVALS_PER_BLOCK * turns_of_all(self.weights, len(self.operations))
         least = max(self.least_block_s, self.load.duration_s / _MAX_BLOCKS, arrivals / (self.load.rate or math.inf))
         most = int(self.load.duration_s / least + 1e-9)
@@ -153,11 +155,13 @@ class Plan:
     @property
     def block_s(self) -> float:
         """Return the length of a block."""
-        return self.load.duration_s / self.blocks
+        return self.load.duration_s / max(1, self.blocks)
 
     @cached_property
     def segments(self) -> list[Segment]:
         """Return all segments in order; their numbers begin at `first_segment`."""
+        if not self._rounds:
+            return []
         made = self._steps() if self.step_rate is not None else [*self._warmup(), *self._duel()]
         return [replace(segment, gap=False) for segment in made] if self.scenario else made
 

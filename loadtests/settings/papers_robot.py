@@ -117,6 +117,7 @@ def _robot(endpoints: Endpoints, interfaces: tuple[str, ...]) -> Robot:
         ca_file=endpoints.ca_file,
         token=_token(endpoints.token_file),
         timeout_s=endpoints.timeout_s,
+        trust_hosts=endpoints.trust_hosts,
     )
 
 

@@ -104,7 +104,7 @@ def comparison(
 
 def aa_interval(measured: Measured, operation: str, quantile: str) -> Interval | None:
     """Return the interval of the ratio that SOAP and REST came to against themselves, both pooled."""
-    client, seed = measured.plan.clients[0], measured.plan.load.seed
+    client, seed = next(iter(measured.plan.clients), ""), measured.plan.load.seed
     parts = [
         _enough(measured.paired(*_against_itself((operation, interface, client))), quantile, seed, stream=stream)
         for stream, interface in enumerate(WEB_SERVICES)

@@ -2,13 +2,14 @@
 
 from pathlib import Path
 
-from conformance.api.soap.address import is_http, may_be_followed, soap_address, split
+from conformance.api.soap.address import is_http, soap_address, split
 from conformance.api.soap.published_wsdl import PublishedWsdl, get, obtain
 from conformance.api.soap.service import KnownMessages, SoapService
 from conformance.contract.interfaces import Interface
 from conformance.statement.statement import StatementError
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswerError
+from conformance.transport.reach import Trust
 
 # How long the address in a WSDL is given to answer before the WSDL's own is taken instead, s.
 _PROBE_S = 3.0
@@ -24,8 +25,8 @@ def open_service(
 ) -> SoapService:
     """Find out where a service is. Whatever the robot answers, there is a service to send to afterwards.
 
-    An endpoint that is given wins. Else it is what the WSDL's soap:address says, if that answers; else the WSDL's URL
-    without its query.
+    An endpoint that is given wins. Else it is what the WSDL's soap:address says, if that is on a server that the user
+    named and answers; else the WSDL's URL without its query.
 
     Args:
         name: ``publishers`` or ``subscribers``.
@@ -37,7 +38,7 @@ def open_service(
 
     Raises:
         StatementError: what was given names no place: no HTTP URL, a file that cannot be read, or one that names no
-            usable address while no endpoint is given.
+            usable address while no endpoint is given, or alone decides where credentials go.
     """
     for option, url in (("endpoint", endpoint), ("WSDL", wsdl if wsdl and "://" in wsdl else None)):
         if url is not None and not is_http(url):
@@ -48,6 +49,11 @@ def open_service(
         raise StatementError(
             f"{name}: {wsdl} has no soap:address with an http URL; say where the service is with --{name}-endpoint"
         )
+    if not endpoint and published.url is None and connection.credentials and not connection.may_authorize(where):
+        raise StatementError(
+            f"{name}: {wsdl} names the address {where}, and no description decides where credentials go: name the "
+            f"address yourself, as by --{name}-endpoint {where}"
+        )
     base, path = split(where)
     return SoapService(name, HttpClient(base, connection), path, published, contract_wsdl_path, known_messages)
 
@@ -57,11 +63,12 @@ def _located(published: PublishedWsdl, connection: Connection) -> str | None:
     address = soap_address(published.document) if published.document else None
     if published.url is None:
         return address if address and is_http(address) else None
-    if address and may_be_followed(address, published.url, with_token=bool(connection.credentials)):
+    trust = connection.trust or Trust.of(published.url)
+    if address and trust.trusts(address):
         try:
-            get(address, connection, timeout_s=min(_PROBE_S, connection.timeout_s))
+            get(trust.place(address), connection, timeout_s=min(_PROBE_S, connection.timeout_s))
         except NoAnswerError:
             pass
         else:
-            return address
+            return trust.place(address)
     return published.url.split("?", 1)[0]

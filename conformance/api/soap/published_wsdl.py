@@ -9,6 +9,7 @@ from conformance.documents.wsdl import Description, DescriptionError, describe
 from conformance.statement.statement import StatementError
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError
+from conformance.transport.reach import Folder
 
 _OK = 200
 
@@ -43,7 +44,9 @@ class PublishedWsdl:
             return None, self.problem
         try:
             described = describe(
-                self.document, self.source, lambda location: fetch(location, self.url or beside, connection)
+                self.document,
+                self.source,
+                lambda location: fetch(location, self.url or beside, connection, Folder(str(self.source))),
             )
         except DescriptionError as error:
             return None, str(error)
@@ -83,17 +86,17 @@ def obtain(name: str, source: str | None, connection: Connection) -> PublishedWs
     return PublishedWsdl(source, exchange.response.body, "", exchange)
 
 
-def fetch(location: str, robot: str, connection: Connection) -> bytes:
+def fetch(location: str, robot: str, connection: Connection, folder: Folder) -> bytes:
     """Read a document that a WSDL refers to, at its resolved location: a file, or from the robot and no other host.
 
     A robot behind a proxy or another name writes locations with its own; the same path is asked for at the URL
-    ``robot``.
+    ``robot``. A file is in the ``folder``.
 
     Raises:
-        OSError: it cannot be had.
+        OSError, ValueError: it cannot be had.
     """
     if "://" not in location:
-        return Path(location).read_bytes()
+        return folder.read(location)
     path = split(location)[1]
     try:
         exchange = get(split(robot)[0] + path, connection)

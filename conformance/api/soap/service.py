@@ -14,6 +14,7 @@ from conformance.documents.wsdl import Description, DescriptionError, Operation,
 from conformance.documents.xml_node import Node
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
+from conformance.transport.reach import Folder
 
 KnownMessages = Callable[["SoapService", Operation], Iterable[Node]]
 
@@ -118,9 +119,11 @@ class SoapService:
         return self.own if self.own is not None and not next(faults(self.own), "") else self.contract
 
     def fetch(self, location: str) -> bytes:
-        """Read a document that the robot's WSDL refers to.
+        """Read a document that the robot's WSDL refers to, or the contract's where the robot has none.
 
         Raises:
-            OSError: it cannot be had.
+            OSError, ValueError: it cannot be had.
         """
-        return fetch(location, self.published.url or self.endpoint, self.client.connection)
+        own = self.published.source if self.published.document is not None else None
+        folder = Folder(own or str(self.contract_wsdl_path))
+        return fetch(location, self.published.url or self.endpoint, self.client.connection, folder)

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
-from urllib.parse import urlsplit
 
 import pytest
 
@@ -19,6 +18,7 @@ from conformance.documents.wsdl import Description, DescriptionError, describe, 
 from conformance.documents.xml_names import WSDL_SOAP, clark
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError
+from conformance.transport.reach import Trust, is_same
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
@@ -71,7 +71,7 @@ def _served(service: SoapService) -> _Served:
         description = describe(answer.body, source, service.fetch)
     except DescriptionError as error:
         return _Served(exchange, None, str(error))
-    missing = [(place, why) for place, why in description.missing if urlsplit(place).netloc == urlsplit(source).netloc]
+    missing = [(place, why) for place, why in description.missing if is_same(place, source)]
     # A document of another host (a public schema) matters only where something that is used comes from it.
     problem = next((f"a reference to {place}: {why}" for place, why in missing), "") or next(faults(description), "")
     return _Served(exchange, description, problem)
@@ -131,19 +131,16 @@ def _answers(service: SoapService, location: str) -> tuple[Attempt | None, str]:
     """
     if not is_http(location):
         return None, "an address that is no http URL"
-    base, path = split(location)
+    trust = service.client.connection.trust or Trust.of(service.endpoint)
+    if reason := trust.refusal(location):
+        return None, f"an address to which nothing was sent: {reason}"
+    base, path = split(trust.place(location))
     try:
         with closing(HttpClient(base, service.client.connection)) as client:
-            # The token is for the robot that the statement names.
-            authorized = client.host == service.client.host
             if client.refusal("POST", path):
-                return client.send("GET", path, authorized=authorized), ""
+                return client.send("GET", path), ""
             exchange = client.send(
-                "POST",
-                path,
-                headers=(("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", '""')),
-                body=EMPTY,
-                authorized=authorized,
+                "POST", path, headers=(("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", '""')), body=EMPTY
             )
     except NoAnswerError as none:
         return none.unanswered, str(none)

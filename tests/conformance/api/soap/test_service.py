@@ -8,6 +8,7 @@ from conformance.api.soap.discovery import open_service
 from conformance.packs.table1.files import CONTRACT_DIR
 from conformance.statement.statement import StatementError
 from conformance.transport.client import Connection
+from conformance.transport.reach import Trust
 
 WSDL = (CONTRACT_DIR / "publishers.wsdl").read_bytes()
 PATH = CONTRACT_DIR / "publishers.wsdl"
@@ -67,7 +68,10 @@ def test_a_closed_port_is_no_error():
 def test_the_address_in_the_wsdl_is_taken_where_it_answers(listening):
     there = listening(answered(b"", "405 Method Not Allowed"))
     base = listening(answered(addressed(f"{there}/elsewhere")))
-    assert opened(f"{base}/robot_ws?wsdl").endpoint == f"{there}/elsewhere"
+    assert opened(f"{base}/robot_ws?wsdl").endpoint == f"{base}/robot_ws", "another server is not followed"
+    trust = Trust.of(hosts=[there.removeprefix("http://")])
+    service = open_service("publishers", f"{base}/robot_ws?wsdl", None, Connection(timeout_s=1.0, trust=trust), PATH)
+    assert service.endpoint == f"{there}/elsewhere"
 
 
 @pytest.mark.parametrize(
