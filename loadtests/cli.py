@@ -1,4 +1,7 @@
-"""`roaas load`: the options, and the process that does the measuring."""
+"""`roaas load`: the options, and the process that does the measuring.
+
+Over 300 lines because half of them are the options.
+"""
 
 import os
 import signal
@@ -6,15 +9,16 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, TemporaryFile
 from types import FrameType
-from typing import Any, Self
+from typing import IO, Any, Self
 
 import click
 
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, ResultCommand
+from conformance.commandline.terminal import inert
 from conformance.commandline.without_folders import command_without_folders
 from conformance.contract.toml_file import TomlFileError
 from conformance.packs.table1.statement import Statement, load_robot_statement
@@ -23,6 +27,7 @@ from conformance.statement.endpoints import Endpoints
 from loadtests.clients.failures import CallError
 from loadtests.described.device import DESCRIBED_ONLY, Named
 from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest, store
+from loadtests.result.files import with_unstopped
 from loadtests.schedule.plan import CLIENTS, INTERFACES
 from loadtests.settings.cli_options import KNEE_SEARCHES, CliOptions
 from loadtests.settings.errors import SettingsError
@@ -44,8 +49,10 @@ _FILE = click.Path(path_type=Path)
 _DESCRIPTIONS = ("publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint")
 
 
-def _run_load(settings: Settings, written: Path) -> CommandResult:
+def _run_load(settings: Settings, written: Path, summary: IO[str]) -> CommandResult:
     """Run a load test in its own process, which writes the path of its result into the file `written`.
+
+    Its summary goes into another file, as it is printed once the robot has been stopped.
 
     The process has its own session, so that Ctrl-C reaches it only through this process: it then writes a partial
     result.
@@ -53,6 +60,7 @@ def _run_load(settings: Settings, written: Path) -> CommandResult:
     child = subprocess.Popen(
         [sys.executable, "-P", "-m", "loadtests"],
         stdin=subprocess.PIPE,
+        stdout=summary,
         text=True,
         start_new_session=True,
         env=os.environ | _ONE_THREAD,
@@ -198,6 +206,8 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     robot not reachable; 4 measurement not valid or inconclusive; 130 interrupted.
     """
     device = None
+    context = click.get_current_context()
+    summary = context.with_resource(TemporaryFile("w+", encoding="utf-8"))  # noqa: SIM115 - click closes it
     try:
         named = Named.of(targets, options)
         kept = _Baselines.of(options.pop("baselines"), options.pop("save"), options.pop("baseline"))
@@ -211,7 +221,7 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
             settings = device.settings(_command_line())
         _make_folder(Path(settings.output.folder))
         with TemporaryDirectory(prefix="roaas-load-") as folder:
-            result = _run_load(settings, Path(folder, "written"))
+            result = _run_load(settings, Path(folder, "written"), summary)
     except (TomlFileError, SettingsError, BaselineError) as error:
         click.echo(f"roaas load: {error}", err=True)
         return CommandResult(ExitCode.USAGE)
@@ -221,9 +231,13 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     except KeyboardInterrupt:
         return CommandResult(ExitCode.INTERRUPTED)
     finally:
-        for problem in device.stop() if device is not None else ():
-            click.echo(f"roaas load: {problem}", err=True)
-    return kept.after(result, tolerance, click.get_current_context().obj)
+        unstopped = "; ".join(device.stop()) if device is not None else ""
+        if unstopped:
+            click.secho(f"WARNING: {inert(unstopped)}", fg="red")
+    summary.seek(0)
+    click.echo(summary.read(), nl=False)
+    result = with_unstopped(result, unstopped) if unstopped else result
+    return kept.after(result, tolerance, context.obj)
 
 
 def _papers_robot(statement: Path | None, options: dict[str, Any]) -> Settings:

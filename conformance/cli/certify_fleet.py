@@ -10,6 +10,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from conformance.cli.summary import warning
 from conformance.commandline.result_command import CommandResult
 from conformance.commandline.terminal import inert
 from conformance.contract.locating import ContractError
@@ -108,6 +109,9 @@ def _shared() -> list[str]:
 def _print_summary(results: list[MemberResult]) -> None:
     """Print one line for each robot: its verdict, and the classes it passed."""
     width = max(len(result.member.name) for result in results)
+    for result in results:
+        if said := warning(result.document or {}, f"{result.member.name}: "):
+            click.secho(said, fg="red", nl=False)
     click.echo()
     for result in results:
         trusted = ", ".join(result.trusted)

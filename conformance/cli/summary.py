@@ -80,10 +80,10 @@ def print_summary(outcome: Certification) -> None:
     )
 
 
-def warning(document: Mapping[str, Any]) -> str:
+def warning(document: Mapping[str, Any], which: str = "") -> str:
     """Return the line that says that the robot may still move, which comes before all others; or an empty text."""
     said = document.get("stop_undelivered", "")
-    return f"WARNING: {inert(said)}\n" if said else ""
+    return f"WARNING: {which}{inert(said)}\n" if said else ""
 
 
 def _print_unjudged(document: Mapping[str, Any]) -> None:

@@ -188,7 +188,9 @@ def _concluded(
     code = (
         OF_VERDICT[overall(accepted, enough=run.enough and not run.judge.faults)] if reached else ExitCode.UNREACHABLE
     )
-    return Certification(code, document, path)
+    # No program may take for a good end that the robot drives on.
+    still_moves = code is ExitCode.PASSED and bool(run.stop_undelivered)
+    return Certification(ExitCode.INCONCLUSIVE if still_moves else code, document, path)
 
 
 def _deciding(

@@ -10,7 +10,7 @@ from conformance.commandline.atomic_write import write_json
 from conformance.commandline.exit_codes import ExitCode
 from conformance.engine.result import rfc3339
 from conformance.engine.suite import suite_version
-from conformance.fleet.member_run import EXIT_CODES, MemberResult
+from conformance.fleet.member_run import EXIT_CODES, MemberResult, Outcome
 
 FLEET_FORMAT = "roaas-fleet/1"
 FLEET_NAME = "fleet.json"
@@ -31,6 +31,8 @@ def exit_code(results: Sequence[MemberResult], *, interrupted: bool) -> ExitCode
 def _code(result: MemberResult) -> ExitCode:
     if result.exit_code == ExitCode.PASSED:  # also where a baseline accepts each failure
         return ExitCode.PASSED
+    if result.outcome is Outcome.CONFORMANT and "stop_undelivered" in (result.document or {}):
+        return ExitCode.INCONCLUSIVE
     return EXIT_CODES[result.outcome]
 
 
@@ -85,5 +87,6 @@ def _robot(result: MemberResult) -> dict[str, Any]:
             "requirement_set": document["requirement_set"],
             "classes": document["classes"],
             "accepted_until": document.get("accepted_until"),
+            **({"stop_undelivered": document["stop_undelivered"]} if "stop_undelivered" in document else {}),
         }
     return told

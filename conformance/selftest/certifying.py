@@ -27,6 +27,8 @@ from conformance.verdict.run import Run
 
 # What every run imports: loaded once, and inherited by the processes that are forked from there.
 _PRELOADED = ["conformance.selftest.preloaded"]
+# The stop of a robot at the end of a run is tried for so long, s.
+_STOP_S = 1.0
 #: Names the folder of the pack that is loaded there as well.
 PACK_VARIABLE = "ROAAS_SELFTEST_PACK"
 
@@ -179,6 +181,8 @@ def robot_of(job: Job, folder: Path) -> RobotUnderTest:
         allow_motion=not contract.described,
         seed=job.seed,
         effort=Effort(job.effort),
+        # Nothing is hurt by a mutant that cannot be stopped.
+        stop_s=_STOP_S,
     )
     if job.enough:
         run.judge = _EnoughKnown(run, job.enough)

@@ -60,6 +60,7 @@ class Run:
         losses: how often the device stopped responding.
         restart_command: command that restarts a device that stopped responding, or empty.
         wait_s: how long a device that stopped responding is waited for, s; None: as the restart command has it.
+        stop_s: for how long the stop of the device is tried by default, s.
         refused: how the device refused the run's credentials, so that nothing, or not all, was judged; or empty.
         unshown: why nothing of a device with a description of its own was shown, or empty.
         stop_undelivered: why the device may still move after the run; empty: it was stopped, or was not moved.
@@ -84,6 +85,7 @@ class Run:
     losses: int = 0
     restart_command: str = ""
     wait_s: float | None = None
+    stop_s: float = 20.0
     refused: str = ""
     unshown: str = ""
     stop_undelivered: str = ""
@@ -99,6 +101,11 @@ class Run:
         """Record that the time was over before a case of a requirement was tried."""
         say = self.judge.not_seen if self.contract.described else self.judge.note
         say(requirement, self.limit.reason)
+
+    @property
+    def tries_stop_s(self) -> float:
+        """How long the stop of the device is tried: as long as a lost device is waited for, s."""
+        return self.wait_s or self.stop_s
 
     @property
     def scored(self) -> frozenset[str] | None:

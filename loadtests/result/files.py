@@ -1,6 +1,7 @@
 """The files of a result: latency.json and one .hgrm file for each series, each written completely or not at all."""
 
 import io
+import json
 import re
 from collections import Counter
 from pathlib import Path
@@ -9,6 +10,8 @@ from typing import Any
 from hdrh.histogram import HdrHistogram
 
 from conformance.commandline.atomic_write import write_atomically, write_json
+from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.result_command import CommandResult
 
 FORMAT = "roaas-latency/1"
 _NO_NAME = re.compile(r"[^A-Za-z0-9.-]+")
@@ -28,6 +31,20 @@ def write(folder: Path, result: dict[str, Any]) -> Path:
         for time, key in (("service", "histogram"), ("response", "response_histogram")):
             write_atomically(folder / f"{stem}-{time}.hgrm", percentile_distribution(series[key]))
     return write_json(folder / "latency.json", result, indent=1, allow_nan=False)
+
+
+def with_unstopped(result: CommandResult, why: str) -> CommandResult:
+    """Write into latency.json that the robot may still move, and why; return the result, which has not passed then.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    if result.file is not None:
+        document = json.loads(result.file.read_text(encoding="utf-8"))
+        document |= {"stop_undelivered": why, "notes": [why, *document["notes"]]}
+        document["exit_code"] = document["exit_code"] or int(ExitCode.INCONCLUSIVE)
+        write_json(result.file, document, indent=1, allow_nan=False)
+    return result._replace(exit_code=result.exit_code or ExitCode.INCONCLUSIVE)
 
 
 def percentile_distribution(encoded: str) -> str:

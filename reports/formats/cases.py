@@ -1,7 +1,8 @@
 """Convert a conformance result to test cases, from which every CI format is written.
 
 Each requirement becomes a case. A class whose verdict no requirement explains (a missing prerequisite, nothing
-executed) gets a case of its own, and so does a run without any verdict. So no CI system shows green by mistake.
+executed) gets a case of its own, and so does a run without any verdict. So no CI system shows green by mistake. That
+the robot may still move is the first case.
 """
 
 import hashlib
@@ -14,6 +15,8 @@ from typing import Any
 from reports.findings import Finding, findings
 from reports.pages.untrusted import beginning
 
+STOP = "stop"
+"""Name of the case that says that the robot may still move."""
 MESSAGE = 1000
 """Characters of a case's message that a format shows on one line."""
 _SHOWN_FAILURES = 10
@@ -49,8 +52,8 @@ class Case:
     """One test case: of a requirement, a class or the run.
 
     Attributes:
-        name: id of the requirement, `class NAME`, or `run`.
-        class_name: the conformance class; empty for the run.
+        name: id of the requirement, `class NAME`, `run`, or `stop`.
+        class_name: the conformance class; empty for the run and the stop.
         outcome: its outcome.
         message: the reason for the outcome in one line, or empty.
         requirement: the requirement's entry in result.json; None for a class or the run.
@@ -91,6 +94,8 @@ class Case:
 def cases(result: Mapping[str, Any]) -> list[Case]:
     """Return the test cases of a valid `roaas-result/1` document, class by class."""
     found = [case for name in classes(result) for case in _of_class(result, name)]
+    if "stop_undelivered" in result:
+        found.insert(0, Case(STOP, "", Outcome.ERROR, result["stop_undelivered"]))
     if not found or (
         result["verdict"] != "conformant"
         and not any(case.outcome in {Outcome.FAILED, Outcome.ERROR, Outcome.ACCEPTED} for case in found)
@@ -102,11 +107,12 @@ def cases(result: Mapping[str, Any]) -> list[Case]:
 def worst_first(found: Sequence[Case]) -> list[Case]:
     """Return only the cases that failed, were not judged, were accepted or have a warning, in this order.
 
-    Cases with the same outcome are sorted by the number of their most urgent finding.
+    That the robot may still move comes first. Cases with the same outcome are sorted by the number of their most urgent
+    finding.
     """
     order = [Outcome.FAILED, Outcome.ERROR, Outcome.ACCEPTED, Outcome.WARNING]
     shown = (case for case in found if case.outcome in order)
-    return sorted(shown, key=lambda case: (order.index(case.outcome), _first(case)))
+    return sorted(shown, key=lambda case: (case.name != STOP, order.index(case.outcome), _first(case)))
 
 
 def _first(case: Case) -> float:

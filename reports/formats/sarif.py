@@ -13,7 +13,7 @@ from typing import Any
 from urllib.parse import quote
 
 from reports.certificate.page import certificate
-from reports.formats.cases import MESSAGE, Case, Outcome, cases, worst_first
+from reports.formats.cases import MESSAGE, STOP, Case, Outcome, cases, worst_first
 from reports.formats.places import Place, places_of
 from reports.formats.source_pages import page_of
 from reports.pages.untrusted import excerpt, visible
@@ -26,7 +26,9 @@ _LEVELS = {Outcome.FAILED: "error", Outcome.ERROR: "none", Outcome.ACCEPTED: "wa
 def sarif(result: Mapping[str, Any]) -> str:
     """Return a valid `roaas-result/1` document as a SARIF log (JSON text) with one run."""
     found = worst_first(cases(result))
-    if any(case.outcome is Outcome.ERROR for case in found) and not any(case.name == "run" for case in found):
+    if any(case.outcome is Outcome.ERROR and case.name != STOP for case in found) and not any(
+        case.name == "run" for case in found
+    ):
         found.append(Case("run", "", Outcome.ERROR, certificate(result).headline))
     rules = [_rule(result, case) for case in found]
     run = {
@@ -49,7 +51,10 @@ def _invocation(result: Mapping[str, Any], found: Sequence[Case]) -> dict[str, A
         "startTimeUtc": result["started"],
         **({"endTimeUtc": result["finished"]} if result["finished"] else {}),
         "toolExecutionNotifications": [
-            {"level": "error" if not judged else "note", "message": {"text": _text(f"{case.name}: {case.message}")}}
+            {
+                "level": "note" if judged and case.name != STOP else "error",
+                "message": {"text": _text(f"{case.name}: {case.message}")},
+            }
             for case in open_cases
         ],
     }

@@ -61,6 +61,8 @@ def latency_junit(result: Mapping[str, Any]) -> str:
 
 def _cases(result: Mapping[str, Any]) -> Iterator[_Case]:
     sentence = result["headline"]["sentence"]
+    if "stop_undelivered" in result:
+        yield _Case("run", "the robot was stopped", "may still move", result["stop_undelivered"])
     yield _Case("run", "the figures are valid", "valid" if result["valid"] else "not valid", sentence)
     for level in result.get("slo", []):
         name = f"{level['operation']} over {level['interface'].upper()}: {level['limit']} at most {level['most']:g}"

@@ -69,7 +69,7 @@ class Cart:
         """Take a velocity."""
         self.where()
         if self.moved_at and (self.fault.isdigit() or self.fault in {"ignores", "closes"}):
-            return
+            return  # whatever it is told, it goes on
         self.speed = speed
         if speed and not self.moved_at:
             self.moved_at = time.monotonic()
@@ -96,6 +96,8 @@ class Cart:
             request.transport.abort()
         if self.fault.isdigit():
             return int(self.fault)
+        if self.fault == "late" and not self._is_back:
+            return 503
         self.drive(0.0)
         return 200
 
@@ -135,5 +137,14 @@ def application(cart: Cart) -> web.Application:
     return app
 
 
+async def main(port: int, fault: str) -> None:
+    """Serve a cart until the process is ended."""
+    runner = web.AppRunner(application(Cart(fault)), access_log=None)
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", port).start()
+    print("ready", flush=True)  # noqa: T201 - the test waits for it
+    await asyncio.Event().wait()
+
+
 if __name__ == "__main__":
-    web.run_app(application(Cart(sys.argv[2])), host="127.0.0.1", port=int(sys.argv[1]), access_log=None)
+    asyncio.run(main(int(sys.argv[1]), sys.argv[2]))

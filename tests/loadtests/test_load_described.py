@@ -218,7 +218,12 @@ def test_after_a_load_that_moves_a_device_it_is_stopped_and_its_rest_is_awaited(
 def test_a_device_that_does_not_come_to_rest_is_named(driven):
     run, url = driven(60, "--allow-motion")
     assert where(url)["speed"] == 0.5
-    assert "told to stop after the load, but may still move: the device does not come to rest" in run.err
+    said = "the stop could not be delivered; the robot may still move: the device does not come to rest"
+    assert run.out.startswith(f"WARNING: {said}")
+    document = json.loads((run.folder / "latency.json").read_text(encoding="utf-8"))
+    assert document["stop_undelivered"].startswith(said)
+    assert document["notes"][0] == document["stop_undelivered"]
+    assert (run.code, document["exit_code"]) == (4, 4)
 
 
 def test_what_the_motion_map_moves_needs_permission_to_move(driven):

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.stops import TRIED_S, stop_once
+from conformance.api.rest.stops import stop_once
 from conformance.transport.client import Draft, drafted
 from conformance.transport.exchange import SAFE_METHODS
 
@@ -91,7 +91,7 @@ class Guard:
 
     def _tell(self, stops: list[dict[str, Any]]) -> None:
         """Write the stops to the process, which is started if there is none; a run without it goes on."""
-        message = {"stops": stops, "for_s": self._api.run.wait_s or TRIED_S, "deadline_s": _DEADLINE_S}
+        message = {"stops": stops, "for_s": self._api.run.tries_stop_s, "deadline_s": _DEADLINE_S}
         try:
             if not self._is_alive:
                 # Isolated, in a session of its own. The credentials in the stops go through the pipe alone.

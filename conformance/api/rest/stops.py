@@ -22,8 +22,6 @@ from conformance.transport.exchange import NoAnswerError, NotPermittedError
 
 #: What is said of a device that may still move begins with these words.
 UNDELIVERED: Final = "the stop could not be delivered; the robot may still move"
-#: How long the stop is tried by default, s.
-TRIED_S: Final = 20.0
 # Between two tries, s.
 _AGAIN_S: Final = 0.3
 # The deadline of one request, and how many usual responses a slow device gets.
@@ -50,11 +48,10 @@ def stop_device(api: RestInterface, tell: Callable[[str], None] = lambda _: None
     if not (run.allow_motion or api.call_rules.allow):
         return ""
     run.stop_undelivered = f"{UNDELIVERED}: the run ended before it was seen to stop"
-    tried_s = run.wait_s or TRIED_S
-    until = time.monotonic() + tried_s
+    until = time.monotonic() + run.tries_stop_s
     open_ = stop_once(api)
     if open_:
-        tell(f"the device was not stopped: {'; '.join(open_.values())}. The stop is tried for {tried_s:g} s")
+        tell(f"the device was not stopped: {'; '.join(open_.values())}. The stop is tried for {run.tries_stop_s:g} s")
     while open_ and time.monotonic() < until:
         time.sleep(_AGAIN_S)
         with _unheard(api.client):

@@ -311,17 +311,24 @@ class MappedDevice:
         if is_drafting() or not (self.motion.state.axes or self.motion.speeds):
             return problem
         try:
-            self.come_to_rest(stop=False)
-        except (NotPossibleError, NoAnswerError) as unseen:
-            return "; ".join(filter(None, (problem, str(unseen))))
+            # A stop that was not accepted is soon sent again.
+            self.come_to_rest(stop=False, within_s=0.0 if problem else None)
+        except (NotPossibleError, NotPermittedError) as error:
+            return "; ".join(filter(None, (problem, str(error))))
+        except NoAnswerError as none:
+            return problem or f"{self._named(none.unanswered)}: {none}"
         return ""
 
     @staticmethod
     def _named(attempt: Attempt) -> str:
         return f"{attempt.request.method} {urlsplit(attempt.request.url).path}"
 
-    def come_to_rest(self, *, stop: bool = True) -> None:
+    def come_to_rest(self, *, stop: bool = True, within_s: float | None = None) -> None:
         """Stop what goes on, unless that is done already, and wait until the device rests.
+
+        Args:
+            stop: whether to stop it.
+            within_s: how long to wait, s; None: as long as the map says, and at least some seconds.
 
         Raises:
             NotPossibleError: it does not.
@@ -329,11 +336,12 @@ class MappedDevice:
         """
         if stop:
             self.stop()
-        until = self.clock.now() + max(_RESTS_S, self.motion.stop.rests_within_s if self.motion.stop else 0.0)
+        rests_s = max(_RESTS_S, self.motion.stop.rests_within_s if self.motion.stop else 0.0)
+        until = self.clock.now() + (rests_s if within_s is None else within_s)
         while self.clock.now() <= until:
             before = self.where()
             seen = self.watch(self.clock.now() + STAYS_S)
             stays = self.is_near(self.where(), before) if before else any(one.speeds for one in seen)
             if stays and not fastest(seen, self.motion):
                 return
-        raise NotPossibleError("the device does not come to rest")
+        raise NotPossibleError(f"the device does not come to rest, as {self.motion.state.read} shows")

@@ -1,0 +1,169 @@
+"""A robot that cannot be stopped is named before everything else; one that comes back in time is stopped."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import moving_cart
+import moving_winch
+import msgspec
+import pytest
+from lxml import etree
+from moving_winch import Winch
+from processes import ended
+from small_device import certified
+from soap_devices import serving
+
+from conformance.api.rest.stops import UNDELIVERED
+from conformance.engine.describing import described_contract, soap_contract
+from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.scenarios.motion.binding import binding_of
+from conformance.scenarios.motion.mapped import MappedDevice
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import load_statement
+from conformance.transport.client import Connection
+from conformance.transport.exchange import NoAnswerError
+from conformance.verdict.run import Run
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What a moving robot does from its first move on.
+
+    Attributes:
+        name: of the fault, as moving_cart.py knows it.
+        said: is in the reason why it may still move; empty: it is stopped, and nothing is said.
+    """
+
+    name: str
+    said: str
+
+
+FAULTS = (
+    Fault("hang", "POST /stop: no response within"),
+    Fault("silent", "POST /stop: no response within"),
+    Fault("crash", "POST /stop: no connection"),
+    Fault("closes", "POST /stop: the server closed the connection"),
+    Fault("ignores", "the device does not come to rest, as GET /state shows"),
+    Fault("401", "POST /stop got status 401"),
+    Fault("409", "POST /stop got status 409"),
+    Fault("429", "POST /stop got status 429"),
+    Fault("500", "POST /stop got status 500"),
+    Fault("503", "POST /stop got status 503"),
+    Fault("pause", ""),
+    Fault("late", ""),
+    Fault("none", ""),
+)
+
+
+@contextmanager
+def cart(fault: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """Serve a cart; yields its base URL and its process."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    command = [sys.executable, str(Path(moving_cart.__file__)), str(port), fault]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        try:
+            assert process.stdout.readline() == "ready\n"
+            yield f"http://127.0.0.1:{port}", process
+        finally:
+            process.kill()
+
+
+def robot_at(url: str, folder: Path, motion: str, wsdl: str = "") -> RobotUnderTest:
+    """Return a device with a motion map, connected, as a run that may move it has it."""
+    where, connection = Endpoints(), Connection(timeout_s=1.0)
+    if wsdl:
+        contract, where, _ = soap_contract(f"{url}/{wsdl}", None, where, connection, folder, moves=True)
+    else:
+        contract, where, _ = described_contract(f"{url}/openapi.json", (), None, where, connection, folder, moves=True)
+    (folder / "robot.toml").write_text(motion, encoding="utf-8")
+    statement = msgspec.structs.replace(load_statement(folder / "robot.toml", contract), endpoints=where)
+    robot = RobotUnderTest(Run(statement, contract, allow_motion=True, stop_s=3.0), connection)
+    robot.connect()
+    return robot
+
+
+def driven(robot: RobotUnderTest, speeds: dict[str, float]) -> None:
+    """Give a device a velocity."""
+    assert robot.rest is not None
+    assert robot.run.statement.motion_map is not None
+    mapped = MappedDevice(robot.rest, robot.run.statement.motion_map, binding=binding_of(robot.rest))
+    with suppress(NoAnswerError):
+        mapped.drive(speeds)
+
+
+def where(url: str) -> float:
+    """Return where a cart is."""
+    with urllib.request.urlopen(f"{url}/state", timeout=5) as answer:  # noqa: S310 - http
+        x: float = json.load(answer)["x"]
+    return x
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_a_robot_is_stopped_or_it_is_said_that_it_may_still_move(fault, tmp_path):
+    with cart(fault.name) as (url, _):
+        robot = robot_at(url, tmp_path, moving_cart.MAP)
+        driven(robot, {"ahead": 0.5})
+        robot.stop()
+        if not fault.said:
+            assert robot.run.stop_undelivered == ""
+            here = where(url)
+            time.sleep(0.1)
+            assert where(url) == here
+            return
+        assert robot.run.stop_undelivered.startswith(f"{UNDELIVERED}: ")
+        assert fault.said in robot.run.stop_undelivered
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("silent", "no response within"),
+        ("refuses", "POST /winch got status 500, text/xml"),
+        ("ignores", "the device does not come to rest"),
+        ("none", ""),
+    ],
+)
+def test_a_device_over_soap_is_stopped_or_it_is_said_that_it_may_still_move(fault, said, tmp_path):
+    with serving(Winch(fault)) as url:
+        robot = robot_at(url, tmp_path, moving_winch.MAP, "winch.wsdl")
+        driven(robot, {"ahead": 0.5})
+        robot.stop()
+    assert robot.run.stop_undelivered.startswith(f"{UNDELIVERED}: " if said else "")
+    assert said in robot.run.stop_undelivered
+    assert bool(robot.run.stop_undelivered) == bool(said)
+
+
+def test_a_robot_that_hangs_while_it_moves_fails_and_that_it_may_still_move_comes_first(tmp_path):
+    statement, out = tmp_path / "robot.toml", tmp_path / "out"
+    with cart("hang") as (url, _):
+        statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n{moving_cart.MAP}', encoding="utf-8")
+        outcome = certified(
+            statement, out, "--allow-motion", "--class", "motion", "--timeout", "1", "--wait", "1", "--quiet"
+        )
+    assert outcome.exit_code == 1
+    assert outcome.text.startswith(f"WARNING: {UNDELIVERED}: POST /stop: no response within")
+    assert outcome.result["stop_undelivered"] == outcome.result["notes"][0]
+    assert outcome.result["stop_undelivered"].startswith(UNDELIVERED)
+    (failure,) = outcome.requirement("robustness/no-hang")["failures"]
+    assert failure["request"]["url"].endswith("/velocity")
+    ended(sys.executable, "-m", "roaas", "report", out, "--format", "sarif", check=True)
+    assert f"WARNING: {UNDELIVERED}" in (out / "certificate.md").read_text(encoding="utf-8").splitlines()[0]
+    page = (out / "certificate.html").read_text(encoding="utf-8")
+    assert page.index(UNDELIVERED) < page.index("<header")
+    first = etree.parse(out / "junit.xml").find("testsuite/testcase")
+    assert first.find("error").get("message").startswith(UNDELIVERED)
+    (sarif,) = out.glob("*.sarif")
+    assert json.loads(sarif.read_text(encoding="utf-8"))["runs"][0]["results"][0]["message"]["text"].startswith(
+        UNDELIVERED
+    )
