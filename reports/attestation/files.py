@@ -75,10 +75,8 @@ def compared(statement: Statement, directory: Path, statement_name: str | None) 
             found = _digest(directory / name)
             problem = "not the file that was signed" if found else "not a regular file"
             yield Compared(name, "" if found == signed else problem)
-    extent = statement.predicate.roaas.extent
-    described = extent is not None and extent.operations is not None
     for name in sorted(there - _places(statement, statement_name).keys()):
-        if described and name.startswith(f"{DESCRIPTION}/"):
+        if statement.predicate.roaas.described and name.startswith(f"{DESCRIPTION}/"):
             yield Compared(name, "added after the signature: no run judged the device by it")
 
 

@@ -136,7 +136,7 @@ def _suite(statement: Statement, policy: Policy, known: Known) -> Iterator[Point
     unknown = "" if run.suite.digest in trusted else ", which the policy does not trust"
     contract = (
         "give the folder of the description with --contract"
-        if "description" in run.classes
+        if run.described
         else f"install RoAAS {run.suite.version}, and give its contract with --contract"
     )
     yield Point(
@@ -207,7 +207,7 @@ def _requirements(statement: Statement, policy: Policy, known: Known) -> Iterato
     tested = sum(verdict in TESTED for verdict in musts.values())
     yield Point(
         "tested",
-        bool(musts) and tested >= policy.tested * len(musts),
+        tested >= policy.tested * len(musts),
         f"{tested} of {len(musts)} MUSTs of the required classes",
         f"at least {policy.tested:.0%} of them (tested)",
         "ask for a run that may do more (--allow-motion, --call, credentials), or demand less",

@@ -61,7 +61,9 @@ def signer_of(path: Path) -> CryptoSigner:
     try:
         key = load_pem_private_key(_octets(path), None)
     except (ValueError, TypeError, UnsupportedAlgorithm) as error:
-        raise KeyUnusableError(f"{path}: not a private key in PEM without a passphrase") from error
+        raise KeyUnusableError(
+            f"{path}: not a private key in PEM without a passphrase; `roaas keygen` makes one"
+        ) from error
     if not isinstance(key, Ed25519PrivateKey):
         raise KeyUnusableError(f"{path}: not an Ed25519 key; `roaas keygen` makes one")
     return CryptoSigner(key, _named(key.public_key()))

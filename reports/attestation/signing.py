@@ -1,5 +1,6 @@
 """Sign a conformance result together with the files that belong to it."""
 
+import datetime as dt
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -129,6 +130,8 @@ def _disagreeing(result: Mapping[str, Any]) -> list[str]:
             found.append(f"{id_} passed without a case")
         if findings and (verdict in {"skip", "not-claimed"} or (verdict == "pass" and item["level"] != "MAY")):
             found.append(f"{id_} has {findings} findings, but ended with {verdict!r}")
-    if (result["finished"] or result["started"]) < result["started"]:
-        found.append("the run ended before it started; set the clock")
-    return found
+    try:
+        began, ended = (dt.datetime.fromisoformat(result[one] or result["started"]) for one in ("started", "finished"))
+    except ValueError:
+        return [*found, "the calendar has no such time as that of the run"]
+    return [*found, "the run ended before it started; set the clock"] if ended < began else found

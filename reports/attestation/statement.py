@@ -131,6 +131,11 @@ class Run(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     extent: Extent | None = None
 
     @property
+    def described(self) -> bool:
+        """Return whether the device was judged by its own description."""
+        return "description" in self.classes if self.extent is None else self.extent.operations is not None
+
+    @property
     def ended(self) -> dt.datetime | None:
         """Return `finished` as a datetime, or None if the text is not a time in UTC."""
         try:

@@ -31,7 +31,7 @@ def sign(door: FrontDoor, directory: Path, key: Path, pack: str | None) -> None:
 def _pack_of(door: FrontDoor, directory: Path) -> str | None:
     """Return the contract pack of a result: the description beside it, or an installed pack; None for the default."""
     result = read_result(directory / RESULT_NAME)
-    if "api" in result:
+    if "api" in result and (directory / DESCRIPTION).is_dir():
         return str(directory / DESCRIPTION)
     name: str | None = result.get("pack", {}).get("name")
     # A result is data: a name in it leads to no folder.

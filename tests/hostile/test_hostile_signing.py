@@ -2,6 +2,7 @@
 
 import base64
 import json
+import os
 import shutil
 import unicodedata
 from pathlib import Path
@@ -107,6 +108,7 @@ EDITED = [
     ("a class failed", lambda result: result["classes"].update(http="fail"), "not all claimed classes passed"),
     ("an invented class", lambda result: result["classes"].update(magic="not-claimed"), "has no class magic"),
     ("interrupted", of_result(interrupted=True), "the run was interrupted"),
+    ("no day of the calendar", of_result(finished="2026-02-30T00:00:00Z"), "the calendar has no such time"),
     ("ended before it began", of_result(started="2027-01-01T00:00:00Z"), "ended before it started"),
 ]
 
@@ -431,6 +433,22 @@ def test_a_leading_name_reads_no_file(vendor):
     vendor.forge(conformant(), subject("../../../../etc/passwd"))
     done = vendor.verify("--result", vendor.folder)
     assert (done.exit_code, "leads out of the folder" in done.output) == (1, True), done.output
+
+
+@pytest.mark.parametrize("kind", ["pipe", "endless", "folder"])
+@pytest.mark.parametrize("name", ["result.json", "traces.json.gz", "certificate.html"])
+def test_what_is_no_file_keeps_nobody_waiting(honest, tmp_path, name, kind):
+    shutil.copytree(honest.folder, tmp_path / "sent")
+    path = tmp_path / "sent" / name
+    path.unlink(missing_ok=True)
+    {"pipe": lambda: os.mkfifo(path), "endless": lambda: path.symlink_to("/dev/zero"), "folder": path.mkdir}[kind]()
+    done = honest.verify("--result", tmp_path / "sent")
+    assert "Traceback" not in done.output
+    if name == "result.json":
+        assert (done.exit_code in {1, 2}, "ACCEPTED" in done.output) == (True, False), done.output
+    else:
+        signed = name != "traces.json.gz" and kind != "folder"
+        assert (done.exit_code, f"REFUSED  {name}" in done.output) == (int(signed), signed), done.output
 
 
 def test_an_envelope_that_contradicts_its_result_is_refused(vendor):

@@ -112,6 +112,10 @@ def signed_with(**changes):
     return lambda desk: desk.sign(**changes)
 
 
+def ended_at(time):
+    return lambda desk: desk.sign(started=time, finished=time)
+
+
 def forged_with(**changes):
     return lambda desk: desk.forge(**changes)
 
@@ -149,6 +153,7 @@ RESULTS = [
     ("accepted failure", accepted_failure, {}, {"baseline", "classes"}),
     ("part of a run", forged_with(interrupted=True), {}, {"interrupted", "agreement"}),
     ("expired", signed_with(started="2025-11-20T11:00:00Z", finished="2025-11-20T12:00:00Z"), {}, {"max_age_days"}),
+    ("a clock six minutes ahead", ended_at("2026-11-21T12:06:00Z"), {}, {"max_age_days"}),
     ("from the future", signed_with(finished="2026-11-22T12:00:00Z"), {}, {"max_age_days"}),
     ("replayed nonce", signed_with(nonce="monday", seed=seed_of("monday")), {"nonce": "tuesday"}, {"nonce"}),
     ("nonce and another seed", signed_with(nonce="monday", seed=0), {"nonce": "monday"}, {"nonce"}),
@@ -173,6 +178,7 @@ WAIVERS = [
     (signed_with(started="2025-11-20T11:00:00Z", finished="2025-11-20T12:00:00Z"), {"max_age_days": 400}),
     (signed_with(class_views={"http": "seen on ROS"}), {"ros": True}),
     (signed_with(nonce="monday", seed=seed_of("monday")), {"nonce": "monday"}),
+    (ended_at("2026-11-21T12:04:00Z"), {}),
     (nothing, {"robot": "Courier 7", "vendor": "Example Robotics", "firmware": "2.4.1"}),
 ]
 
