@@ -14,8 +14,9 @@ Not recognized are a reversed or encrypted secret, and base64 of an escaped one.
 import gzip
 import re
 import zlib
+from array import array
 from base64 import b64encode
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from itertools import takewhile
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -29,8 +30,9 @@ _BEGINNING: Final = 8
 _LONG: Final = 12
 _CUT: Final = re.compile(r"\Z|[\s\"'`<\\]")
 # Before an ellipsis, less of it is recognized.
-_ELLIPSIS: Final = re.compile(r"…|\.\.\.")
+_ELLIPSIS: Final = re.compile(r"…+|\.{3,}")
 _SHORTEST_CUT: Final = 4
+_LONGEST_CUT: Final = 256
 # An escape may itself be escaped; hostile text is not searched deeper than this.
 _DEPTH: Final = 4
 _ESCAPE: Final = re.compile(
@@ -80,6 +82,8 @@ class Secrets:
         # Those in which the case does not matter, and the others.
         self._folded: tuple[_Form, ...] = ()
         self._exact: tuple[_Form, ...] = ()
+        # By the last characters before an ellipsis: what may be cut there, and after how many characters.
+        self._cuts: dict[str, list[tuple[_Form, int]]] = {}
 
     def __bool__(self) -> bool:
         return bool(self._known)
@@ -100,6 +104,11 @@ class Secrets:
         folded, exact = _forms(secret)
         self._folded = _with(self._folded, folded, variable)
         self._exact = _with(self._exact, exact, variable)
+        cuts: dict[str, list[tuple[_Form, int]]] = {}
+        for form in (*self._folded, *self._exact):
+            for length in range(min(len(form.whole), _LONGEST_CUT), _SHORTEST_CUT - 1, -1):
+                cuts.setdefault(form.whole[length - _SHORTEST_CUT : length].lower(), []).append((form, length))
+        self._cuts = cuts
 
     def keep_userinfo(self, text: str) -> None:
         """Mask the passwords of all URLs in a text that have one (``http://user:password@robot``)."""
@@ -150,10 +159,6 @@ class Secrets:
         seen = dict[str, str]()
         return self._walked(value, seen)
 
-    def shown_in(self, text: str) -> bool:
-        """Return whether a text shows a secret."""
-        return bool(self._known) and self.masked(text) != text
-
     def _walked(self, value: Any, seen: dict[str, str]) -> Any:
         if isinstance(value, str):
             if value not in seen:
@@ -175,11 +180,15 @@ class Secrets:
         lowered = text.lower()
         if len(lowered) != len(text):
             lowered = "".join(small if len(small := char.lower()) == 1 else char for char in text)
-        cuts = [found.start() for found in _ELLIPSIS.finditer(text)]
         for forms, where in ((self._folded, lowered), (self._exact, text)):
             for form in forms:
                 yield from _found(form, where)
-                yield from _cut_short(form, where, cuts)
+        for cut in _ELLIPSIS.finditer(lowered):
+            end = cut.start()
+            for form, length in self._cuts.get(lowered[max(0, end - _SHORTEST_CUT) : end], ()):
+                if lowered.startswith(form.whole[:length].lower(), end - length):
+                    yield end - length, end, form.variable
+                    break
         for unit in (_UNITS if depth == 0 else _UNITS[:1]) if depth < _DEPTH else ():
             plain = unit.sub(_decoded, text)
             if len(plain) != len(text) and (inner := [*self._spans(plain, depth + 1)]):
@@ -233,15 +242,6 @@ def _found(form: _Form, text: str) -> Iterator[tuple[int, int, str]]:
         begin = text.find(form.beginning, end)
 
 
-def _cut_short(form: _Form, text: str, cuts: Iterable[int]) -> Iterator[tuple[int, int, str]]:
-    """Yield where a text has some of a form of a secret before an ellipsis."""
-    for end in cuts:
-        for length in range(min(len(form.whole), end), _SHORTEST_CUT - 1, -1):
-            if text.startswith(form.whole[:length], end - length):
-                yield end - length, end, form.variable
-                break
-
-
 def _decoded(unit: re.Match[str]) -> str:
     """Return what an escape stands for."""
     kind, digits = unit.lastgroup, unit[unit.lastgroup] if unit.lastgroup else ""
@@ -259,13 +259,14 @@ def _decoded(unit: re.Match[str]) -> str:
 def _outer(inner: list[tuple[int, int, str]], unit: re.Pattern[str], text: str) -> Iterator[tuple[int, int, str]]:
     """Yield where in the escaped text the spans of the plain one are."""
     # For each character of the plain text, where its escape begins and ends.
-    begins, ends, last = list[int](), list[int](), 0
+    begins, ends, last = array("Q"), array("Q"), 0
     for found in unit.finditer(text):
-        begins += (*range(last, found.start()), *([found.start()] * len(_decoded(found))))
-        ends += (*range(last + 1, found.start() + 1), *([found.end()] * len(_decoded(found))))
+        length = len(_decoded(found))
+        begins.extend((*range(last, found.start()), *[found.start()] * length))
+        ends.extend((*range(last + 1, found.start() + 1), *[found.end()] * length))
         last = found.end()
-    begins += range(last, len(text))
-    ends += range(last + 1, len(text) + 1)
+    begins.extend(range(last, len(text)))
+    ends.extend(range(last + 1, len(text) + 1))
     for begin, end, variable in inner:
         yield begins[begin], ends[end - 1], variable
 
