@@ -1,6 +1,7 @@
 """The configuration file of the robot (TOML): names on the ROS graph, and settings of the web services."""
 
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 
@@ -21,6 +22,10 @@ class WebSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         settle: Within what time a new velocity is reached, s; declared, not enforced.
         deadline: How long to wait for a response from ROS, s.
         read_deadline: How long a client may take to send one request, s.
+        token_deadline: Where tokens are required: how long a client without a valid token may take for each of these:
+            the TLS handshake, to send one request, to begin the next one, s.
+        connections_per_address: How many connections each interface accepts from one address; None for seven eighths of
+            all. Connections from a trusted proxy do not count.
         lag: How much later each request is answered, s, as by a robot that has other things to do.
     """
 
@@ -33,6 +38,8 @@ class WebSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     settle: Positive = 0.6
     deadline: Positive = 5.0
     read_deadline: Positive = 10.0
+    token_deadline: Positive = 5.0
+    connections_per_address: Annotated[int, msgspec.Meta(ge=1)] | None = None
     lag: NotNegative = 0.0
 
 

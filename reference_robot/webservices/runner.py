@@ -15,7 +15,7 @@ import uvloop
 from conformance.commandline.endings import ending_signals
 from reference_robot.ros import RosRuntime
 from reference_robot.webservices.assembly import Endpoints, interfaces
-from reference_robot.webservices.configuration import Configuration
+from reference_robot.webservices.configuration import Configuration, WebSettings
 from reference_robot.webservices.endpoint import EndpointPublisher, bound
 from reference_robot.webservices.http.address import url_of
 from reference_robot.webservices.http.listening import Listening
@@ -24,7 +24,9 @@ from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 
 _DESCRIPTORS: Final = 8192  # connections and ROS together; the usual soft limit of 1,024 is soon reached
-_TLS_CONNECTIONS: Final = 500  # per interface; each takes 280 kB once used
+_OTHER_DESCRIPTORS: Final = 592  # for ROS, files, and connections that are being refused
+_CONNECTIONS: Final = 3800  # per interface
+_TLS_CONNECTIONS: Final = 600  # per interface; each takes 280 kB once used
 _DISCOVERY: Final = 20.0  # seconds in which a robot that has been started must appear on the graph
 _DISCOVERY_STEP: Final = 0.05
 
@@ -50,7 +52,7 @@ class RobotWebServiceNodesRunner:
             RobotNotFoundError: ``wait_for_robot`` is set and no robot appeared in time.
         """
         configuration, listening = self.configuration, self.listening
-        _raise_descriptor_limit()
+        descriptors = _raised_descriptor_limit()
         # This is Fast DDS's default, and overrides a user's setting. In asynchronous mode each publish waits for a lock
         # of the sender's thread, which delays one response in ten by 3 ms. Other middleware ignores the variable.
         os.environ["RMW_FASTRTPS_PUBLICATION_MODE"] = "SYNCHRONOUS"
@@ -66,10 +68,9 @@ class RobotWebServiceNodesRunner:
             if wait_for_robot:
                 _await_robot(publishers, subscribers)
             *pair, velocity = interfaces(publishers, subscribers, configuration, endpoints, listening)
-            patience = configuration.web.read_deadline
             publisher = EndpointPublisher(
                 list(zip(pair, (rest, soap), strict=True)),
-                Limits(patience) if listening.tls is None else Limits(patience, connections=_TLS_CONNECTIONS),
+                _limits(configuration.web, descriptors, is_encrypted=listening.tls is not None),
                 listening.proxies,
                 listening.tls,
             )
@@ -104,8 +105,20 @@ def _await_robot(publishers: RobotPublishersNode, subscribers: RobotSubscribersN
         time.sleep(_DISCOVERY_STEP)
 
 
-def _raise_descriptor_limit() -> None:
+def _limits(web: WebSettings, descriptors: int, *, is_encrypted: bool) -> Limits:
+    most = _TLS_CONNECTIONS if is_encrypted else _CONNECTIONS
+    return Limits(
+        web.read_deadline,
+        unknown=web.token_deadline,
+        connections=max(1, min(most, (descriptors - _OTHER_DESCRIPTORS) // 2)),
+        of_address=web.connections_per_address,
+    )
+
+
+def _raised_descriptor_limit() -> int:
+    """Return how many file descriptors this process may have, after raising the limit as far as permitted."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = _DESCRIPTORS if hard == resource.RLIM_INFINITY else min(_DESCRIPTORS, hard)
     if soft != resource.RLIM_INFINITY and soft < wanted:
         resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+    return wanted

@@ -27,6 +27,11 @@ class Admission:
         self._allows = hosts.allows
         self._origins = frozenset(origin.encode() for origin in origins)
 
+    @property
+    def is_guarded(self) -> bool:
+        """Whether requests need a token."""
+        return self._authorization.is_required
+
     def check(self, request: Request, needed: Callable[[Request], Scope | None]) -> None:
         """Raise the Problem 421, 401 or 403 for a request with a wrong host, token or origin.
 

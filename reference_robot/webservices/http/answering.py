@@ -7,7 +7,6 @@ responses, nothing more is read from the connection.
 
 import asyncio
 import contextlib
-import math
 import socket
 import struct
 from abc import ABC, abstractmethod
@@ -17,13 +16,13 @@ from functools import partial
 from time import perf_counter
 from typing import Any, Final
 
+from reference_robot.webservices.http.crowd import NEVER
 from reference_robot.webservices.http.interface import described
 from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.http.port import Port
 from reference_robot.webservices.http.reading import full
 
 FIELD_BYTES: Final = 200  # bytes of memory per field besides its text: two Python objects and their references
-NEVER: Final = math.inf
 
 _LINGER: Final = 2.0  # seconds for which data from a refused client is read and dropped
 _PIPELINED: Final = 16  # waiting requests at which reading from the connection pauses
@@ -34,7 +33,9 @@ class AnsweringConnection(asyncio.Protocol, ABC):
     """A connection to one port that writes responses; a subclass parses the requests.
 
     Attributes:
-        due: The event-loop time by which the client must act; infinity while the robot works on a response.
+        since: The event-loop time of the client's last step.
+        allowed: Seconds that its next step may take; infinity while the robot works on a response.
+        is_known: Whether a request of the client has passed the access check.
     """
 
     def __init__(self, port: Port) -> None:
@@ -42,7 +43,9 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         self._respond = port.interface.respond
         self._now = port.loop.time
         self._transport: asyncio.Transport
-        self.due = NEVER
+        self.since = self._now()
+        self.allowed = NEVER
+        self.is_known = False
         self._has_begun = False  # a request is being received
         # The requests that have been received, and the end of the connection
         self._waiting: deque[tuple[Request, Response | None, int]] = deque()
@@ -56,7 +59,7 @@ class AnsweringConnection(asyncio.Protocol, ABC):
 
     @abstractmethod
     def expire(self) -> None:
-        """End the connection because ``due`` has passed."""
+        """End the connection because the client's time has passed."""
 
     # Callbacks of the transport
 
@@ -76,10 +79,10 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         """Stop writing and reading, because the client does not read its responses."""
         self._stalled = True
         self._pause_reading()
-        self.due = self._now() + self._port.patience
+        self._allow(self._port.patience)
         self._unread = self._transport.get_write_buffer_size()
         self._hold(self._unread)
-        if self._port.is_full():
+        if self._port.is_full_for(self._held):
             self._reset()
 
     def resume_writing(self) -> None:
@@ -88,6 +91,16 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         self._hold(-self._unread)
         self._unread = 0
         self._advance()
+
+    def _allow(self, seconds: float) -> None:
+        """Give the client this time for its next step, from now on."""
+        self.since = self._now()
+        self.allowed = seconds
+
+    def _allow_next(self) -> None:
+        """Give the client time to begin its next request."""
+        self.since = self._now()
+        self.allowed = self._port.keep_alive if self.is_known else self._port.unknown_keep_alive
 
     # Responses, in the order of the requests
 
@@ -104,11 +117,11 @@ class AnsweringConnection(asyncio.Protocol, ABC):
             return
         weight = _weight(request)
         self._hold(weight)
-        if response is None and self._port.is_full():
+        if response is None and self._port.is_full_for(self._held):
             response = described(full(), request.headers.get(b"accept"))
         self._waiting.append((request, response, weight))
         if not self._stalled:
-            self.due = NEVER
+            self.allowed = NEVER
         if len(self._waiting) >= _PIPELINED:
             self._pause_reading()
 
@@ -121,7 +134,7 @@ class AnsweringConnection(asyncio.Protocol, ABC):
 
     def _await(self, request: Request, outcome: Coroutine[Any, Any, Response]) -> None:
         if not self._has_begun:
-            self.due = NEVER
+            self.allowed = NEVER
         weight = _weight(request)
         self._hold(weight)
         self._task = self._port.loop.create_task(outcome)
@@ -147,7 +160,10 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         elif not self._reading and not self._leaving:
             self._reading = True
             self._transport.resume_reading()
-            self.due = self._now() + (self._port.patience if self._has_begun else self._port.keep_alive)
+            if self._has_begun:
+                self._allow(self._port.patience)
+            else:
+                self._allow_next()
 
     def _write(self, request: Request, response: Response) -> None:
         """Write a complete response.
@@ -172,7 +188,7 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         if not keep_alive:
             self._leave()
         elif not self._has_begun and not self._stalled:
-            self.due = self._now() + self._port.keep_alive
+            self._allow_next()
 
     # The end of the connection
 
@@ -185,16 +201,16 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         self._leaving = True
         self._waiting.clear()
         if lingers:
-            if self._transport.can_write_eof():  # not under TLS: there the client closes, or `due` passes
+            if self._transport.can_write_eof():  # not under TLS: there the client closes, or the time passes
                 self._transport.write_eof()
-            self.due = self._now() + _LINGER
+            self._allow(_LINGER)
         else:
             self._close()
 
     def _close(self) -> None:
         self._leaving = True
         self._transport.close()
-        self.due = self._now() + self._port.patience
+        self._allow(self._port.patience)
 
     def stop(self) -> None:
         """Close the connection if no response is pending; otherwise the pending response will be the last."""
@@ -207,6 +223,11 @@ class AnsweringConnection(asyncio.Protocol, ABC):
             self._task.cancel()
         self._transport.abort()
 
+    def give_way(self) -> None:
+        """Close the connection at once, because another client gets its place."""
+        self._leaving = True
+        self._transport.abort()
+
     def _reset(self) -> None:
         """Reset the connection, so that the kernel frees its send buffer at once although the client does not read."""
         with contextlib.suppress(OSError):  # the socket may be closed already
@@ -216,7 +237,7 @@ class AnsweringConnection(asyncio.Protocol, ABC):
     def _pause_reading(self) -> None:
         if self._reading and not self._leaving:
             self._reading = False
-            self.due = NEVER
+            self.allowed = NEVER
             self._transport.pause_reading()
 
     def _hold(self, size: int) -> None:

@@ -5,33 +5,41 @@ These limits keep clients from exhausting the robot:
 
 - Sizes: of the request target, the head, the body, the data dropped after a refusal, and all data that is kept for
   clients: incomplete requests, waiting requests, and responses that a client does not read.
-- Times: ``due`` is the deadline for the client's next step, such as sending a request or reading responses. Only while
-  the robot works on a response is there no deadline.
+- Times: ``allowed`` is the time for the client's next step, such as sending a request or reading responses. Only while
+  the robot works on a response is there no limit. Who has shown no valid token gets less time.
 - Waiting requests: when too many wait on a connection, or while the client does not read, nothing more is read.
 
-``answering`` contains the base class. Inheritance is used because calls to a separate object, several for each request,
-would cost time.
+``answering`` and ``pacing`` contain the base classes. Inheritance is used because calls to a separate object, several
+for each request, would cost time.
 """
 
 import asyncio
 from typing import Final, cast
 
-from httptools import HttpParserCallbackError, HttpParserError, HttpRequestParser
+from httptools import HttpParserCallbackError, HttpParserError, HttpParserUpgrade, HttpRequestParser
 
-from reference_robot.webservices.http.answering import FIELD_BYTES, AnsweringConnection
+from reference_robot.webservices.http.answering import FIELD_BYTES
+from reference_robot.webservices.http.crowd import Client
 from reference_robot.webservices.http.interface import described
 from reference_robot.webservices.http.messages import BODY_LIMIT, Field, Request
+from reference_robot.webservices.http.pacing import PacedConnection
 from reference_robot.webservices.http.port import Port
 from reference_robot.webservices.http.proxies import take_forwarded
 from reference_robot.webservices.http.reading import (
+    FRAMING_FIELDS,
+    FRAMING_LIMIT,
+    FRAMING_PER_BYTE,
     HEAD_LIMIT,
     TARGET_LIMIT,
+    VERSIONS,
     fields_by_name,
+    framing_too_large,
     full,
     head_too_large,
     no_request,
     readable,
     require_bounded,
+    require_head,
     require_old_version,
 )
 from reference_robot.webservices.representation.problems import Problem, not_yet
@@ -41,11 +49,13 @@ _UNREAD: Final = 16 * 1024  # bytes of unread responses at which a client counts
 _CONTINUE: Final = b"HTTP/1.1 100 Continue\r\n\r\n"
 
 
-class HttpConnection(AnsweringConnection):
+class HttpConnection(PacedConnection):
     """A connection to one port that parses requests and answers them."""
 
-    def __init__(self, port: Port) -> None:
+    def __init__(self, port: Port, handshake: Client | None = None) -> None:
+        """Create a connection; ``handshake`` is the TLS handshake whose place in the port it takes."""
         super().__init__(port)
+        self._handshake = handshake
         self._admit = port.interface.admit
         self._parser = HttpRequestParser(self)
         self._is_proxied = False  # the peer is a trusted proxy
@@ -58,7 +68,10 @@ class HttpConnection(AnsweringConnection):
         self._content: bytes | bytearray = b""
         self._is_refused = False  # the error response is sent, and the rest of the body is dropped
         self._dropped = 0
+        self._after_head = 0  # bytes in the segments after the one in which the head ended
+        self._received = 0  # bytes of content
         self._arriving = 0  # bytes kept for this request
+        self._is_stopped = False  # the parser stops after this head
 
     # Callbacks of the transport
 
@@ -66,21 +79,27 @@ class HttpConnection(AnsweringConnection):
         """Register the connection and start the deadline for its first request; refuse one connection too many."""
         self._transport = cast("asyncio.Transport", transport)
         self._transport.set_write_buffer_limits(_UNREAD)
-        self._is_proxied = self._port.proxies.include(transport.get_extra_info("peername"))
-        self.due = self._now() + self._port.patience
-        if not self._port.add(self):
-            self._refuse(not_yet("too many connections"))
+        peer = transport.get_extra_info("peername")
+        self._is_proxied = self._port.proxies.include(peer)
+        self._allow(self._port.unknown_patience)
+        if self._handshake is not None:
+            self._port.replace(self._handshake, self)
+        elif not self._port.add(self, peer):
+            if self._port.is_overrun():
+                self.give_way()
+            else:
+                self._refuse(not_yet("too many connections"))
 
-    def data_received(self, data: bytes) -> None:
+    def _take(self, data: bytes) -> None:
         """Feed received bytes to the parser; answer invalid requests with an error."""
-        if self._leaving:
-            return
         if self._in_head:
             if not self._has_begun:
                 data = readable(data)
             self._head_size += len(data)
+        else:
+            self._after_head += len(data)
         try:
-            self._parser.feed_data(data)
+            self._parse(data)
         except HttpParserCallbackError as error:
             problem = error.__context__
             self._refuse(problem if isinstance(problem, Problem) else no_request(problem or error))
@@ -89,6 +108,27 @@ class HttpConnection(AnsweringConnection):
         else:
             if self._has_begun:
                 self._hold_arriving()
+                if self._after_head > FRAMING_LIMIT + FRAMING_PER_BYTE * self._received:
+                    self._refuse(framing_too_large())
+
+    def _parse(self, data: bytes | memoryview) -> None:
+        """Feed bytes to the parser; ignore offers to upgrade (RFC 9110 7.8).
+
+        After the head of a request that offers an upgrade, or of CONNECT, the parser stops, because data of another
+        protocol may follow. The robot supports none. So a new parser gets a head that has only the framing of the
+        request's body, and then what follows. Java's HttpClient offers h2c with every first request.
+        """
+        while True:
+            try:
+                self._parser.feed_data(data)
+            except HttpParserUpgrade as stopped:
+                data = memoryview(data)[stopped.args[0] :]
+                self._parser = HttpRequestParser(self)
+                headers = self._request.headers if self._request is not None else {}
+                framing = [b"%b: %b\r\n" % (name, headers[name]) for name in FRAMING_FIELDS if name in headers]
+                self._parser.feed_data(b"POST / HTTP/1.1\r\nhost: a\r\n%b\r\n" % b"".join(framing))
+            else:
+                return
 
     # Callbacks of the parser; an exception stops it
 
@@ -96,7 +136,7 @@ class HttpConnection(AnsweringConnection):
         """Start the deadline for receiving the request that begins."""
         self._has_begun = True
         if not self._stalled:
-            self.due = self._now() + self._port.patience
+            self._allow(self._port.patience if self.is_known else self._port.unknown_patience)
 
     def on_url(self, url: bytes) -> None:
         """Store a part of the request target; raise the Problem 414 if the target is too long."""
@@ -111,11 +151,15 @@ class HttpConnection(AnsweringConnection):
 
     def on_headers_complete(self) -> None:
         """Refuse a request with an invalid head; otherwise send 100 Continue if the client waits for that status."""
-        fields = self._fields
-        if self._head_size > HEAD_LIMIT and sum(len(name) + len(value) for name, value in fields) > HEAD_LIMIT:
-            raise head_too_large()
+        if self._is_stopped:  # this is the second head, of the framing alone
+            self._is_stopped = False
+            return
+        fields, parser = self._fields, self._parser
+        headers, version = dict(fields), parser.get_http_version()
+        if self._head_size > HEAD_LIMIT or b"transfer-encoding" in headers or version not in VERSIONS:
+            require_head(version, fields)
         self._in_head = False
-        headers, parser = dict(fields), self._parser
+        self._is_stopped = parser.should_upgrade()
         request = Request(parser.get_method().decode(), self._target, headers, keep_alive=parser.should_keep_alive())
         self._request = request
         if self._is_proxied:
@@ -124,8 +168,10 @@ class HttpConnection(AnsweringConnection):
             if len(headers) != len(fields):
                 request.headers = headers = fields_by_name(fields)
             if b"host" not in headers:
-                require_old_version(parser.get_http_version())
+                require_old_version(version)
             self._admit(request)
+            if not self.is_known:
+                self._become_known()
             if b"content-length" in headers:  # digits only: the parser has checked that
                 require_bounded(int(headers[b"content-length"]))
         except Problem as problem:
@@ -136,6 +182,7 @@ class HttpConnection(AnsweringConnection):
 
     def on_body(self, body: bytes) -> None:
         """Store a part of the body, or drop it if the request has been refused."""
+        self._received += len(body)
         request = self._request
         if request is None or self._is_refused:
             self._dropped += len(body)
@@ -150,17 +197,19 @@ class HttpConnection(AnsweringConnection):
             self._content += body
         try:
             require_bounded(len(self._content))
-            if self._port.is_full():
+            if self._port.is_full_for(len(self._content)):
                 raise full()
         except Problem as problem:
             self._refuse_one(request, problem)
 
     def on_message_complete(self) -> None:
         """Answer or queue the complete request, and prepare for the next one."""
+        if self._is_stopped:
+            return
         request, refused = self._request, self._is_refused
         self._has_begun = self._is_refused = False
         self._in_head = True
-        self._head_size = 0
+        self._head_size = self._after_head = self._received = 0
         self._target = b""
         self._fields = []
         self._request = None
@@ -170,12 +219,18 @@ class HttpConnection(AnsweringConnection):
         if request is None or refused:
             self._dropped = 0
             if not self._is_busy():
-                self.due = self._now() + self._port.keep_alive
+                self._allow_next()
             return
         if self._content:
             request.body = bytes(self._content)
             self._content = b""
         self._queue(request, None)
+
+    def _become_known(self) -> None:
+        """Give the client of the first request that has passed the access check more time for its body."""
+        self.is_known = True
+        if not self._stalled:
+            self._allow(self._port.patience)
 
     # The end of the connection
 
@@ -197,7 +252,7 @@ class HttpConnection(AnsweringConnection):
         self._leaving = True
 
     def expire(self) -> None:
-        """End the connection because ``due`` has passed; answer 408 if a request is incomplete (RFC 9110 15.5.9)."""
+        """End the connection because the client's time has passed; answer 408 to half a request (RFC 9110 15.5.9)."""
         if self._transport.is_closing() or self._stalled:
             self._reset()
         elif self._has_begun and not self._leaving:
@@ -216,5 +271,5 @@ class HttpConnection(AnsweringConnection):
         weight = self._head_size + FIELD_BYTES * len(self._fields) + len(self._content)
         self._hold(weight - self._arriving)
         self._arriving = weight
-        if self._in_head and self._port.is_full():
+        if self._in_head and self._port.is_full_for(weight):
             self._refuse(full())

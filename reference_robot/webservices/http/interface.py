@@ -28,6 +28,11 @@ class Interface(ABC):
     def __init__(self, admission: Admission) -> None:
         self._admission = admission
 
+    @property
+    def is_guarded(self) -> bool:
+        """Whether requests need a token."""
+        return self._admission.is_guarded
+
     @abstractmethod
     def answer(self, request: Request) -> Response | Awaitable[Response]:
         """Return the response or an awaitable of it; a raised Problem becomes the response."""

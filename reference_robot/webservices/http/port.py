@@ -3,30 +3,20 @@
 import asyncio
 import os
 import time
+from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from email.utils import formatdate
-from typing import Final, Protocol
+from typing import Any, Final
 
+from reference_robot.webservices.http.crowd import Client, Crowd, address_of
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.proxies import TrustedProxies
 
 _AWAKE: Final = 150e-6  # seconds; a client on the same machine needs 20 to 100 µs from a response to its next request
+_TURNS: Final = 5e-3  # seconds for what clients have postponed, before new requests of other clients get their turn
+_REFUSED: Final = 100  # connections beyond the limit that are told so and closed
 _CROWDED: Final = 2.0  # runnable processes for each processor, averaged over a minute
-
-
-class Client(Protocol):
-    """A connection as seen by its port; ``due`` is the event-loop time at which the connection expires."""
-
-    due: float
-
-    def expire(self) -> None:
-        """End the connection because ``due`` has passed."""
-
-    def stop(self) -> None:
-        """Close the connection if no response is pending; otherwise the pending response will be the last."""
-
-    def abort(self) -> None:
-        """Drop the connection and cancel the request in progress."""
 
 
 @dataclass(frozen=True)
@@ -36,13 +26,18 @@ class Limits:
     Attributes:
         patience: Seconds that a client may take to send one request, and to read responses.
         keep_alive: Seconds that an idle connection is kept open for its next request.
-        connections: Connections per port; two full ports and ROS need fewer file descriptors than the runner's 8,192.
+        unknown: Where tokens are required: seconds that a client without a valid token may take for each step, such as
+            the TLS handshake, the head of a request, or to begin its next request.
+        connections: Connections per port.
+        of_address: Connections per port from one address; None for seven eighths of ``connections``.
         held: Bytes that the robot keeps for all connections together.
     """
 
     patience: float
     keep_alive: float = 60.0
+    unknown: float = 5.0
     connections: int = 3800
+    of_address: int | None = None
     held: int = 64 * 1024 * 1024
 
 
@@ -67,6 +62,10 @@ class Port:
         proxies: The proxies whose X-Forwarded fields are trusted.
 
     Attributes:
+        patience: Seconds that a client may take to send one request, and to read responses.
+        keep_alive: Seconds that an idle connection is kept open for its next request.
+        unknown_patience: ``patience`` for a client that has shown no valid token.
+        unknown_keep_alive: ``keep_alive`` for such a client.
         date: The Date header field, less than two seconds old (RFC 9110 6.6.1).
         is_empty: An event that is set while there are no connections.
     """
@@ -77,7 +76,19 @@ class Port:
         self.interface = interface
         self.patience = limits.patience
         self.keep_alive = limits.keep_alive
-        self._limits = limits
+        is_guarded = interface.is_guarded
+        self.unknown_patience = min(limits.patience, limits.unknown) if is_guarded else limits.patience
+        self.unknown_keep_alive = min(limits.keep_alive, limits.unknown) if is_guarded else limits.keep_alive
+        self._most_held = limits.held
+        self._share = limits.held // limits.connections
+        self._turns: deque[Callable[[], None]] = deque()
+        self._takes_turns = False
+        self._refused_most = limits.connections + _REFUSED
+        self._clients = Crowd(
+            limits.connections,
+            limits.connections - limits.connections // 8 if limits.of_address is None else limits.of_address,
+            is_guarded=is_guarded,
+        )
         self.loop = asyncio.get_running_loop()
         self.held = held or Held()
         self.proxies = proxies or TrustedProxies()
@@ -88,27 +99,46 @@ class Port:
         self._may_poll = not _is_crowded()
         self.is_empty = asyncio.Event()
         self.is_empty.set()
-        self._clients: set[Client] = set()
 
-    def add(self, client: Client) -> bool:
-        """Register a connection; return False if there are too many."""
-        self._clients.add(client)
+    def add(self, client: Client, peer: Any) -> bool:
+        """Register a connection; return False if there are too many, and none of them can give way.
+
+        A trusted proxy's connections stand for many clients, so each counts as if it had an address of its own.
+
+        Args:
+            client: The connection.
+            peer: The address of its other end, from ``getpeername``.
+        """
+        address: Any = client if self.proxies.include(peer) else address_of(peer)
+        has_place = self._clients.has_place_for(address, self.loop.time())
+        self._clients.add(client, address)
         self.is_empty.clear()
-        return len(self._clients) <= self._limits.connections
+        return has_place
 
-    def has_room_for(self, more: int) -> bool:
-        """Return whether ``more`` further connections are within the limit."""
-        return len(self._clients) + more <= self._limits.connections
+    def is_overrun(self) -> bool:
+        """Return whether so many refused connections are being closed that a further one gets no response."""
+        return len(self._clients) > self._refused_most
+
+    def replace(self, old: Client, new: Client) -> None:
+        """Register a connection in the place of its TLS handshake."""
+        self._clients.replace(old, new)
 
     def remove(self, client: Client) -> None:
         """Remove a closed connection."""
-        self._clients.discard(client)
+        self._clients.remove(client)
         if not self._clients:
             self.is_empty.set()
 
-    def is_full(self) -> bool:
-        """Return whether more memory is kept for clients than the limit."""
-        return self.held.size > self._limits.held
+    def is_full_for(self, size: int) -> bool:
+        """Return whether a client may not keep ``size`` bytes: memory is full, and they are more than its share."""
+        return self.held.size > self._most_held and size > self._share
+
+    def postpone(self, turn: Callable[[], None]) -> None:
+        """Call a function that parses what a client has sent, after other clients have had their turn."""
+        self._turns.append(turn)
+        if not self._takes_turns:
+            self._takes_turns = True
+            self.loop.call_soon(self._take_turns)
 
     def answered(self, began: float, now: float) -> None:
         """Poll for 0.15 ms without sleeping if the request came within 0.15 ms of the last response.
@@ -132,19 +162,30 @@ class Port:
         self.date = _date()
         self._may_poll = not _is_crowded()
         now = self.loop.time()
-        for client in [client for client in self._clients if client.due <= now]:
-            client.expire()
+        for client in self._clients:
+            if client.since + client.allowed <= now:
+                client.expire()
 
     def stop(self) -> None:
         """Close idle connections; the others close after their pending response."""
         self.is_stopping = True
-        for client in list(self._clients):
+        for client in self._clients:
             client.stop()
 
     def abort(self) -> None:
         """Drop all remaining connections."""
-        for client in list(self._clients):
+        for client in self._clients:
             client.abort()
+
+    def _take_turns(self) -> None:
+        until = time.perf_counter() + _TURNS
+        try:
+            while self._turns and time.perf_counter() < until:
+                self._turns.popleft()()
+        finally:
+            self._takes_turns = bool(self._turns)
+            if self._takes_turns:
+                self.loop.call_soon(self._take_turns)
 
     def _poll(self) -> None:
         """Keep the event loop from sleeping, which it never does while a call is due."""

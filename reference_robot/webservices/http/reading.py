@@ -8,12 +8,16 @@ from reference_robot.webservices.representation.problems import Problem, not_yet
 
 TARGET_LIMIT: Final = 8000  # bytes (RFC 9110 4.1 requires at least that)
 HEAD_LIMIT: Final = 64 * 1024  # bytes: request line and fields (RFC 6585 5)
+FRAMING_LIMIT: Final = 64 * 1024  # bytes of chunk sizes, chunk extensions and trailers, besides those for each byte:
+FRAMING_PER_BYTE: Final = 8  # a chunk of one byte takes six
+_FIELD_MARKS: Final = 4  # bytes of a field line besides name and value: colon, space and line end
+VERSIONS: Final = frozenset({"1.1", "1.0"})
+FRAMING_FIELDS: Final = (b"content-length", b"transfer-encoding")
 
 # Fields that may occur only once in a request (RFC 9110 5.3; 9112 3.2 for Host).
 _SINGLE: Final = frozenset({b"host", b"content-type", b"content-length", b"authorization"})
 
 _SERVED: Final = (b"GET ", b"PUT ", b"POST ", b"DELETE ", b"HEAD ", b"OPTIONS ")
-_UPGRADE: Final = re.compile(rb"(?i)(?<=\r\n)Upgrade(?=:)")
 _METHOD: Final = re.compile(rb"[!#$%&'*+.^_`|~0-9A-Za-z-]++(?= [^ \r\n]+ HTTP/1\.[01]\r?\n)")
 
 
@@ -22,17 +26,12 @@ def readable(data: bytes) -> bytes:
 
     A method that no resource offers is replaced by TRACE. The parser would reject unknown methods; so they get the same
     405 or 404 as any unsupported method (RFC 9110 15.5.6).
-
-    The Upgrade field is renamed, because the parser would read the body as data of another protocol. The robot supports
-    no upgrades and may ignore the field (RFC 9110 7.8). Java's HttpClient requests h2c with every first request.
     """
     if not data.startswith(_SERVED):
         method = _METHOD.match(data)
-        data = data if method is None else b"TRACE" + data[method.end() :]
-    if b"pgrade:" not in data:
-        return data
-    head, end, rest = data.partition(b"\r\n\r\n")
-    return _UPGRADE.sub(b"X-Ignored-Upgrade", head) + end + rest
+        if method is not None:
+            return b"TRACE" + data[method.end() :]
+    return data
 
 
 def fields_by_name(fields: list[Field]) -> dict[bytes, bytes]:
@@ -50,6 +49,29 @@ def fields_by_name(fields: list[Field]) -> dict[bytes, bytes]:
         else:
             headers[name] += b", " + value
     return headers
+
+
+def require_head(version: str, fields: list[Field]) -> None:
+    """Raise the Problem for a head that is too long, or that leaves in doubt where the request ends.
+
+    Raises:
+        Problem: 431 for fields that are too long, 505 for a version other than HTTP/1 (RFC 9110 15.6.6), 400 for a
+            transfer coding in HTTP/1.0, and 501 for a transfer coding other than ``chunked`` (RFC 9112 6.1).
+    """
+    if sum(len(name) + len(value) + _FIELD_MARKS for name, value in fields) > HEAD_LIMIT:
+        raise head_too_large()
+    if version not in VERSIONS:
+        raise Problem(505, f"HTTP/{version} is not supported, only HTTP/1.1 and HTTP/1.0")
+    codings = b",".join(value for name, value in fields if name == b"transfer-encoding")
+    if codings and version == "1.0":
+        raise Problem(400, "HTTP/1.0 has no Transfer-Encoding (RFC 9112 6.1)")
+    if codings and codings.lower() != b"chunked":
+        raise Problem(501, f"Transfer-Encoding {codings.decode('latin-1')[:80]!a} is not supported, only chunked")
+
+
+def framing_too_large() -> Problem:
+    """Return the Problem 431 for chunk extensions and trailers that are too long (RFC 6585 5)."""
+    return Problem(431, f"chunk sizes, chunk extensions and trailers exceed {FRAMING_LIMIT} bytes")
 
 
 def head_too_large() -> Problem:

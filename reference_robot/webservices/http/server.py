@@ -2,15 +2,18 @@
 
 import asyncio
 import contextlib
+import logging
 import socket
 import ssl
-from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 from reference_robot.webservices.http.connection import HttpConnection
 from reference_robot.webservices.http.port import Port
-from reference_robot.webservices.http.tls import accept
+from reference_robot.webservices.http.tls import begin_handshake
 
+_LOGGER: Final = logging.getLogger(__name__)
+_AT_ONCE: Final = 64  # connections that are accepted before clients that have one get their turn
+_PAUSE: Final = 0.1  # seconds after a failed accept
 _BACKLOG: Final = 1024  # connections that may wait to be accepted
 _TICK: Final = 0.5  # seconds
 _LAST_WORDS: Final = 2.0  # seconds for pending responses when the robot stops
@@ -33,22 +36,66 @@ async def serve(
         context: The TLS settings; None for plain HTTP.
     """
     listener.listen(_BACKLOG)
-    end_listening: Callable[[], object]
-    if context is None:
-        server = await port.loop.create_server(lambda: HttpConnection(port), sock=listener, backlog=_BACKLOG)
-        end_listening = server.close
-    else:
-        end_listening = port.loop.create_task(accept(port, listener, context)).cancel
+    accepting = _Accepting(port, listener, context)
+    accepting.resume()
     ticking = port.loop.create_task(_tick(port))
     started.set()
     await stop.wait()
-    end_listening()
+    accepting.end()
     port.stop()
     with contextlib.suppress(TimeoutError):
         async with asyncio.timeout(_LAST_WORDS):
             await port.is_empty.wait()
     ticking.cancel()
     port.abort()
+
+
+class _Accepting:
+    """Accepts connections, many at a time.
+
+    ``create_server`` accepts one connection in each turn of the event loop. New clients would wait behind the
+    connections of a client that opens many.
+    """
+
+    def __init__(self, port: Port, listener: socket.socket, context: ssl.SSLContext | None) -> None:
+        self._port = port
+        self._listener = listener
+        self._context = context
+        self._tasks: set[asyncio.Task[Any]] = set()
+
+    def resume(self) -> None:
+        """Accept connections from now on."""
+        if self._listener.fileno() >= 0:
+            self._port.loop.add_reader(self._listener, self._accept)
+
+    def end(self) -> None:
+        """Accept no more connections."""
+        self._port.loop.remove_reader(self._listener)
+        self._listener.close()
+
+    def _accept(self) -> None:
+        for _ in range(_AT_ONCE):
+            try:
+                client, peer = self._listener.accept()
+            except BlockingIOError:
+                return
+            except OSError as error:  # no file descriptor is left, or the client has disconnected
+                _LOGGER.warning("cannot accept a connection: %s", error)
+                self._port.loop.remove_reader(self._listener)
+                self._port.loop.call_later(_PAUSE, self.resume)
+                return
+            client.setblocking(False)  # noqa: FBT003 - the standard library's signature
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            if self._context is None:
+                task = self._port.loop.create_task(self._connect(client))
+                self._tasks.add(task)
+                task.add_done_callback(self._tasks.discard)
+            else:
+                begin_handshake(self._port, client, peer, self._context)
+
+    async def _connect(self, client: socket.socket) -> None:
+        with contextlib.suppress(OSError):  # the client has disconnected
+            await self._port.loop.connect_accepted_socket(lambda: HttpConnection(self._port), client)
 
 
 async def _tick(port: Port) -> None:

@@ -2,18 +2,15 @@
 
 import asyncio
 import contextlib
-import logging
 import socket
 import ssl
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from reference_robot.webservices.http.connection import HttpConnection
 from reference_robot.webservices.http.port import Port
 
-_LOGGER: Final = logging.getLogger(__name__)
 _SHUTDOWN: Final = 2.0  # seconds for the client's close_notify
-_PAUSE: Final = 0.1  # seconds after a failed accept
 
 
 class TlsFileError(ValueError):
@@ -68,40 +65,45 @@ def _reason(error: ssl.SSLError) -> str:
     return (error.reason or str(error)).replace("_", " ").lower()
 
 
-async def accept(port: Port, listener: socket.socket, context: ssl.SSLContext) -> None:
-    """Accept connections and perform their TLS handshakes until cancelled; handshakes count as connections of the port.
+def begin_handshake(port: Port, client: socket.socket, peer: Any, context: ssl.SSLContext) -> None:
+    """Begin the TLS handshake of an accepted connection; it counts as a connection of the port.
 
     ``create_server(ssl=...)`` does not count connections whose handshake is not complete.
     """
-    handshakes: set[asyncio.Task[None]] = set()
-    try:
-        while True:
-            try:
-                client, _ = await port.loop.sock_accept(listener)
-            except OSError as error:  # no file descriptor is left, or the client has disconnected
-                _LOGGER.warning("cannot accept a connection: %s", error)
-                await asyncio.sleep(_PAUSE)
-                continue
-            if not port.has_room_for(len(handshakes) + 1):
-                client.close()  # no response is possible before the handshake
-                continue
-            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            handshake = port.loop.create_task(_agree(port, client, context))
-            handshakes.add(handshake)
-            handshake.add_done_callback(handshakes.discard)
-    finally:
-        listener.close()
-        for handshake in handshakes:
-            handshake.cancel()
+    handshake = _Handshake(port, client)
+    if port.add(handshake, peer):
+        handshake.begin(context)
+    else:
+        port.remove(handshake)
+        client.close()  # no response is possible before the handshake
 
 
-async def _agree(port: Port, client: socket.socket, context: ssl.SSLContext) -> None:
-    # The handshake fails if the client does not use TLS, shares no version, or is too slow; the socket is then closed.
-    with contextlib.suppress(OSError):
-        await port.loop.connect_accepted_socket(
-            lambda: HttpConnection(port),
-            client,
-            ssl=context,
-            ssl_handshake_timeout=port.patience,
-            ssl_shutdown_timeout=_SHUTDOWN,
-        )
+class _Handshake:
+    """A TLS handshake, which has a place among the connections of the port; a slow or failed one closes the socket."""
+
+    is_known = False
+
+    def __init__(self, port: Port, client: socket.socket) -> None:
+        self._port = port
+        self._client = client
+        self._task: asyncio.Task[None] | None = None
+        self.since = port.loop.time()
+        self.allowed = port.unknown_patience
+
+    def begin(self, context: ssl.SSLContext) -> None:
+        """Begin the handshake."""
+        self._task = self._port.loop.create_task(self._agree(context))
+        self._task.add_done_callback(lambda _: self._port.remove(self))
+
+    async def _agree(self, context: ssl.SSLContext) -> None:
+        with contextlib.suppress(OSError):  # the client does not use TLS, or shares no version
+            await self._port.loop.connect_accepted_socket(
+                lambda: HttpConnection(self._port, self), self._client, ssl=context, ssl_shutdown_timeout=_SHUTDOWN
+            )
+
+    def give_way(self) -> None:
+        """End the handshake."""
+        if self._task is not None:
+            self._task.cancel()
+
+    expire = stop = abort = give_way
