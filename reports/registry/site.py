@@ -90,11 +90,12 @@ def _row(history: History) -> Row:
     standing = history.current
     run = standing.certificate.run
     tone, word = _word(standing)
+    keys = len({one.certificate.key for one in history.standings})
     firmware = f"firmware {run.robot.version}" if run.robot.version else ""
     notes = (
         ", ".join(filter(None, [history.vendor, firmware])),
         f"{run.finished[:10]}, {_judged_by(run)}",
-        f"key {standing.certificate.key[:16]}…",
+        f"key {standing.certificate.key[:16]}…" + (f", {keys} keys in all" if keys > 1 else ""),
     )
     return Row(
         name=history.name,

@@ -5,10 +5,11 @@ import json
 import os
 import shutil
 import unicodedata
+from collections import Counter
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from lxml import html
 from signed_results import COUNT, Vendor, conformant, failures, roaas
@@ -398,6 +399,52 @@ def test_any_alteration_of_a_requirement_is_refused(honest, tmp_path_factory, al
     assert (done.exit_code, vendor.envelope.exists()) == (2, False), (alteration, place, done.output)
 
 
+def alteration(kind, level, verdict, place):
+    """Alter one requirement of a signed certificate."""
+
+    def alter(listed):
+        ids = listed[level][verdict]
+        id_ = ids[place % len(ids)]
+        match kind:
+            case "remove":
+                ids.remove(id_)
+            case "double":
+                ids.append(id_)
+            case "rename":
+                ids[ids.index(id_)] = id_.upper()
+            case "level":
+                listed[next(name for name in listed if name != level)][verdict].append(id_)
+                ids.remove(id_)
+            case _:
+                listed[level].setdefault(kind, []).append(id_)
+                ids.remove(id_)
+
+    return alter
+
+
+@settings(max_examples=30)
+@given(
+    kind=st.sampled_from(["remove", "double", "rename", "level", "Pass", "fail"]),
+    level=st.sampled_from(["MUST", "SHOULD"]),
+    place=st.integers(0, 266),
+)
+def test_any_alteration_of_a_signed_requirement_is_refused(honest, tmp_path_factory, kind, level, place):
+    """Also where the vendor who holds the key counts anew."""
+    vendor = Vendor(tmp_path_factory.mktemp("altered"), honest.keys)
+
+    def lie(document):
+        facts = document["predicate"]["roaas"]
+        alteration(kind, level, "pass", place)(facts["outcomes"])
+        found = [verdict for verdicts in facts["outcomes"].values() for verdict, ids in verdicts.items() for _ in ids]
+        facts["requirements"] = dict(Counter(found))
+
+    # A SHOULD may end in any way. A MUST that only a probe or a rare event shows may remain untested.
+    assume(level == "MUST" or kind != "fail")
+    vendor.forge(conformant(), lie)
+    done = vendor.verify()
+    assert (done.exit_code, "REFUSED  requirements" in done.output) == (1, True), done.output
+
+
 KEYS = [
     ("the neutral point", "01" + "00" * 31),
     ("order 2", "ec" + "ff" * 30 + "7f"),
@@ -559,7 +606,8 @@ def test_another_suite_cannot_know_the_whole_ledger_and_says_so(vendor, tmp_path
     result = conformant()
     result["suite"]["digest"] = "sha256:" + "6" * 64
     result["requirements"].append(result["requirements"][0] | {"id": "http/newer", "class": "http"})
-    assert vendor.sign(result).exit_code == 0
+    done = vendor.sign(result)
+    assert (done.exit_code, "were not compared with a ledger" in done.stderr) == (0, True), done.output
     policy = tmp_path / "policy.toml"
     policy.write_text(f'suites = ["{result["suite"]["digest"]}"]\n')
     done = vendor.verify("--policy", policy)
@@ -639,6 +687,13 @@ def test_a_certificate_of_the_future_supersedes_none(vendor, tmp_path):
     assert now.sign(conformant()).exit_code == 0
     done = registry(tmp_path, *folders)
     assert done.stdout.startswith("1 of 1 robots with a certificate that counts"), done.output
+
+
+def test_a_registry_says_that_two_keys_signed_for_one_robot(vendor, honest, tmp_path):
+    trusted(tmp_path, vendor, honest)
+    assert vendor.sign(conformant()).exit_code == 0
+    assert registry(tmp_path, vendor.folder, honest.folder).stdout.startswith("1 of 1 robots")
+    assert "2 keys in all" in (tmp_path / "site" / "index.html").read_text()
 
 
 def test_a_registry_does_not_count_one_requirement_of_all(vendor, tmp_path):
