@@ -222,6 +222,40 @@ class _Reader:
         return value
 
 
+def check_yaml(text: str) -> None:
+    """Check that a parser can build what a YAML stream holds: libyaml follows nesting to the end of its stack.
+
+    Raises:
+        ValueError: it is nested too deeply, or its aliases repeat too much.
+        yaml.YAMLError: it is no YAML.
+    """
+    loader = _Loader(text)
+    sizes: dict[str, int] = {}
+    around: list[tuple[str | None, int]] = []
+    nodes = 0
+    try:
+        while not isinstance(event := loader.get_event(), yaml.StreamEndEvent):
+            if isinstance(event, yaml.AliasEvent):
+                if event.anchor not in sizes:
+                    raise ValueError(f"the alias *{event.anchor} of nothing, or of what holds it")
+                nodes += sizes[event.anchor]
+            elif isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent):
+                nodes += 1
+                if isinstance(event, yaml.CollectionStartEvent):
+                    around.append((event.anchor, nodes))
+                elif event.anchor is not None:
+                    sizes[event.anchor] = 1
+            elif isinstance(event, yaml.CollectionEndEvent):
+                anchor, begin = around.pop()
+                if anchor is not None:
+                    sizes[anchor] = nodes - begin + 1
+            if nodes > _MOST_NODES or len(around) > _DEEPEST:
+                limit = f"{_MOST_NODES:,} values, with what its aliases repeat" if nodes > _MOST_NODES else "100 levels"
+                raise ValueError(f"it holds more than {limit}")
+    finally:
+        loader.dispose()
+
+
 def _tag_of(event: Any) -> str:
     """Return a scalar's tag; that of a plain one, whose type its text decides, is `_PLAIN`."""
     if event.tag is not None and event.tag != "!":

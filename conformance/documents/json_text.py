@@ -3,6 +3,7 @@
 import codecs
 import json
 import math
+from collections import Counter
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
@@ -76,8 +77,8 @@ class _Reader:
         """Return an object, and record the first duplicate name."""
         result = dict(pairs)
         if len(result) < len(pairs):
-            names = [name for name, _ in pairs]
-            self.twice = self.twice or next(name for name in names if names.count(name) > 1)
+            counts = Counter(name for name, _ in pairs)
+            self.twice = self.twice or next(name for name, count in counts.items() if count > 1)
         return result
 
 

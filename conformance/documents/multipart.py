@@ -13,6 +13,9 @@ from conformance.documents.xml import NotXmlError, parse
 if TYPE_CHECKING:
     from lxml import etree
 
+# A body has so many parts, and those that it includes, as often as it does, have so many octets.
+_MOST_PARTS: Final = 10_000
+_MOST_OCTETS: Final = 64 * 1024 * 1024
 _INCLUDE: Final = "{http://www.w3.org/2004/08/xop/include}Include"
 _XOP: Final = "application/xop+xml"
 
@@ -57,6 +60,8 @@ def parts_of(content_type: str, body: bytes) -> list[Part]:
     pieces = (b"\r\n" + body).split(b"\r\n--" + boundary)
     if len(pieces) < 3 or not pieces[-1].startswith(b"--"):  # noqa: PLR2004 - a part between two delimiters
         raise NotXmlError("multipart/related that does not end with its boundary")
+    if len(pieces) > _MOST_PARTS:
+        raise NotXmlError(f"multipart/related with more than {_MOST_PARTS:,} parts")
     found = [_part(piece.partition(b"\r\n")[2]) for piece in pieces[1:-1]]
     start = parameter(content_type, "start").strip("<>")
     root = next((one for one in found if start and one.id == start), found[0])
@@ -71,7 +76,10 @@ def _part(octets: bytes) -> Part:
         if colon:
             fields[name.strip()] = value.strip()
     if fields.get("Content-Transfer-Encoding", "").lower() == "base64":
-        body = base64.b64decode(body)
+        try:
+            body = base64.b64decode(body)
+        except ValueError as error:
+            raise NotXmlError(f"a part that is no base64: {error}") from error
     return Part(fields.get("Content-Type", ""), fields.get("Content-ID", "").strip("<>"), body)
 
 
@@ -86,10 +94,14 @@ def root_of(content_type: str, body: bytes) -> etree._Element:
     root, *others = parts_of(content_type, body)
     document = parse(in_utf_8(root.content_type, root.body), doctype=True)
     by_id = {one.id: one for one in others}
+    octets = 0
     for include in list(document.iter(_INCLUDE)):
         wanted, parent = unquote(include.get("href", "")).removeprefix("cid:"), include.getparent()
         if wanted not in by_id:
             raise NotXmlError(f"xop:Include names the part {wanted!r}, which is not there")
+        octets += len(by_id[wanted].body)
+        if octets > _MOST_OCTETS:
+            raise NotXmlError(f"the parts that xop:Include repeats have more than {_MOST_OCTETS:,} bytes")
         if parent is not None:
             parent.remove(include)
             parent.text = base64.b64encode(by_id[wanted].body).decode()
@@ -100,11 +112,11 @@ def in_utf_8(content_type: str, body: bytes) -> bytes:
     """Return XML in UTF-8 if its Content-Type names another charset, which outranks the document (RFC 7303, 3.2)."""
     charset = parameter(content_type, "charset").strip("'\"").lower()
     # A byte order mark outranks both, and an encoding that the document names itself is read by the parser.
-    if charset in {"", "utf-8"} or body.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf")):
+    if charset in {"", "utf-8", "idna", "punycode"} or body.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf")):
         return body
     try:
         text = body.decode(charset)
-    except (LookupError, UnicodeDecodeError):
+    except (LookupError, UnicodeError):
         return body
     declaration = text.startswith("<?xml") and "?>" in text
     return (text.partition("?>")[2] if declaration else text).encode()

@@ -6,6 +6,7 @@ from typing import Any
 import yaml
 from lxml import etree
 
+from conformance.contract.document_text import check_yaml
 from conformance.documents import xml
 from conformance.documents.json_schema import Schema, as_double, kind_of, types_of, whole
 from conformance.documents.json_text import read_json
@@ -71,7 +72,9 @@ def parse_yaml(body: bytes) -> Any:
         UnreadableError: it is not YAML, or has several documents.
     """
     try:
-        documents = list(yaml.load_all(body.decode("utf-8"), Loader=_Loader))
+        text = body.decode("utf-8")
+        check_yaml(text)
+        documents = list(yaml.load_all(text, Loader=_Loader))
     except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
         raise UnreadableError(f"not YAML: {_short(error)}") from error
     while len(documents) > 1 and documents[-1] in (None, ""):
@@ -93,7 +96,9 @@ def by_itself(body: bytes) -> Any:
         UnreadableError: it is not YAML.
     """
     try:
-        return next(iter(yaml.load_all(body.decode("utf-8"), Loader=_ByItself)), None)
+        text = body.decode("utf-8")
+        check_yaml(text)
+        return next(iter(yaml.load_all(text, Loader=_ByItself)), None)
     except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
         raise UnreadableError(f"not YAML: {_short(error)}") from error
 

@@ -20,6 +20,9 @@ from conformance.transport.exchange import IDEMPOTENT_METHODS, Response
 # An answer longer than this is no answer to any request of the contract, octets; nor is a longer header section.
 _MAX_ANSWER: Final = 32 * 1024 * 1024
 _MAX_HEAD: Final = 100 * 1024
+# As much comes over the wire for one answer, with the sizes and extensions of its chunks, and as many interim answers.
+_MAX_WIRE: Final = 2 * _MAX_ANSWER
+_MAX_INTERIM: Final = 100
 # Octets that are handed to the network, and taken from it, at once.
 _PIECE: Final = 256 * 1024
 _READ: Final = 64 * 1024
@@ -94,6 +97,7 @@ class HttpConnection:
         self._state = h11.Connection(h11.CLIENT, max_incomplete_event_size=_MAX_HEAD)
         self._idle_since = 0.0
         self._begun = False
+        self._octets = 0
         self._was_reset = False
         self.is_idle = False
         self.last_status = 0
@@ -113,7 +117,7 @@ class HttpConnection:
             h11.RemoteProtocolError: the response is not HTTP, or too large.
             OSError: the connection broke.
         """
-        started, self.is_idle, self._begun = time.perf_counter(), False, False
+        started, self.is_idle, self._begun, self._octets = time.perf_counter(), False, False, 0
         if self._link is None:
             self._link = open_link(*self._server, deadline.to_send_s())
         self._send(self._link, request, content, deadline)
@@ -128,7 +132,9 @@ class HttpConnection:
             time.monotonic(),
             cut,
         )
-        if self._state.our_state is h11.DONE and self._state.their_state is h11.DONE:
+        # What came after the response would be taken for that to the next request.
+        ends = self._state.our_state is h11.DONE and self._state.their_state is h11.DONE
+        if ends and not self._state.trailing_data[0]:
             self._state.start_next_cycle()
             self.is_idle, self._idle_since = True, time.monotonic()
         self.last_status = response.status
@@ -163,12 +169,13 @@ class HttpConnection:
 
     def _head(self, link: socket.socket, deadline: Deadline) -> h11.Response | h11.InformationalResponse:
         """Return the head of the final response or the next interim response (RFC 9110 15.2)."""
-        while True:
+        for _ in range(_MAX_INTERIM + 1):
             event = self._event(link, deadline)
             if isinstance(event, h11.Response):
                 return event
             if isinstance(event, h11.InformationalResponse) and event.status_code == _SWITCHING_PROTOCOLS:
                 return event
+        raise h11.RemoteProtocolError(f"more than {_MAX_INTERIM} interim responses (1xx) before a final one")
 
     def _body(self, link: socket.socket, deadline: Deadline) -> bytes:
         pieces: list[bytes] = []
@@ -222,6 +229,9 @@ class HttpConnection:
                 self._was_reset = not self._begun and _is_reset(link)
                 raise ClosedError
             deadline.came(len(octets))
+            self._octets += len(octets)
+            if self._octets > _MAX_WIRE:
+                raise h11.RemoteProtocolError(f"a response of more than {_MAX_WIRE} bytes on the wire")
             self._state.receive_data(octets)
         return event
 

@@ -1,6 +1,8 @@
 """HTTP/1.1 over a plain socket: requests that no client library sends, and responses checked byte by byte.
 
 Every wait has a deadline. The error for a response with broken framing names the violated clause of RFC 9112.
+
+Over 300 lines because the limits of what a robot may send belong to the loops that read it.
 """
 
 import itertools
@@ -37,6 +39,8 @@ _REQUEST_LINE = re.compile(
     rb"((?:PUT|POST|DELETE|PATCH)(?=[ \t\v\f])|[A-Za-z-]+(?=[ \t\v\f]+(?:/|https?:)))[ \t\v\f]+([^ \t\v\f\r\n]+)"
 )
 _MOST = 4 * 1024 * 1024
+_MOST_INTERIM = 100
+_SHORT = 64 * 1024
 # The least that a connection is waited for, s.
 _TO_CONNECT_S = 0.05
 
@@ -146,7 +150,9 @@ def talk(
                 break
             received += piece
             deadline += time_for(len(piece))
-            if answers and answers_in(bytes(received), answers) == answers:
+            # A long answer is looked at when no more of it is there to be read, as each look takes time.
+            short = len(received) < _SHORT or not select.select([link], [], [], 0)[0]
+            if answers and short and answers_in(bytes(received), answers) == answers:
                 break
     client.connection.note(request.method)
     silence = NoAnswer.CLOSED if closed else NoAnswer.TIMEOUT
@@ -227,6 +233,15 @@ def parse(octets: bytes, method: str, *, closed: bool, elapsed_ms: float = 0.0) 
     Raises:
         FramingError: the response is incomplete or its framing is broken.
     """
+    for _ in range(_MOST_INTERIM):
+        response, octets = _parsed(octets, method, closed=closed, elapsed_ms=elapsed_ms)
+        if response is not None:
+            return response, octets
+    raise FramingError(f"more than {_MOST_INTERIM} interim responses before a final one (RFC 9110 15.2)")
+
+
+def _parsed(octets: bytes, method: str, *, closed: bool, elapsed_ms: float) -> tuple[Response | None, bytes]:
+    """Return the first response in a byte stream, None for an interim one, and the bytes after it; see parse()."""
     section, separator, _ = octets.partition(b"\r\n\r\n")
     if not separator:
         raise FramingError(f"no end of the header section in {octets[:60]!r} (RFC 9112 2.1)")
@@ -243,7 +258,7 @@ def parse(octets: bytes, method: str, *, closed: bool, elapsed_ms: float = 0.0) 
         first = reader.next_event()
         if isinstance(first, h11.InformationalResponse):
             # RFC 9110 15.2: interim responses come before the final one.
-            return parse(reader.trailing_data[0], method, closed=closed, elapsed_ms=elapsed_ms)
+            return None, reader.trailing_data[0]
         if not isinstance(first, h11.Response) or first.http_version not in {b"1.0", b"1.1"}:
             raise FramingError(f"no response of HTTP/1.1 or HTTP/1.0: {section[:60]!r} (RFC 9112 2.3, 4)")
         body, rest = _content(reader)

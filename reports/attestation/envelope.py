@@ -8,6 +8,7 @@ because only the recipient decides whom to trust. The module `signature` verifie
 import base64
 import binascii
 import json
+from collections import Counter
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -109,8 +110,7 @@ def strict_json(octets: bytes) -> Any:
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found = dict(pairs)
     if len(found) != len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
+        twice = next(name for name, count in Counter(name for name, _ in pairs).items() if count > 1)
         raise ValueError(f"the name {twice[:80]!r} occurs twice in one object")
     return found
 
