@@ -22,7 +22,7 @@ from reference_robot.webservices.http.answering import FIELD_BYTES
 from reference_robot.webservices.http.crowd import Client
 from reference_robot.webservices.http.interface import described
 from reference_robot.webservices.http.messages import BODY_LIMIT, Field, Request
-from reference_robot.webservices.http.pacing import PacedConnection
+from reference_robot.webservices.http.pacing import DRAINED, PacedConnection
 from reference_robot.webservices.http.port import Port
 from reference_robot.webservices.http.proxies import take_forwarded
 from reference_robot.webservices.http.reading import (
@@ -44,7 +44,6 @@ from reference_robot.webservices.http.reading import (
 )
 from reference_robot.webservices.representation.problems import Problem, not_yet
 
-_DRAINED: Final = 16 * BODY_LIMIT  # bytes of a refused body that are dropped before the connection is closed
 _UNREAD: Final = 16 * 1024  # bytes of unread responses at which a client counts as not reading
 _CONTINUE: Final = b"HTTP/1.1 100 Continue\r\n\r\n"
 
@@ -67,7 +66,6 @@ class HttpConnection(PacedConnection):
         self._request: Request | None = None
         self._content: bytes | bytearray = b""
         self._is_refused = False  # the error response is sent, and the rest of the body is dropped
-        self._dropped = 0
         self._after_head = 0  # bytes in the segments after the one in which the head ended
         self._received = 0  # bytes of content
         self._arriving = 0  # bytes kept for this request
@@ -186,7 +184,7 @@ class HttpConnection(PacedConnection):
         request = self._request
         if request is None or self._is_refused:
             self._dropped += len(body)
-            if self._dropped > _DRAINED:
+            if self._dropped > DRAINED:
                 raise Problem(413, f"the body exceeds {BODY_LIMIT} bytes")
             return
         if not self._content:

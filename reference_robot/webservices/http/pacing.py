@@ -8,10 +8,12 @@ from abc import abstractmethod
 from typing import Final
 
 from reference_robot.webservices.http.answering import AnsweringConnection
+from reference_robot.webservices.http.messages import BODY_LIMIT
 from reference_robot.webservices.http.port import Port
 from reference_robot.webservices.http.reading import full
 from reference_robot.webservices.representation.problems import Problem
 
+DRAINED: Final = 16 * BODY_LIMIT  # bytes that are dropped after a refusal, before the connection is closed
 _HEAD_END: Final = b"\r\n\r\n"
 _AT_ONCE: Final = 4  # postponed requests of one client that are parsed in its turn
 
@@ -22,6 +24,7 @@ class PacedConnection(AnsweringConnection):
     def __init__(self, port: Port) -> None:
         super().__init__(port)
         self._postponed = b""
+        self._dropped = 0  # bytes that came after a refusal
 
     @abstractmethod
     def _take(self, data: bytes) -> None:
@@ -38,6 +41,9 @@ class PacedConnection(AnsweringConnection):
     def data_received(self, data: bytes) -> None:
         """Take received bytes; postpone those after the first request."""
         if self._leaving:
+            self._dropped += len(data)
+            if self._dropped > DRAINED:
+                self.give_way()
             return
         if self._postponed:
             self._postpone(self._postponed + data)
