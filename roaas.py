@@ -15,6 +15,7 @@ if (
 ):
     del sys.path[0]
 
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,7 @@ _COMMANDS = {
     "explain": ("conformance.cli.explain", "Explain a requirement: why, by which source, how judged, how to fix it."),
 }
 _EXTRAS = {"load"}  # commands that need the optional dependencies of the same name
-_INTERRUPTED = 130
+_USAGE, _INTERRUPTED = 2, 130
 _INSTALLED = Path(__file__).with_name("roaas_rooms")
 
 
@@ -84,6 +85,29 @@ class _Rooms(click.Group):
         if not isinstance(command, click.Command):
             raise TypeError(f"{module}.{cmd_name} is not a command")
         return command
+
+    def main(self, *args: Any, **options: Any) -> Any:
+        """Run a command and end the process with its exit code. By 1, nothing ends that is not a command's own verdict.
+
+        Click and Python end by 1 whatever they have no other code for: an exception, an interrupted prompt, a closed
+        pipe.
+        """
+        run: Callable[..., Any] = super().main
+        if not options.get("standalone_mode", True):
+            return run(*args, **options)
+        open_rooms()
+        guard = import_module("conformance.commandline.guard")
+        guard.make_streams_lenient()
+        try:
+            code = run(*args, **{**options, "standalone_mode": False})
+        except click.ClickException as error:
+            error.show()
+            code = _USAGE if error.exit_code == click.ClickException.exit_code else error.exit_code
+        except (KeyboardInterrupt, click.Abort):
+            code = _INTERRUPTED
+        except Exception as error:  # noqa: BLE001 - as in invoke()
+            code = guard.report_failure(error)
+        sys.exit(code if isinstance(code, int) else 0)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; name the extra that it lacks, if it turns out to need one, as the report of a load test.

@@ -17,6 +17,7 @@ import click
 
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.out_folder import FolderError, held
 from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.commandline.terminal import inert
 from conformance.commandline.without_folders import command_without_folders
@@ -80,7 +81,10 @@ def _run_load(settings: Settings, written: Path, summary: IO[str]) -> CommandRes
             signal.signal(number, handler)
     if code < 0:  # ended by a signal: before it handled Ctrl-C itself, or killed
         code = ExitCode.INTERRUPTED if -code in earlier else ExitCode.INCONCLUSIVE
-    return CommandResult(code, Path(written.read_text(encoding="utf-8")) if written.exists() else None)
+    path = Path(written.read_text(encoding="utf-8")) if written.exists() else None
+    if code == ExitCode.FAILED and path is None:  # Python's own, such as that of a module that cannot be loaded
+        code = ExitCode.INCONCLUSIVE
+    return CommandResult(code, path)
 
 
 def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
@@ -209,6 +213,7 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     context = click.get_current_context()
     summary = context.with_resource(TemporaryFile("w+", encoding="utf-8"))  # noqa: SIM115 - click closes it
     try:
+        _hold_folder(context, Path(options["out"]))
         named = Named.of(targets, options)
         kept = _Baselines.of(options.pop("baselines"), options.pop("save"), options.pop("baseline"))
         tolerance = options["tolerance"]
@@ -219,7 +224,6 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
 
             device = Described.of(named, options)
             settings = device.settings(_command_line())
-        _make_folder(Path(settings.output.folder))
         with TemporaryDirectory(prefix="roaas-load-") as folder:
             result = _run_load(settings, Path(folder, "written"), summary)
     except (TomlFileError, SettingsError, BaselineError) as error:
@@ -305,9 +309,9 @@ def _command_line() -> str:
     )
 
 
-def _make_folder(folder: Path) -> None:
-    """Make the folder for the result, so that a run does not fail at its end."""
+def _hold_folder(context: click.Context, folder: Path) -> None:
+    """Make the folder for the result and keep other runs out of it, so that a run does not fail at its end."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SettingsError(f"--out {str(folder)!r}: {error.strerror or error}") from None
+        context.with_resource(held(folder))
+    except FolderError as error:
+        raise SettingsError(f"--out {str(folder)!r}: {error}") from None

@@ -58,7 +58,7 @@ class UnusableError(click.ClickException):
 class RobotLostError(click.ClickException):
     """An error for a simulated robot that did not start or that ended unexpectedly."""
 
-    exit_code = ExitCode.FAILED
+    exit_code = ExitCode.UNREACHABLE
 
 
 @dataclass(frozen=True)

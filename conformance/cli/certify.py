@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from conformance.api.call_rules import CallRules, told
 from conformance.cli.certify_init import init, init_described
-from conformance.cli.certify_target import check_folder, told_apart, what_is_judged
+from conformance.cli.certify_target import hold_folder, told_apart, what_is_judged
 from conformance.cli.summary import print_summary
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
@@ -176,13 +176,13 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
     """
     if options["init"] and source is not None:
         return init_described(statement, source, options)
+    if not (options["plan"] or options["init"]):
+        hold_folder(options["out"])
     chosen, contract = what_is_judged(source, statement if not options["init"] else None, options)
     if options["init"]:
         return init(statement, chosen, contract, force=options["force"])
     if options["nonce"] is not None:
         _check_nonce(options["nonce"])
-    if not options["plan"]:
-        check_folder(options["out"])
     # Before the run: what cannot be signed by this key is told at once.
     notary = door.notary(Path(options["key"]), str(contract.directory)) if options["key"] else None
     if options["plan"]:
@@ -190,10 +190,8 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
     outcome = _certify(door, chosen, options, contract, statement)
     if outcome.unwritten:
         print_summary(outcome)
-        click.echo(
-            f"error: the result could not be written: {inert(outcome.unwritten)}. What is printed is all that is kept",
-            err=True,
-        )
+        kept = "What is printed is all that is kept" if outcome.path.parent == options["out"] else f"See {outcome.path}"
+        click.echo(f"error: the result could not be written: {inert(outcome.unwritten)}. {kept}", err=True)
         return CommandResult(outcome.exit_code)
     if options["as_json"]:
         click.echo(outcome.path.read_text(encoding="utf-8"), nl=False)

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import datetime as dt
 import sys
 from pathlib import Path
 from typing import Any
@@ -10,8 +9,10 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from conformance.cli.certify_target import hold_folder
 from conformance.cli.summary import warning
 from conformance.commandline.result_command import CommandResult
+from conformance.commandline.started import Started
 from conformance.commandline.terminal import inert
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
@@ -45,6 +46,7 @@ def certify_fleet(path: Path, options: dict[str, Any]) -> CommandResult:
             refuse_same_identity(path, members)
     except (FleetError, ContractError) as error:
         raise click.UsageError(str(error)) from error
+    hold_folder(options["out"])
     deep_s = 60 * DEEP_MINUTES if options["effort"] == "deep" else 0
     limit_s = TIME_LIMIT_S + (60 * options["minutes"] if options["minutes"] else deep_s)
     runs = [
@@ -56,12 +58,12 @@ def certify_fleet(path: Path, options: dict[str, Any]) -> CommandResult:
         )
         for member in members
     ]
-    started = dt.datetime.now(dt.UTC)
+    started = Started()
     parallel = options["parallel"] or PARALLEL
 
     def write(results: list[MemberResult], *, interrupted: bool) -> Path:
         document = fleet_document(
-            results, started=started, finished=dt.datetime.now(dt.UTC), parallel=parallel, interrupted=interrupted
+            results, started=started.at, finished=started.ended, parallel=parallel, interrupted=interrupted
         )
         return write_fleet(document, options["out"])
 

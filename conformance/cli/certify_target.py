@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import click
 import msgspec
 
 from conformance.commandline.extras import lacking_soap
+from conformance.commandline.out_folder import FolderError, held
 from conformance.contract.pack import Contract
 from conformance.documents.description import is_url
 from conformance.documents.openapi import operations_of
@@ -195,15 +195,13 @@ def _claims(options: dict[str, Any], contract: Contract) -> tuple[str, ...]:
     return (*contract.profiles.get(options["profile"] or "", ()), *options["classes"])
 
 
-def check_folder(out: Path) -> None:
-    """Make the folder for the results, before a run whose results it could not take.
+def hold_folder(out: Path) -> None:
+    """Make the folder for the results and keep other runs out of it, until the command ends.
 
     Raises:
-        click.UsageError: it cannot be made, or nothing can be written to it.
+        click.UsageError: it cannot take the results.
     """
     try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise click.UsageError(f"--out {out}: {error.strerror}") from error
-    if not os.access(out, os.W_OK | os.X_OK):
-        raise click.UsageError(f"--out {out}: nothing can be written to this folder")
+        click.get_current_context().with_resource(held(out))
+    except FolderError as error:
+        raise click.UsageError(f"--out {out}: {error}") from error

@@ -34,10 +34,19 @@ def write_json(path: Path, value: Any, **options: Any) -> Path:
 
 
 def _written(path: Path, text: str) -> Path:
+    return write_octets(path, text.encode())
+
+
+def write_octets(path: Path, octets: bytes) -> Path:
+    """Write octets, in which nothing is masked, atomically; return the path. A link of that name is replaced.
+
+    Raises:
+        OSError: as above.
+    """
     draft = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
-        with draft.open("x", encoding="utf-8") as file:
-            file.write(text)
+        with draft.open("xb") as file:
+            file.write(octets)
         return draft.replace(path)
     finally:
         draft.unlink(missing_ok=True)

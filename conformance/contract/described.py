@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from conformance.commandline.atomic_write import write_atomically, write_json
 from conformance.commandline.given_files import read_json, read_octets
+from conformance.commandline.out_folder import own_folder
 from conformance.contract.locating import MANIFEST
 from conformance.contract.toml_file import basic_string
 
@@ -56,7 +57,7 @@ def write_described_pack(
     Raises:
         OSError: it cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    own_folder(folder)
     info = document.get("info")
     info = info if isinstance(info, dict) else {}
     name = _NO_NAME.sub("-", str(info.get("title", "api")).lower()).strip("-") or "api"

@@ -11,6 +11,7 @@ from typing import Any, Final
 from urllib.parse import urlsplit
 
 from conformance.commandline.atomic_write import write_atomically, write_json
+from conformance.commandline.out_folder import own_folder
 from conformance.contract.described import MOTION, SOAP, TITLE, WEB_SERVER
 from conformance.contract.locating import MANIFEST
 from conformance.contract.pack import Contract
@@ -58,7 +59,7 @@ def write_soap_pack(
     Raises:
         OSError: it cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    own_folder(folder)
     lines = [
         f"name = {basic_string(re.sub(r'[^a-z0-9]+', '-', found.name.lower()).strip('-') or 'soap')}",
         'version = "0"',

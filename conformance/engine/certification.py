@@ -3,7 +3,9 @@
 import datetime as dt
 import gc
 import sys
+import tempfile
 from collections.abc import Container, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
@@ -12,6 +14,7 @@ import pytest
 
 from conformance.commandline.exit_codes import OF_VERDICT, ExitCode
 from conformance.commandline.secrecy import SECRETS
+from conformance.commandline.started import Started
 from conformance.contract.classes import Prerequisite
 from conformance.contract.described import MOTION, SOAP
 from conformance.engine.checks_plugin import ChecksPlugin
@@ -48,7 +51,7 @@ class Certification:
         exit_code: exit code of the command (docs/cli.md).
         document: content of result.json.
         path: where result.json was written.
-        unwritten: why it could not be written, or empty.
+        unwritten: why it could not be written to the folder for results, or empty; it may be in a temporary one.
     """
 
     exit_code: int
@@ -83,11 +86,12 @@ def certify(
     Raises:
         OSError: the CA file cannot be read.
     """
-    run, started = robot.run, dt.datetime.now(dt.UTC)
+    run, started = robot.run, Started()
     remarks, recordings, reached = list(notes), Recordings(), True
     with remembered(run) as interruption:
         # A result is there from the first request on, whatever ends the process.
-        _unwritten(_unfinished(robot, started, command, notes), recordings, out)
+        with suppress(OSError):  # told in the end
+            write_result(_unfinished(robot, started, command, notes), out)
         try:
             run.limit.begin()
             robot.connect(progress)
@@ -109,7 +113,7 @@ def certify(
         return _concluded(robot, out, remarks, recordings, baseline, started, command, reached=reached)
 
 
-def _unfinished(robot: RobotUnderTest, started: dt.datetime, command: str, notes: Iterable[str]) -> dict[str, Any]:
+def _unfinished(robot: RobotUnderTest, started: Started, command: str, notes: Iterable[str]) -> dict[str, Any]:
     """Return the content of result.json for a run that has not ended, which remains if the process is killed."""
     run = replace(robot.run, interrupted=True, aborted="the run has not ended")
     told = [*notes, "The run has not ended: it is under way, or it was killed."]
@@ -121,8 +125,8 @@ def _unfinished(robot: RobotUnderTest, started: dt.datetime, command: str, notes
         verdicts,
         causes,
         classes,
-        started=started,
-        finished=started,
+        started=started.at,
+        finished=started.at,
         command=command,
         notes=told,
         interrupted=True,
@@ -135,7 +139,7 @@ def _concluded(
     remarks: list[str],
     recordings: Recordings,
     baseline: tuple[Expectation, ...],
-    started: dt.datetime,
+    started: Started,
     command: str,
     *,
     reached: bool,
@@ -174,14 +178,14 @@ def _concluded(
         causes,
         classes if failed else accepted,
         accepted_until=accepted_until(verdicts) if failed and overall(accepted) is not Overall.NOT_CONFORMANT else "",
-        started=started,
-        finished=dt.datetime.now(dt.UTC),
+        started=started.at,
+        finished=started.ended,
         command=command,
         notes=remarks,
         interrupted=run.interrupted,
     )
     document = SECRETS.masked_json(document)
-    path, unwritten = out / RESULT_NAME, _unwritten(document, recordings, out)
+    path, unwritten = _written(document, recordings, out)
     if run.interrupted or unwritten:
         code = ExitCode.INTERRUPTED if run.interrupted else ExitCode.INCONCLUSIVE
         return Certification(code, document, path, unwritten)
@@ -200,14 +204,22 @@ def _deciding(
     return {name: value for name, value in class_verdicts(verdicts, claims).items() if name not in beside}
 
 
-def _unwritten(document: dict[str, Any], recordings: Recordings, out: Path) -> str:
-    """Write the result and its traces; return why that failed, or an empty text."""
-    try:
-        write_result(document, out)
-        write_traces(recordings, out)
-    except OSError as error:
-        return str(error)
-    return ""
+def _written(document: dict[str, Any], recordings: Recordings, out: Path) -> tuple[Path, str]:
+    """Write the result and its traces, into a temporary folder if ``out`` does not take them.
+
+    Returns:
+        The path of result.json, and why it could not be written to ``out``, or an empty text.
+    """
+    problem = ""
+    for folder in (out, None):
+        try:
+            path = write_result(document, folder or Path(tempfile.mkdtemp(prefix="roaas-result-")))
+            write_traces(recordings, path.parent)
+        except OSError as error:
+            problem = problem or str(error)
+        else:
+            return path, problem
+    return out / RESULT_NAME, problem
 
 
 def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:

@@ -49,6 +49,9 @@ def result_document(
 ) -> dict[str, Any]:
     """Return the content of result.json for a run."""
     run, statement = robot.run, robot.run.statement
+    if not run.digests:
+        # Of what judges: when the run ends, the files may be gone.
+        run.digests.update(suite=suite_digest(run.contract), contract=contract_digests(run.contract))
     aside = [one for one in verdicts if one.requirement.class_ in run.beside]
     verdicts = [one for one in verdicts if one not in aside]
     ids = {one.requirement.id for one in verdicts}
@@ -62,10 +65,10 @@ def result_document(
         **({"accepted_until": accepted_until} if accepted_until else {}),
         **({"refused": run.refused} if run.refused else {}),
         "interrupted": interrupted,
-        "suite": {"version": suite_version(), "contract": run.contract.label, "digest": suite_digest(run.contract)},
+        "suite": {"version": suite_version(), "contract": run.contract.label, "digest": run.digests["suite"]},
         "pack": {"name": run.contract.name, "version": run.contract.version, "title": run.contract.title},
         "requirement_set": run.requirement_set.told if run.requirement_set else None,
-        "digests": {"statement": run.given.statement, "contract": contract_digests(run.contract)},
+        "digests": {"statement": run.given.statement, "contract": run.digests["contract"]},
         "baseline": {"digest": run.given.baseline} if run.given.baseline else None,
         "nonce": run.given.nonce,
         "places": run.given.places,

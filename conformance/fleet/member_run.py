@@ -20,6 +20,7 @@ from msgspec.structs import asdict
 from conformance.commandline.atomic_write import write_atomically
 from conformance.commandline.endings import as_parent
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.out_folder import own_folder
 from conformance.contract.toml_file import basic_string
 
 if TYPE_CHECKING:
@@ -162,7 +163,8 @@ class MemberRun:
         return ""
 
     def _prepare(self) -> None:
-        self._folder.mkdir(parents=True, exist_ok=True)
+        own_folder(self._folder.parent)
+        own_folder(self._folder)
         for pattern in _WRITTEN:
             for path in self._folder.glob(pattern):
                 path.unlink()

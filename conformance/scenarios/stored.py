@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from conformance.commandline.atomic_write import write_octets
 from conformance.commandline.given_files import read_octets, unzipped
 from conformance.commandline.secrecy import SECRETS
 from conformance.scenarios.scenario import Recording, Recordings, Scenario
@@ -41,8 +42,7 @@ def write_traces(recordings: Recordings, folder: Path) -> Path | None:
     if SECRETS:
         plain = msgspec.to_builtins(traces, builtin_types=(bytes,), str_keys=True, enc_hook=_plain)
         traces = SECRETS.masked_json(plain)
-    path.write_bytes(gzip.compress(msgspec.json.encode(traces, enc_hook=_plain), _FAST, mtime=0))
-    return path
+    return write_octets(path, gzip.compress(msgspec.json.encode(traces, enc_hook=_plain), _FAST, mtime=0))
 
 
 def read_traces(path: Path, scenarios: Iterable[Scenario]) -> Recordings:

@@ -53,6 +53,7 @@ class Run:
         requirement_set: the frozen set that scores the robot, or None for the whole contract.
         given: inputs that the result repeats, beside the statement.
         effort: how much is tried; reduced when the robot responds slowly.
+        digests: of what judges, as in result.json; empty until the run begins.
         judge: the evidence.
         aborted: why the run was aborted, or empty.
         interrupted: whether the run was interrupted.
@@ -78,6 +79,7 @@ class Run:
     effort: Effort = field(default_factory=Effort)
     requirement_set: RequirementSet | None = None
     given: Given = Given()
+    digests: dict[str, Any] = field(default_factory=dict)
     judge: Judge = field(init=False)
     aborted: str = ""
     interrupted: bool = False

@@ -7,7 +7,6 @@ import sys
 import traceback
 from contextlib import ExitStack
 from dataclasses import replace
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
@@ -16,6 +15,7 @@ import locust  # patches the standard library, which has to come before our modu
 
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult
+from conformance.commandline.started import Started
 from conformance.packs.table1.ros_process import ProbeError
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Robot
@@ -49,7 +49,7 @@ class Run:
         self.settings = settings
         other = () if settings.against is None else (settings.against.robot,)
         self.robots: tuple[Robot, ...] = (settings.robot, *other)
-        self.outcome = Outcome(settings, self.robots, datetime.now(UTC))
+        self.outcome = Outcome(settings, self.robots, Started())
         self.plan, _ = duel_plan(settings, *self.robots)  # preliminary: the WSDLs have not been read
         self.collector: Collector | None = None
         self._watch = Watch(self.outcome, REPORT_S if settings.generator.expect else 0.0)

@@ -1,7 +1,7 @@
 """latency.json: everything that a run found out, however the run ended."""
 
 import os
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any, NamedTuple
 
 import msgspec
@@ -98,8 +98,8 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "notes": [*settings.notes, *outcome.notes, *notes, *spoilt, *losses, *SECRETS.notes],
         "interrupted": outcome.interrupted or outcome.dead_at is not None,
         "exit_code": code,
-        "started": _stamp(outcome.started),
-        "finished": _stamp(datetime.now(UTC)),
+        "started": _stamp(outcome.started.at),
+        "finished": _stamp(outcome.started.ended),
         "environment": describe(outcome.robots[0], settings.output, outcome.findings.servers, outcome.robot_process)
         | {"machine": machine},
         "plan": plan_words(settings, plan, pacing, 1 + max(one.part for one in measured.plans)),

@@ -1,9 +1,9 @@
 """The results of a run, collected while it runs; latency.json is made from them."""
 
 from dataclasses import dataclass, field
-from datetime import datetime
 from typing import Any
 
+from conformance.commandline.started import Started
 from loadtests.clients.robot import Robot
 from loadtests.measuring.distributed_executor import Executor
 from loadtests.measuring.end_to_end import Journeys
@@ -55,7 +55,7 @@ class Outcome:
 
     settings: Settings
     robots: tuple[Robot, ...]
-    started: datetime
+    started: Started
     findings: Findings = field(default_factory=Findings)
     notes: list[str] = field(default_factory=list)
     invalid: list[str] = field(default_factory=list)

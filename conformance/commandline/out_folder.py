@@ -1,0 +1,104 @@
+"""The folder for a command's results: it takes files, leads nowhere else, and belongs to one run at a time."""
+
+import datetime as dt
+import json
+import os
+import secrets
+import socket
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Final
+
+LOCK_NAME: Final = ".roaas.lock"
+# A result has some hundred kilobytes: where these octets find no room, neither does it.
+_ROOM: Final = bytes(1 << 18)
+_MOST: Final = 1000
+
+
+class FolderError(Exception):
+    """The error for a folder that cannot take a run's results; the message is the end of a sentence."""
+
+
+@contextmanager
+def held(folder: Path) -> Iterator[None]:
+    """Make a folder for results and keep other runs out of it, before anything is sent.
+
+    A run that is killed leaves its lock, which the next run takes over. On Windows there is no lock.
+
+    Raises:
+        FolderError: it cannot be made or written to, or another run uses it.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        _try_to_write(folder)
+        descriptor = _locked(folder / LOCK_NAME)
+    except OSError as error:
+        raise FolderError(f"nothing can be written to this folder: {error.strerror or error}") from error
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            (folder / LOCK_NAME).unlink()
+        os.close(descriptor)
+
+
+def own_folder(folder: Path) -> Path:
+    """Make a folder inside that of the results, in place of a link that would lead elsewhere; return it.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    if folder.is_symlink():
+        folder.unlink()
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _try_to_write(folder: Path) -> None:
+    draft = folder / f".{secrets.token_hex(4)}.part"
+    try:
+        with draft.open("xb") as file:
+            file.write(_ROOM)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def _locked(path: Path) -> int:
+    """Return the descriptor of a locked file, which says whose it is.
+
+    The lock ends with the process, however that ends.
+    """
+    while True:
+        if path.is_symlink():
+            path.unlink()
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
+        if sys.platform == "win32":
+            return descriptor
+        import fcntl  # noqa: PLC0415 - there is none on Windows
+
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            try:
+                raise FolderError(f"another run uses this folder: {_owner(descriptor)}") from None
+            finally:
+                os.close(descriptor)
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(descriptor), path.stat()):
+                break
+        os.close(descriptor)  # the run before ended, and removed its file, in between
+    os.ftruncate(descriptor, 0)
+    owner = {"pid": os.getpid(), "host": socket.gethostname(), "since": f"{dt.datetime.now(dt.UTC):%Y-%m-%dT%H:%M:%SZ}"}
+    os.write(descriptor, json.dumps(owner).encode())
+    return descriptor
+
+
+def _owner(descriptor: int) -> str:
+    """Return whose the lock is, for a sentence."""
+    try:
+        owner = json.loads(os.pread(descriptor, _MOST, 0))
+        return f"process {int(owner['pid'])} on {str(owner['host'])[:100]!r}, since {str(owner['since'])[:30]}"
+    except (OSError, ValueError, KeyError, TypeError):
+        return f"its file {LOCK_NAME} does not say which"

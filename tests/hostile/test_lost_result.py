@@ -1,0 +1,178 @@
+"""A result is never lost or written elsewhere, and no exit code but that of a verdict is 1."""
+
+import datetime as dt
+import errno
+import json
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+import pytest
+from aiohttp import web
+from click.testing import CliRunner
+from processes import ended
+from small_device import Handle, constant, described, reading, small_device
+
+import roaas
+from conformance.commandline import started
+from conformance.commandline.out_folder import LOCK_NAME
+
+_OBJECT = {"type": "object"}
+_DESCRIPTION = described({"/state": reading(_OBJECT)})
+
+
+def _command(url: str, out: Path, *more: object) -> list[str]:
+    words = [sys.executable, "-m", "roaas", "certify", f"{url}/openapi.json", "--effort=quick", "--out", out, *more]
+    return [str(word) for word in words]
+
+
+def _result(folder: Path) -> dict[str, object]:
+    found: dict[str, object] = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    return found
+
+
+def _first(action: Callable[[], object]) -> dict[str, Handle]:
+    """Return the handlers of a resource; the first request does something in a thread of its own."""
+    done = threading.Event()
+
+    async def handle(_: web.Request) -> web.Response:
+        if not done.is_set():
+            done.set()
+            action()
+        return web.json_response({})
+
+    return {"GET": handle}
+
+
+def _all(out: Path) -> None:
+    shutil.rmtree(out)
+    out.touch()
+
+
+def _place(out: Path) -> None:
+    (out / "result.json").unlink()
+    (out / "result.json" / "folder").mkdir(parents=True)
+
+
+@pytest.mark.parametrize("lose", [_all, _place])
+def test_a_folder_that_is_lost_during_the_run_does_not_lose_the_result(lose, tmp_path, monkeypatch):
+    out, elsewhere = tmp_path / "out", tmp_path / "tmp"
+    elsewhere.mkdir()
+    monkeypatch.setenv("TMPDIR", str(elsewhere))
+
+    with small_device(_DESCRIPTION, {"/state": _first(lambda: lose(out))}) as url:
+        done = ended(*_command(url, out, "--class", "description"))
+    assert done.returncode == 4, done.stderr
+    (kept,) = elsewhere.glob("roaas-result-*/result.json")
+    assert str(kept) in done.stderr
+    assert _result(kept.parent)["interrupted"] is False
+
+
+def _no_room() -> None:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
+
+
+@pytest.mark.parametrize(
+    ("out", "limit"),
+    [("file/out", None), ("out", _no_room), ("/proc/roaas", None)],
+    ids=["below a file", "no room", "of the system"],
+)
+def test_a_folder_that_takes_no_result_is_found_before_the_first_request(tmp_path, out, limit):
+    (tmp_path / "file").touch()
+    requests = []
+    with small_device(_DESCRIPTION, {"/state": _first(lambda: requests.append(1))}) as url:
+        done = ended(*_command(url, tmp_path / out), preexec_fn=limit)
+    assert (done.returncode, requests) == (2, [])
+    assert f"--out {tmp_path / out}: nothing can be written to this folder" in done.stderr
+
+
+def test_a_run_keeps_others_out_of_its_folder_until_it_ends_or_is_killed(tmp_path):
+    waits, reached = threading.Event(), threading.Event()
+
+    async def handle(_: web.Request) -> web.Response:
+        reached.set()
+        return web.json_response({})
+
+    with small_device(_DESCRIPTION, {"/state": {"GET": handle}}) as url:
+        command = _command(url, tmp_path, "--class", "description")
+        with subprocess.Popen([*command, "--request-rate", "1"], stderr=subprocess.DEVNULL) as first:
+            assert reached.wait(100)
+            second = ended(*command)
+            assert second.returncode == 2
+            assert f"another run uses this folder: process {first.pid} on" in second.stderr
+            first.send_signal(signal.SIGKILL)
+            first.wait(30)
+        assert (tmp_path / LOCK_NAME).exists()
+        third = ended(*command)
+    waits.set()
+    assert third.returncode == 0, third.stderr
+    assert not (tmp_path / LOCK_NAME).exists()
+
+
+def test_links_in_the_folder_are_replaced_and_not_followed(tmp_path):
+    out, outside = tmp_path / "out", tmp_path / "outside"
+    out.mkdir()
+    (outside / "folder").mkdir(parents=True)
+    names = ("result.json", "certificate.html", "certificate.md", "junit.xml", "traces.json.gz", LOCK_NAME)
+    for name in names:
+        (outside / name).write_text("precious", encoding="utf-8")
+        (out / name).symlink_to(outside / name)
+    (out / "description").symlink_to(outside / "folder")
+    with small_device(_DESCRIPTION, {"/state": constant({})}) as url:
+        done = ended(*_command(url, out, "--class", "description"))
+    assert done.returncode == 0, done.stderr
+    assert {(outside / name).read_text(encoding="utf-8") for name in names} == {"precious"}
+    assert list((outside / "folder").iterdir()) == []
+    assert not [path for path in out.iterdir() if path.is_symlink()]
+    assert _result(out)["verdict"] == "conformant"
+
+
+def test_a_clock_that_is_set_back_makes_no_run_end_before_it_began(monkeypatch):
+    begun = started.Started()
+
+    class SetBack(dt.datetime):
+        @classmethod
+        def now(cls, tz: dt.tzinfo | None = None) -> dt.datetime:
+            return super().now(tz) - dt.timedelta(days=2)
+
+    monkeypatch.setattr(dt, "datetime", SetBack)
+    assert dt.timedelta(0) <= begun.ended - begun.at < dt.timedelta(hours=1)
+
+
+_RAISED = [
+    (click.Abort(), 130),
+    (KeyboardInterrupt(), 130),
+    (click.ClickException("no"), 2),
+    (click.FileError("robot.toml"), 2),
+    (MemoryError(), 4),
+    (ImportError("no module"), 4),
+    (BrokenPipeError(errno.EPIPE, "closed"), 4),
+    (OSError(errno.ENOSPC, "full"), 4),
+    (AssertionError(), 4),
+]
+
+
+@pytest.mark.parametrize("command", ["explain", "diff", "certify", "report"])
+@pytest.mark.parametrize(("raised", "code"), _RAISED, ids=lambda value: type(value).__name__)
+def test_what_a_command_does_not_expect_never_ends_with_1(raised, code, command, monkeypatch, tmp_path):
+    def broken(**_: object) -> None:
+        raise raised
+
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    found = roaas.main.get_command(click.Context(roaas.main), command)
+    monkeypatch.setattr(found, "callback", broken)
+    monkeypatch.setattr(found, "params", [])
+    assert CliRunner().invoke(roaas.main, [command]).exit_code == code
+
+
+@pytest.mark.parametrize("words", [["--help"], ["certify", "--help"], ["--version"], ["explain", "http/date"]])
+@pytest.mark.parametrize("streams", [">/dev/full", ">&-", "| true", "<&- >&- 2>&-"])
+def test_output_that_nobody_takes_is_no_failure(words, streams):
+    command = f"set -o pipefail; {sys.executable} -m roaas {' '.join(words)} {streams}"
+    assert ended("bash", "-c", command).returncode == 0
