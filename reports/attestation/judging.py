@@ -105,7 +105,8 @@ def _classes(run: Run, wanted: tuple[str, ...], known: Known) -> Point:
     text, remedies = [f"{', '.join(there) or 'none'} passed"], []
     if unclaimed:
         text.append(f"not claimed, so not tested: {', '.join(unclaimed)}")
-        options = " ".join(f"--class {name}" for name in (*there, *unclaimed))
+        claimed = (name for name, verdict in run.classes.items() if verdict != "not-claimed")
+        options = " ".join(f"--class {name}" for name in (*claimed, *unclaimed))
         remedies.append(f"ask the vendor to claim them and to certify again ({options}), or require fewer classes")
     for name in wanted:
         verdict = run.classes.get(name, "not-claimed")

@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import msgspec
 
-from reports.attestation.statement import PROPERTY, Run, Statement, passed, property_name
+from reports.attestation.statement import CONTRACT_SUBJECT, PROPERTY, Run, Statement, passed, property_name, seed_of
 
 _LEVELS = frozenset({"MUST", "SHOULD", "MAY"})
 _VERDICTS = frozenset({"pass", "fail", "warn", "skip", "not-claimed", "error"})
@@ -83,6 +83,8 @@ def contradictions(run: Run) -> list[str]:
     claimed = {name for name, verdict in run.classes.items() if verdict != "not-claimed"}
     if run.verdict == "conformant" and ({run.classes[name] for name in claimed} != {"pass"}):
         found.append("the run is conformant, although not all claimed classes passed")
+    if run.nonce is not None and run.seed != seed_of(run.nonce):
+        found.append("the seed was not derived from the nonce")
     if run.extent is not None and (unclaimed := sorted(claimed - {*run.extent.claims})):
         found.append(f"{named(unclaimed)} has a verdict, but was not claimed")
     if run.extent is not None and run.verdict == "conformant" and run.extent.suite_errors:
@@ -98,6 +100,11 @@ def statement_contradictions(statement: Statement) -> list[str]:
         found.append("its properties are not the classes that passed")
     if predicate.verifier.id != f"urn:roaas:suite:{run.suite.version}:{run.suite.digest}":
         found.append("its verifier is not the suite that it names")
+    if predicate.time_created != run.finished:
+        found.append("its time is not the end of the run")
+    contract = {one.name: one.sha256 for one in statement.subject if one.name.startswith(CONTRACT_SUBJECT)}
+    if {one.name: one.sha256 for one in predicate.verifier.policies} != contract:
+        found.append("its policies are not the files of the contract")
     names = [subject.name for subject in statement.subject]
     if twice := [name for name, count in Counter(names).items() if count > 1]:
         found.append(f"it has two digests of {named(twice)}")

@@ -125,6 +125,7 @@ def nothing(_):
 
 
 PAGES = {"certificate.html", "certificate-print.html"}
+ANOTHER_SEED = {"nonce", "requirements", "agreement"}
 OTHER = PAGES | {"certificate.md", "junit.xml", "agreement"}
 
 
@@ -156,7 +157,7 @@ RESULTS = [
     ("a clock six minutes ahead", ended_at("2026-11-21T12:06:00Z"), {}, {"max_age_days"}),
     ("from the future", signed_with(finished="2026-11-22T12:00:00Z"), {}, {"max_age_days"}),
     ("replayed nonce", signed_with(nonce="monday", seed=seed_of("monday")), {"nonce": "tuesday"}, {"nonce"}),
-    ("nonce and another seed", signed_with(nonce="monday", seed=0), {"nonce": "monday"}, {"nonce"}),
+    ("nonce and another seed", forged_with(nonce="monday", seed=0), {"nonce": "monday"}, ANOTHER_SEED),
     ("no nonce", nothing, {"nonce": "monday"}, {"nonce"}),
 ]
 

@@ -198,7 +198,7 @@ def sign_another_text(host, monkeypatch, pattern, instead):
 
 
 def test_a_time_of_another_zone_lengthens_no_life(host, monkeypatch):
-    sign_another_text(host, monkeypatch, rb'"finished":"([^"]+)Z"', rb'"finished":"\1-12:00"')
+    sign_another_text(host, monkeypatch, rb'"(finished|timeCreated)":"([^"]+)Z"', rb'"\1":"\2-12:00"')
     host.build()
     assert index(host)["Courier 7"][0] == "not dated in UTC"
     assert greens(host.site) == []
