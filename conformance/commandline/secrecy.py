@@ -49,9 +49,19 @@ _QUOTED_PRINTABLE: Final = re.compile(rf"=(?:(?P<hex>[0-9A-F]{{2}})|{_LINE_END}{
 _FOLDED: Final = re.compile(rf"{_LINE_END}[ \t]*")
 _UNITS: Final = (_ESCAPE, _QUOTED_PRINTABLE, _FOLDED)
 _URLSAFE: Final = str.maketrans("+/", "-_")
-# What a device gives to who has a credential: the value of a cookie. And a password in a URL (RFC 3986 3.2.1).
+# Known by their places: the value of a cookie that a device gives to the owner of a credential, and digests of a
+# password, from which it can be guessed (RFC 7616 3.4.1; UsernameToken Profile 1.0, 3.1).
 _SET_COOKIE: Final = re.compile(r"([Ss][Ee][Tt]-[Cc][Oo][Oo][Kk][Ii][Ee]2?: ?[^=;,\s\"]{1,99}=)[^;,\s\"]+")
+_ANSWER: Final = re.compile(r"(\bresponse=[\\\"']{0,9})[0-9A-Fa-f]{32,64}")
+_PASSWORD_DIGEST: Final = re.compile(r"(#PasswordDigest[^<>]{0,99}>)[^<]{1,99}")
+_PLACES: Final = (
+    ("ookie", _SET_COOKIE, r"\1$ROAAS_SET_COOKIE"),
+    ("OOKIE", _SET_COOKIE, r"\1$ROAAS_SET_COOKIE"),
+    ("response=", _ANSWER, r"\1$ROAAS_DIGEST"),
+    ("#PasswordDigest", _PASSWORD_DIGEST, r"\1$WSSE_DIGEST"),
+)
 _COOKIE: Final = re.compile(r"^([^=;]{1,99}=)[^;]+")
+# A password in a URL (RFC 3986 3.2.1).
 _USERINFO: Final = re.compile(r"://[^/?#\s:@\"']{0,99}:([^/?#\s@\"']{1,999})@")
 # A compressed body hides what it says from every reader but the curious one.
 _GZIP: Final = b"\x1f\x8b"
@@ -128,8 +138,9 @@ class Secrets:
         """Return a text with variables in place of all secrets."""
         if not self._known:
             return text
-        if "ookie" in text or "OOKIE" in text:
-            text = _SET_COOKIE.sub(r"\1$ROAAS_SET_COOKIE", text)
+        for mark, place, shown in _PLACES:
+            if mark in text:
+                text = place.sub(shown, text)
         parts, end = list[str](), 0
         for begin, until, variable in sorted(self._spans(text), key=lambda span: (span[0], -span[1])):
             if begin >= end:

@@ -11,6 +11,7 @@ from conformance.api.interfaces import Interfaces
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
+from conformance.commandline.secrecy import SECRETS
 from conformance.contract.classes import Level
 from conformance.contract.interfaces import Interface
 from conformance.contract.ledger import expanded
@@ -209,7 +210,7 @@ class ChecksPlugin:
                 new.append(finding)
             self._told |= finding.causes
         if new:
-            pytest.fail("\n".join(map(in_full, new)), pytrace=False)
+            pytest.fail(SECRETS.masked("\n".join(map(in_full, new))), pytrace=False)
         if musts:
             item.stash[_TOLD_BEFORE] = True
             pytest.skip(f"Not tested, because of a failure before: {next(iter(musts.values())).brief}")

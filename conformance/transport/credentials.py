@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 from urllib.parse import quote
 
 from conformance.commandline.secrecy import SECRETS
@@ -235,16 +235,6 @@ class Credentials:
                 octets = _SHOWN_ANSWER.sub(lambda _, field=field: field, octets)  # type: ignore[misc] # a default
             octets = octets.replace(item.variable.encode(), item.sent.encode("latin-1"))
         return octets
-
-    def hidden_in(self, value: Any) -> Any:
-        """Return JSON with variables in place of secrets in all of its texts."""
-        if not self.items:
-            return value
-        if isinstance(value, str):
-            return self.hidden(value)
-        if isinstance(value, dict):
-            return {key: self.hidden_in(item) for key, item in value.items()}
-        return [self.hidden_in(item) for item in value] if isinstance(value, list | tuple) else value
 
     @property
     def places(self) -> tuple[tuple[str, str], ...]:

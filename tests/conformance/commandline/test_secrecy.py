@@ -129,6 +129,17 @@ def test_cookies_that_a_device_gives_and_passwords_in_urls_are_masked():
     assert secrets.masked_json([["set-cookie", "id=4711"]]) == [["set-cookie", "id=$ROAAS_SET_COOKIE"]]
 
 
+def test_digests_of_a_password_are_masked():
+    secrets = Secrets()
+    secrets.keep(_TOKEN, "$ROAAS_TOKEN")
+    sent = 'Digest username="op", nc=1, response="6629fae49393a05397450978507c4ef1", qop=auth'
+    shown = sent.replace("6629fae49393a05397450978507c4ef1", "$ROAAS_DIGEST")
+    assert secrets.masked(sent) == shown
+    assert secrets.masked(json.dumps(json.dumps(sent))) == json.dumps(json.dumps(shown))
+    block = '<w:Password Type="http://x#PasswordDigest">{}</w:Password>'
+    assert secrets.masked(block.format("tuDjA9DfcWZbSsPtoZz7EOmVOEo=")) == block.format("$WSSE_DIGEST")
+
+
 @given(st.text('\\u%&#;=0123456789abcdef\n"', max_size=400))
 def test_hostile_text_is_neither_slow_nor_changed(text):
     secrets = Secrets()

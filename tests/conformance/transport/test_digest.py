@@ -8,6 +8,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 from requests.utils import parse_dict_header
 
+from conformance.commandline.secrecy import SECRETS
 from conformance.engine.connecting import connection_of
 from conformance.engine.resending import send_again
 from conformance.statement.endpoints import Endpoints
@@ -146,5 +147,5 @@ def test_raw_requests_answer_it_and_can_be_sent_again(pair):
             assert "response=" not in repr(request)
         assert "Digest $ROAAS_DIGEST" in repr(shown)
         assert send_again(shown, connection_of(pair)).response.status == 200
-        assert client.connection.credentials.hidden_in({"a": f"x {_SHARED}"}) == {"a": "x $ROAAS_DIGEST"}
+        assert SECRETS.masked_json({"a": f"x {_SHARED}"}) == {"a": "x $ROAAS_DIGEST"}
     assert state["challenged"] == 2
