@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
+from msgspec.structs import replace
 from requests.utils import parse_dict_header
 
 from conformance.commandline.secrecy import SECRETS
@@ -86,7 +87,7 @@ def pair(tmp_path):
 @pytest.mark.parametrize("algorithm", ["MD5", "SHA-256"])
 def test_a_challenge_is_answered_once_and_its_nonce_used_again(pair, algorithm):
     with _protected(algorithm) as (url, state):
-        client = HttpClient(url, connection_of(pair))
+        client = HttpClient(url, connection_of(replace(pair, rest=url)))
         exchanges = [client.send("GET", "/state?x=1"), client.send("PUT", "/move", body=b"{}"), client.send("GET", "/")]
     assert [one.response.status for one in exchanges] == [200, 200, 200]
     assert state["challenged"] == 1
@@ -96,7 +97,7 @@ def test_a_challenge_is_answered_once_and_its_nonce_used_again(pair, algorithm):
 
 def test_a_nonce_that_has_expired_is_replaced(pair):
     with _protected(lasts=2) as (url, state):
-        client = HttpClient(url, connection_of(pair))
+        client = HttpClient(url, connection_of(replace(pair, rest=url)))
         assert [client.send("GET", "/").response.status for _ in range(7)] == [200] * 7
     assert state["challenged"] == 4
 
@@ -104,7 +105,7 @@ def test_a_nonce_that_has_expired_is_replaced(pair):
 def test_clients_at_once_share_a_nonce(pair):
     found = []
     with _protected() as (url, state):
-        connection = connection_of(pair)
+        connection = connection_of(replace(pair, rest=url))
         HttpClient(url, connection).send("GET", "/")
 
         def ask():
@@ -122,7 +123,7 @@ def test_clients_at_once_share_a_nonce(pair):
 
 def test_a_wrong_password_is_refused_and_nothing_is_sent_for_ever(pair):
     with _protected() as (url, state):
-        connection = connection_of(pair)
+        connection = connection_of(replace(pair, rest=url))
         connection.credentials = connection.credentials.wrong
         assert HttpClient(url, connection).send("GET", "/").response.status == 401
     assert (state["served"], state["challenged"]) == (0, 2)
@@ -130,13 +131,16 @@ def test_a_wrong_password_is_refused_and_nothing_is_sent_for_ever(pair):
 
 def test_without_credentials_nothing_answers_the_challenge(pair):
     with _protected() as (url, state):
-        assert HttpClient(url, connection_of(pair)).send("GET", "/", authorized=False).response.status == 401
+        assert (
+            HttpClient(url, connection_of(replace(pair, rest=url))).send("GET", "/", authorized=False).response.status
+            == 401
+        )
     assert state["challenged"] == 1
 
 
 def test_raw_requests_answer_it_and_can_be_sent_again(pair):
     with _protected() as (url, state):
-        client = HttpClient(url, connection_of(pair))
+        client = HttpClient(url, connection_of(replace(pair, rest=url)))
         client.send("GET", "/")
         octets = raw.head(client, "GET", "/state")
         shown = raw.shown(client, octets)
@@ -146,6 +150,6 @@ def test_raw_requests_answer_it_and_can_be_sent_again(pair):
         for request in (shown, partial.request):
             assert "response=" not in repr(request)
         assert "Digest $ROAAS_DIGEST" in repr(shown)
-        assert send_again(shown, connection_of(pair)).response.status == 200
+        assert send_again(shown, connection_of(replace(pair, rest=url))).response.status == 200
         assert SECRETS.masked_json({"a": f"x {_SHARED}"}) == {"a": "x $ROAAS_DIGEST"}
     assert state["challenged"] == 2
