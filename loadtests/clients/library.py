@@ -16,6 +16,7 @@ from zeep.transports import Transport
 from zeep.wsdl import Document
 
 from conformance.packs.table1.thresholds import Client
+from loadtests.clients.bounded import TOO_LONG, BoundedResponse, StayingSession
 from loadtests.clients.failures import CallError, connect_error, require_good
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values, rest_path
 from loadtests.clients.robot import Robot
@@ -68,20 +69,13 @@ def _counting(base: Any, sent: Sent) -> Any:
     """Return a class of connections that counts its requests."""
 
     class Counting(base):  # type: ignore[misc]  # HTTPConnection or HTTPSConnection
+        response_class = BoundedResponse
+
         def request(self, *args: Any, **kwargs: Any) -> None:
             sent.requests += 1
             super().request(*args, **kwargs)
 
     return Counting
-
-
-class _Staying(requests.Session):
-    """A requests session that follows no redirect: a redirected request would measure another server."""
-
-    def get_redirect_target(self, resp: requests.Response) -> str | None:
-        """Return None: there is no redirect to follow."""
-        del resp
-        return None
 
 
 def new_session(robot: Robot, sent: Sent | None = None) -> requests.Session:
@@ -91,7 +85,7 @@ def new_session(robot: Robot, sent: Sent | None = None) -> requests.Session:
         robot: its credentials.
         sent: counts the requests.
     """
-    session = _Staying()
+    session = StayingSession()
     session.trust_env = False  # a proxy from the environment would be measured instead of the robot
     for scheme in ("http://", "https://"):
         session.mount(scheme, _CountingAdapter(sent or Sent()))
@@ -102,7 +96,7 @@ def new_session(robot: Robot, sent: Sent | None = None) -> requests.Session:
     return session
 
 
-def request_error(error: requests.RequestException, where: str, timeout_s: float) -> CallError:
+def request_error(error: requests.RequestException, where: str, timeout_s: float) -> CallError:  # noqa: PLR0911 - one for each kind
     """Return a CallError, with one of its kinds, for an exception of `requests`."""
     cause: BaseException | None = error
     while cause is not None:
@@ -112,6 +106,8 @@ def request_error(error: requests.RequestException, where: str, timeout_s: float
         reason = getattr(cause, "reason", None)
         following = reason if isinstance(reason, BaseException) else (arguments[0] if arguments else None)
         cause = following or cause.__cause__ or cause.__context__
+    if TOO_LONG in str(error):
+        return CallError("malformed", TOO_LONG)
     if isinstance(error, requests.ConnectTimeout):
         return connect_error(TimeoutError(), where)
     if isinstance(error, requests.ReadTimeout) or isinstance(cause, TimeoutError):

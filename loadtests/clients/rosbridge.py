@@ -229,7 +229,7 @@ class Bridge:
         try:
             message = msgspec.json.decode(octets)
             kind, topic = message["op"], message.get("topic")
-        except (msgspec.DecodeError, TypeError, KeyError, AttributeError):
+        except (msgspec.DecodeError, TypeError, KeyError, AttributeError, RecursionError):
             self._fail(CallError("malformed", f"not a message of the rosbridge protocol: {shown(octets)}"))
             return
         answer = Answer(_STATUS_OK, {}, octets, received, len(octets))

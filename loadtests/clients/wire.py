@@ -30,6 +30,7 @@ _IDLE_NS = 500_000_000  # servers close idle connections after seconds: look bef
 _FINAL = int(HTTPStatus.OK)  # RFC 9110 section 15.2: what is below is interim
 _CHALLENGE = int(HTTPStatus.UNAUTHORIZED)
 _MAX_ANSWER = 16 * 1024 * 1024  # an endless response must not fill the generator's memory
+_MAX_INTERIM = 100
 
 now_ns = time.monotonic_ns  # CLOCK_MONOTONIC, the clock of timerfd
 
@@ -109,6 +110,8 @@ class Connection:
         self._body: list[bytes] = []
         self._octets = 0
         self._complete = False
+        self._excess = False
+        self._interim = 0
         self._framed = False
 
     def call(self, request: Request) -> Answer:
@@ -215,6 +218,9 @@ class Connection:
             failure = self._take_in()
         except (BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError):
             pass  # a TLS record without data
+        except httptools.HttpParserCallbackError as error:
+            context = error.__context__
+            failure = context if isinstance(context, CallError) else CallError("malformed", str(error))
         except httptools.HttpParserError as error:
             failure = CallError("malformed", f"the response is not HTTP: {error}")
         except OSError as error:
@@ -239,6 +245,8 @@ class Connection:
             if self._octets > _MAX_ANSWER:
                 return CallError("malformed", f"the response is longer than {_MAX_ANSWER} bytes")
             self._parser.feed_data(data)
+            if self._excess:
+                return CallError("malformed", "the robot sent more after its response, which no request was sent for")
             if self._complete or self.endpoint.scheme == "http":  # TLS may hold more than the socket shows
                 return None
 
@@ -251,6 +259,10 @@ class Connection:
         return CallError("closed", f"the robot closed the connection after {self._octets} bytes of a response")
 
     # What llhttp calls.
+
+    def on_message_begin(self) -> None:
+        """Note what follows a complete response: it must not be taken for a part of it, or for the next one."""
+        self._excess = self._complete
 
     def on_header(self, name: bytes, value: bytes) -> None:
         """Keep a header field; names are case-insensitive (RFC 9110 section 5.1)."""
@@ -269,6 +281,9 @@ class Connection:
         """Note the end of a response; an interim response (1xx) is skipped."""
         if self._parser.get_status_code() < _FINAL:
             self._headers = {}
+            self._interim += 1
+            if self._interim > _MAX_INTERIM:
+                raise CallError("malformed", f"more than {_MAX_INTERIM} interim responses (1xx) before a final one")
             return
         self._complete = True
         self._drop_after = not self._parser.should_keep_alive()

@@ -31,7 +31,7 @@ def stamp_of(message: bytes, pointer: JSONPointer) -> Stamp | None:
             seconds = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
             return Stamp(seconds, _digit(value.partition("T")[2].partition("+")[0].rstrip("Z")))
         number = float(value)
-    except (msgspec.DecodeError, ValueError, TypeError):
+    except (msgspec.DecodeError, ValueError, TypeError, OverflowError, RecursionError):
         return None
     unit = next((unit for least, unit in _UNITS if number >= least), 1.0)
     return Stamp(number / unit, max(_digit(str(value)) / unit, _FLOAT_S))

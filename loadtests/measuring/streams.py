@@ -274,7 +274,7 @@ def _published(octets: bytes, topic: str) -> bytes:
     """
     try:
         message = msgspec.json.decode(octets, type=_Bridged)
-    except msgspec.DecodeError:
+    except (msgspec.DecodeError, RecursionError):
         raise CallError("malformed", f"not a message of the rosbridge protocol: {shown(octets)}") from None
     if message.op == "status" and message.level == "error":
         raise CallError("fault", f"rosbridge: {shown(bytes(message.msg))}")

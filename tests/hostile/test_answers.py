@@ -95,3 +95,21 @@ def test_a_device_that_answers_so_gets_a_verdict(names: list[str], tmp_path: Pat
     result = json.loads((tmp_path / "out/result.json").read_text(encoding="utf-8"))
     assert result["requirements"]
     assert _peak_mb(resource.RUSAGE_CHILDREN) < _MOST_MB
+
+
+@pytest.mark.parametrize("client", ["wire", "library"])
+def test_the_clients_of_load_tests_end(client: str) -> None:
+    program = Path(__file__).parent / "answer_clients.py"
+    with answering() as port:
+        done = ended(sys.executable, "-m", "gevent.monkey", program, client, port, len(_NAMES))
+
+    found = dict(zip(_NAMES, map(json.loads, done.stdout.splitlines()), strict=True))
+    assert "Traceback" not in done.stderr, done.stderr
+    assert {name: one for name, one in found.items() if one["megabytes"] > _MOST_MB} == {}
+    assert {name: one for name, one in found.items() if one["seconds"] > 2 * 2 + _LATE_S} == {}
+    assert all("200" not in outcome for name in _ENDLESS for outcome in found[name]["outcomes"]), found
+    second = found["two responses for one"]["outcomes"]
+    assert all("201" not in outcome for outcome in second), second
+
+
+_ENDLESS = [name for name in _NAMES if "without end" in name and "second" not in name]
