@@ -1,5 +1,6 @@
 """Define the command `roaas diff`."""
 
+import os
 from pathlib import Path
 
 import click
@@ -77,4 +78,5 @@ def _described(source: str) -> str:
         return source
     path = Path(source)
     beside = (path if path.is_dir() else path.parent) / _DESCRIPTION
-    return str(beside) if beside.is_file() else ""
+    # Whatever is there in its place is refused by the reader.
+    return str(beside) if os.path.lexists(beside) else ""
