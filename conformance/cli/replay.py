@@ -12,6 +12,7 @@ import msgspec
 from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, ResultCommand
+from conformance.commandline.secret_file import read_secret
 from conformance.commandline.terminal import inert
 from conformance.contract.described import copy_as_data
 from conformance.contract.locating import ContractError, is_installed
@@ -95,7 +96,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
         document = read_result(result / "result.json" if result.is_dir() else result)
     except StoredResultError as error:
         raise click.UsageError(str(error)) from error
-    token = Path(token_file).read_text(encoding="utf-8").strip() if token_file else None
+    token = read_secret(token_file) if token_file else None
     connection = Connection(timeout_s=timeout_s or _TIMEOUT_S, ca_file=Path(ca_file) if ca_file else None, token=token)
     try:
         if recorded:

@@ -8,6 +8,7 @@ from urllib.parse import parse_qsl
 import msgspec
 
 from conformance.commandline.secrecy import SECRETS
+from conformance.commandline.secret_file import read_secret, warn_if_shared
 from conformance.documents.json_text import read_json
 from conformance.statement.endpoints import Auth, Endpoints
 from conformance.statement.statement import StatementError
@@ -43,7 +44,7 @@ def connection_of(where: Endpoints) -> Connection:
     found = Connection(
         timeout_s=where.timeout_s,
         ca_file=Path(where.ca_file) if where.ca_file else None,
-        token=_secret(where.token_file) if where.token_file else None,
+        token=read_secret(where.token_file) if where.token_file else None,
         credentials=_credentials(where),
         certificate=_certificate(where),
         request_rate=where.request_rate,
@@ -91,6 +92,8 @@ def _logged_in(auth: Auth, base_url: str, connection: Connection) -> Credential:
 
     method, target = auth.login.split(" ", 1)
     content = Path(auth.body_file).read_bytes() if auth.body_file else b""
+    if auth.body_file:
+        warn_if_shared(auth.body_file)
     _keep_parts(content)
     headers = [("Accept", "application/json"), *([("Content-Type", auth.content_type)] if content else [])]
     client = HttpClient(base_url, connection)
@@ -129,13 +132,10 @@ def _keep_parts(content: bytes) -> None:
             SECRETS.keep(value, "$ROAAS_LOGIN")
 
 
-def _secret(path: str) -> str:
-    return Path(path).read_text(encoding="utf-8").strip()
-
-
 def _certificate(where: Endpoints) -> tuple[Path, Path | None] | None:
     if where.client_cert_file is None:
         return None
+    warn_if_shared(where.client_key_file or where.client_cert_file)
     return Path(where.client_cert_file), Path(where.client_key_file) if where.client_key_file else None
 
 
@@ -149,7 +149,7 @@ def _credentials(where: Endpoints) -> Credentials:
     found: list[Credential] = []
     for kind, file in ((Kind.BASIC, where.basic_file), (Kind.DIGEST, where.digest_file)):
         if file:
-            pair = _secret(file)
+            pair = read_secret(file)
             if ":" not in pair:
                 raise StatementError(f"{file}: expected one line user:password")
             found.append(Credential(kind, pair))
@@ -157,8 +157,8 @@ def _credentials(where: Endpoints) -> Credentials:
         place, _, name = (where.api_key or "").partition(" ")
         if place not in _PLACES or not name.strip() or not where.api_key_file:
             raise StatementError("an API key needs api_key = 'header NAME' (or query, or cookie) and api_key_file")
-        found.append(Credential(Kind(place), _secret(where.api_key_file), name.strip()))
-    for number, line in enumerate(_secret(where.headers_file).splitlines() if where.headers_file else (), 1):
+        found.append(Credential(Kind(place), read_secret(where.api_key_file), name.strip()))
+    for number, line in enumerate(read_secret(where.headers_file).splitlines() if where.headers_file else (), 1):
         name, colon, value = line.partition(":")
         if not colon or not name.strip():
             raise StatementError(f"{where.headers_file}, line {number}: expected Name: value")

@@ -9,10 +9,10 @@ import os
 import re
 from dataclasses import dataclass, field
 from email.utils import parsedate_to_datetime
-from pathlib import Path
 from typing import Final
 
 from conformance.commandline.secrecy import SECRETS
+from conformance.commandline.secret_file import read_secret
 
 # What stands in a request for the texts that each message has of its own, and where they are.
 _VARIABLES: Final = (b"$WSSE_DIGEST", b"$WSSE_NONCE", b"$WSSE_CREATED")
@@ -45,7 +45,7 @@ class UsernameToken:
         """
         if path is None:
             return None
-        user, colon, password = Path(path).read_text(encoding="utf-8").strip().partition(":")
+        user, colon, password = read_secret(path).partition(":")
         if not colon:
             raise ValueError(f"{path}: expected one line user:password")
         return cls(user, password)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import msgspec
 
+from conformance.commandline.secret_file import read_secret
 from conformance.packs.table1.statement import Statement
 from conformance.statement.endpoints import Endpoints
 from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
@@ -148,7 +149,7 @@ def _token(path: str | None) -> str | None:
     if path is None:
         return None
     try:
-        token = Path(path).read_text("utf-8").strip()
+        token = read_secret(path)
     except (OSError, UnicodeDecodeError) as error:
         raise SettingsError(f"token file {path!r}: {getattr(error, 'strerror', None) or error}") from None
     if not token or not token.isascii() or not token.isprintable() or " " in token:

@@ -6,6 +6,9 @@ A key is identified by its fingerprint: SHA-256 of the public key as DER (Subjec
 
 import hashlib
 import os
+import stat
+import sys
+from contextlib import suppress
 from pathlib import Path
 
 from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
@@ -20,6 +23,7 @@ from securesystemslib.signer import CryptoSigner, SSlibKey
 
 from reports.errors import KeyUnusableError, ReportError
 from reports.given_files import read_octets
+from reports.pages.untrusted import on_a_line
 
 _MOST_BYTES = 1 << 20
 PRIVATE_NAME = "signing-key.pem"
@@ -58,6 +62,7 @@ def signer_of(path: Path) -> CryptoSigner:
     Raises:
         KeyUnusableError: the file cannot be read, has a passphrase, or does not hold an Ed25519 private key.
     """
+    _warn_if_shared(path)
     try:
         key = load_pem_private_key(_octets(path), None)
     except (ValueError, TypeError, UnsupportedAlgorithm) as error:
@@ -114,3 +119,12 @@ def _octets(path: Path) -> bytes:
         return read_octets(path, _MOST_BYTES)
     except ReportError as error:
         raise KeyUnusableError(error.message) from error
+
+
+def _warn_if_shared(path: Path) -> None:
+    """Write a warning to stderr if the group or others can read a private key."""
+    with suppress(OSError):  # who reads it tells that
+        mode = path.stat().st_mode
+        if os.name == "posix" and stat.S_ISREG(mode) and mode & (stat.S_IRGRP | stat.S_IROTH):
+            shown = on_a_line(str(path), 1000)
+            sys.stderr.write(f"warning: other users can read the private key in {shown}: chmod 600 {shown}\n")

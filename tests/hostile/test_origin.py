@@ -14,6 +14,7 @@ from origin_servers import SECRET, XSD, document, packed, redirect, serving
 from processes import ended
 from soap_devices import CAMERA, CAMERA_XSD
 
+from conformance.commandline.secret_file import read_secret
 from conformance.documents.description import DescriptionError
 from conformance.engine.describing import described_contract, fetch_description, soap_contract
 from conformance.statement.endpoints import Endpoints
@@ -381,3 +382,26 @@ def test_https_never_falls_to_http(device):
     with pytest.raises(ElsewhereError, match="what was named is https"):
         load(f"{device.url}/part.json")
     assert device.seen == []
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o604])
+def test_whoever_may_read_a_secret_is_told(mode, tmp_path, capfd):
+    (tmp_path / "a token").write_text(f"{SECRET}\n")
+    (tmp_path / "a token").chmod(mode)
+    assert read_secret(tmp_path / "a token") == SECRET
+    told = capfd.readouterr().err
+    assert ("chmod 600" in told) is (mode != 0o600), told
+    assert SECRET not in told
+
+
+def test_each_option_with_a_secret_tells_of_it_once(device, tmp_path):
+    device.answers["/openapi.json"] = document(openapi())
+    options = ["--token-file", "--basic-file", "--digest-file", "--api-key-file", "--headers-file"]
+    options += ["--username-token-file", "--sign"]
+    for option in options:
+        (tmp_path / option).write_text(f"X-Key: {SECRET}")
+        (tmp_path / option).chmod(0o644)
+    words = [word for option in options for word in (option, tmp_path / option)]
+    done = roaas("certify", f"{device.url}/openapi.json", *words, "--api-key", "query k", cwd=tmp_path)
+    shared = re.findall(r"other users can read the (?:secret|private key) in ?\S*/(--[a-z-]+)", done.stderr)
+    assert sorted(shared) == sorted(set(options) - {"--username-token-file"}), done.stderr

@@ -7,6 +7,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Final
 
+from conformance.commandline.secret_file import warn_if_shared
 from reference_robot.webservices.representation.problems import Problem
 
 _REALM: Final = b'Bearer realm="robot"'
@@ -78,6 +79,7 @@ def read_tokens(path: Path) -> dict[str, frozenset[Scope]]:
         TokenFileError: The file cannot be read, or a line has another form. The message never quotes a line, which may
             contain a secret.
     """
+    warn_if_shared(path)
     try:
         lines = path.read_text(encoding="ascii").splitlines()
     except (OSError, UnicodeDecodeError) as error:

@@ -7,6 +7,7 @@ import ssl
 from pathlib import Path
 from typing import Any, Final
 
+from conformance.commandline.secret_file import warn_if_shared
 from reference_robot.webservices.http.connection import HttpConnection
 from reference_robot.webservices.http.port import Port
 
@@ -36,6 +37,7 @@ def server_context(certificate: Path, key: Path) -> ssl.SSLContext:
             path.read_bytes()
         except OSError as error:
             raise TlsFileError(f"{option} {path} cannot be read: {error.strerror}") from error
+    warn_if_shared(key)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     context.options |= ssl.OP_NO_RENEGOTIATION  # repeated renegotiation could occupy the robot's processor
