@@ -29,7 +29,13 @@ _MOST_FILES: Final = 5_000
 _MOST_OCTETS: Final = 64 * 1024 * 1024
 _MOST_S: Final = 120.0
 # Objects whose members have names that an author chose.
-_BY_NAME: Final = frozenset({"properties", "patternProperties", "dependentSchemas", "$defs", "definitions", "schemas"})
+_BY_NAME: Final = frozenset(
+    {
+        "properties", "patternProperties", "dependentSchemas", "dependencies", "$defs", "definitions", "schemas",
+        "responses", "parameters", "examples", "requestBodies", "headers", "securitySchemes", "links", "callbacks",
+        "pathItems", "paths", "webhooks", "content", "encoding", "mediaTypes",
+    }
+)  # fmt: skip
 _VARIABLE: Final = re.compile(r"\{([^{}]+)\}")
 _BLANK: Final = b"\xef\xbb\xbf \t\r\n"
 _SCHEME: Final = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")

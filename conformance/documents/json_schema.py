@@ -465,7 +465,10 @@ class Shape:
 
     @cached_property
     def _validator(self) -> Any:
-        return _naming()(bundled(self.schema))
+        from jsonschema_specifications import REGISTRY  # noqa: PLC0415 - as above
+
+        # With a registry of one's own, jsonschema fetches nothing.
+        return _naming()(bundled(self.schema), registry=REGISTRY)
 
     def _first_error(self, value: Any) -> ValidationError | None:
         from jsonschema.exceptions import best_match  # noqa: PLC0415 - as above

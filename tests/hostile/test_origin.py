@@ -12,10 +12,13 @@ import time
 import pytest
 from origin_servers import SECRET, XSD, document, packed, redirect, serving
 from processes import ended
+from schemathesis.specs.openapi.examples import get_strategies_from_examples
 from soap_devices import CAMERA, CAMERA_XSD
 
+from conformance.api.rest.generated import _loaded
 from conformance.commandline.secret_file import read_secret
 from conformance.documents.description import DescriptionError
+from conformance.documents.json_schema import shape_of
 from conformance.engine.describing import described_contract, fetch_description, soap_contract
 from conformance.statement.endpoints import Endpoints
 from conformance.transport.client import Connection
@@ -62,6 +65,7 @@ OPENAPI = {
     },
     "a property called value": {"components": {"schemas": {"a": {"properties": {"value": {"$ref": "ELSE/a.json"}}}}}},
     "a property called default": {"components": {"schemas": {"a": {"properties": {"default": {"$ref": "ELSE/a"}}}}}},
+    "a default response": {"components": {"responses": {"default": {"$ref": "ELSE/a.json"}}}},
     "externalValue": {"components": {"examples": {"a": {"externalValue": "ELSE/a.json"}}}},
     "logins": {
         "components": {
@@ -274,6 +278,7 @@ FILES = {
 PLACES = {
     "a schema": lambda ref: {"schema": {"$ref": ref}},
     "a property called default": lambda ref: {"schema": {"properties": {"default": {"$ref": ref}}}},
+    "an example called default": lambda ref: {"schema": {}, "examples": {"default": {"$ref": ref}}},
     "an example": lambda ref: {"schema": {}, "examples": {"one": {"$ref": ref}}},
 }
 
@@ -307,6 +312,20 @@ def test_a_description_reads_nothing_outside_its_folder(form, place, api):
 
 def test_files_outside_the_folder_are_read_where_that_is_allowed(api):
     assert SECRET in pack_of(api, PLACES["a schema"]("../secret.json"), allow_files=True)
+
+
+def test_what_generates_requests_and_what_judges_responses_fetch_nothing(elsewhere):
+    elsewhere.seen.clear()
+    schema = {"type": "object", "properties": {"a": {"default": {"$ref": "file:///etc/passwd"}}}}
+    examples = {"one": {"externalValue": f"{elsewhere.url}/one"}, "two": {"$ref": f"{elsewhere.url}/two"}}
+    taken = {"content": {"application/json": {"schema": schema, "examples": examples}}}
+    answers = {"default": {"description": "", "content": {"application/json": {"schema": {"$ref": elsewhere.url}}}}}
+    paths = {"/a": {"post": {"requestBody": taken, "responses": answers}}}
+    for one in _loaded({**openapi(), "paths": paths}).get_all_operations():
+        get_strategies_from_examples(one.ok())
+    with pytest.raises(Exception, match="Retrieval is disabled"):
+        shape_of({"anyOf": [{"$ref": f"{elsewhere.url}/three"}]}).problem(1)
+    assert elsewhere.seen == []
 
 
 def test_the_description_of_a_server_reads_no_file(device, api):

@@ -116,7 +116,21 @@ def _loaded(document: dict[str, Any]) -> Any:
     A case that left them out would be judged by a request that was sent with them.
     """
     config = SchemathesisConfig.from_dict({"generation": {"with-security-parameters": False}})
-    return schemathesis.openapi.from_dict(with_python_patterns(document), config=config)
+    return schemathesis.openapi.from_dict(_without_pointers(with_python_patterns(document)), config=config)
+
+
+def _without_pointers(value: Any) -> Any:
+    """Return a value without references to other documents, which Schemathesis would load from anywhere."""
+    if isinstance(value, list):
+        return [_without_pointers(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    return {key: _without_pointers(item) for key, item in value.items() if not _points_elsewhere(key, item)}
+
+
+def _points_elsewhere(key: Any, value: Any) -> bool:
+    is_reference = key in {"$ref", "operationRef"} and not str(value).startswith("#")
+    return isinstance(value, str) and (is_reference or key == "externalValue")
 
 
 def state_machine(document: dict[str, Any]) -> Any:
