@@ -180,13 +180,14 @@ class FrontDoor:
             click.echo(f"no history: {error.format_message()}", err=True)
 
     @staticmethod
-    def description_changes(old: str, new: str) -> list[tuple[bool | None, str, str]]:
+    def description_changes(old: str, new: str, *, allow_files: bool = False) -> list[tuple[bool | None, str, str]]:
         """Return what changed: whether it breaks clients (None if that is not known), the operation, and what it is."""
         comparing = import_module("conformance.engine.comparing")
         refused = import_module("conformance.documents.description").DescriptionError
         unreachable = import_module("conformance.transport.reach").UnreachableError
         try:
-            return [(one.breaking, one.operation, one.text) for one in comparing.compared(old, new)]
+            found = comparing.compared(old, new, allow_files=allow_files)
+            return [(one.breaking, one.operation, one.text) for one in found]
         except (refused, unreachable) as error:
             raise click.UsageError(str(error)) from error
 

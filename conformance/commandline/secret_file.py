@@ -6,9 +6,11 @@ A module of its own, because the suite, the load tests and the robot read such f
 import os
 import shlex
 import stat
-import sys
+from functools import partial
 from pathlib import Path
 from typing import Final
+
+import click
 
 _TOLD: Final = set[str]()
 
@@ -24,10 +26,11 @@ def read_secret(path: str | Path) -> str:
     return Path(path).read_text(encoding="utf-8").strip()
 
 
-def warn_if_shared(path: str | Path) -> None:
+def warn_if_shared(path: str | Path, *, at_once: bool = False) -> None:
     """Write a warning to stderr if the group or others can read a file with a secret; once for each file.
 
-    Any file is read all the same: what mounts secrets into containers often makes them readable to all.
+    It comes at the end of a command, below its result, or ``at_once``. The file is read all the same: what mounts
+    secrets into containers often makes them readable to all.
     """
     try:
         mode = Path(path).stat().st_mode
@@ -37,5 +40,6 @@ def warn_if_shared(path: str | Path) -> None:
     if os.name == "posix" and stat.S_ISREG(mode) and mode & (stat.S_IRGRP | stat.S_IROTH) and name not in _TOLD:
         _TOLD.add(name)
         shown = shlex.quote(name) if name.isprintable() else repr(name)
-        sys.stderr.write(f"warning: other users can read the secret in {shown}: chmod 600 {shown}\n")
-        sys.stderr.flush()
+        context = None if at_once else click.get_current_context(silent=True)
+        tell = partial(click.echo, f"warning: other users can read the secret in {shown}: chmod 600 {shown}", err=True)
+        tell() if context is None else context.call_on_close(tell)

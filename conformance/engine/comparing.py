@@ -10,8 +10,10 @@ from conformance.engine.describing import FOLDER, fetch_description
 from conformance.transport.client import Connection
 
 
-def compared(old: str, new: str) -> list[Change]:
+def compared(old: str, new: str, *, allow_files: bool = False) -> list[Change]:
     """Return what changed between the descriptions at two URLs or in two files.
+
+    With ``allow_files``, they may refer to files outside their folders.
 
     Raises:
         DescriptionError: one of them cannot be used.
@@ -19,8 +21,8 @@ def compared(old: str, new: str) -> list[Change]:
     """
     connection = Connection()
     descriptions = [
-        _of_result(source) if _is_of_result(source) else fetch_description(source, (), connection)
-        for source in (old, new)
+        _of_result(one) if _is_of_result(one) else fetch_description(one, (), connection, allow_files=allow_files)
+        for one in (old, new)
     ]
     # What a reference leads to may have changed, even if the reference did not.
     unread = [

@@ -22,9 +22,10 @@ _DESCRIPTION = Path("description") / "openapi.json"
 @click.command()
 @click.argument("old")
 @click.argument("new")
+@click.option("--allow-files", is_flag=True, help="A description in a file may refer to files outside its folder.")
 @click.option("--out", type=FOLDER, metavar="DIR", help="Write diff.html and diff.md into DIR.")
 @click.pass_obj
-def diff(door: FrontDoor, old: str, new: str, out: Path | None) -> None:
+def diff(door: FrontDoor, old: str, new: str, out: Path | None, *, allow_files: bool) -> None:
     """Show what changed from OLD to NEW: two results of `roaas certify`, or two descriptions of an API.
 
     A result is result.json or the directory that holds it. A regression is a MUST that fails now and did not before, or
@@ -47,7 +48,7 @@ def diff(door: FrontDoor, old: str, new: str, out: Path | None) -> None:
         click.echo(text)
     described = _described(old), _described(new)
     if described[0] and described[1]:
-        changed = description_changes(door.description_changes(*described))
+        changed = description_changes(door.description_changes(*described, allow_files=allow_files))
         worse |= bool(changed.breaking)
         unknown = bool(changed.unknown)
         click.echo(f"\nThe descriptions: {changes_text(changed)}" if pages else changes_text(changed))

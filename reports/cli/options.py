@@ -30,7 +30,9 @@ class FrontDoor(Protocol):
     def is_installed(self, pack: str) -> bool:
         """Return whether a name is that of a contract pack that comes with the suite or that a package installed."""
 
-    def description_changes(self, old: str, new: str) -> list[tuple[bool | None, str, str]]:
+    def description_changes(
+        self, old: str, new: str, *, allow_files: bool = False
+    ) -> list[tuple[bool | None, str, str]]:
         """Return what changed: whether it breaks clients (None if that is not known), the operation, and what it is."""
 
 

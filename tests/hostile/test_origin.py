@@ -244,6 +244,10 @@ def test_no_command_lets_a_description_lead_elsewhere(command, everything, devic
     assert device.seen, done.stderr
     assert elsewhere.seen == []
     assert bool(device.with_secret) is (command != "diff"), done.stderr
+    if command not in {"certify --init", "load of the paper's robot"}:
+        result = tmp_path / "out" / "latency.json"
+        kept = result.read_text() if result.exists() else ""
+        assert "on another server" in done.stdout + done.stderr + kept
 
 
 def test_load_with_a_trusted_host_sends_the_token_there(everything, device, elsewhere, tmp_path):

@@ -79,7 +79,7 @@ def read_tokens(path: Path) -> dict[str, frozenset[Scope]]:
         TokenFileError: The file cannot be read, or a line has another form. The message never quotes a line, which may
             contain a secret.
     """
-    warn_if_shared(path)
+    warn_if_shared(path, at_once=True)
     try:
         lines = path.read_text(encoding="ascii").splitlines()
     except (OSError, UnicodeDecodeError) as error:

@@ -37,7 +37,7 @@ def server_context(certificate: Path, key: Path) -> ssl.SSLContext:
             path.read_bytes()
         except OSError as error:
             raise TlsFileError(f"{option} {path} cannot be read: {error.strerror}") from error
-    warn_if_shared(key)
+    warn_if_shared(key, at_once=True)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     context.options |= ssl.OP_NO_RENEGOTIATION  # repeated renegotiation could occupy the robot's processor
