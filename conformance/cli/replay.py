@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import msgspec
 
+from conformance.cli.summary import warning
 from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, ResultCommand
@@ -85,8 +86,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
     """
     # Imported here, so that --help stays quick.
     from conformance.engine.permission import moves  # noqa: PLC0415
-    from conformance.engine.replay import Outcome, findings  # noqa: PLC0415
-    from conformance.engine.replay import replay as send_again  # noqa: PLC0415
+    from conformance.engine.replay import Outcome, findings, replay_and_stop  # noqa: PLC0415
     from conformance.transport.client import Connection  # noqa: PLC0415
 
     end_like_ctrl_c()
@@ -119,9 +119,10 @@ def replay(  # noqa: C901 - one branch for each way to judge
             raise click.UsageError("these requests may move the robot: add --allow-motion, or name one that only reads")
         if token:
             _check_addresses([failure for _, failure in chosen], trusted)
-        replayed = [send_again(id_, failure, connection, rest, contract) for id_, failure in chosen]
+        replayed, unstopped = replay_and_stop(chosen, document, connection, contract)
     except MALFORMED as error:
         raise click.UsageError(str(not_well_made(result, error))) from error
+    click.secho(warning({"stop_undelivered": unstopped}), fg="red", nl=False)
     for one in replayed:
         now = f"now {one.came}" if one.came else ""
         if one.sent:
@@ -135,7 +136,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
     outcomes = {one.outcome for one in replayed}
     if Outcome.STILL_THERE in outcomes:
         return CommandResult(ExitCode.FAILED)
-    return CommandResult(ExitCode.PASSED if outcomes == {Outcome.GONE} else ExitCode.INCONCLUSIVE)
+    return CommandResult(ExitCode.PASSED if outcomes == {Outcome.GONE} and not unstopped else ExitCode.INCONCLUSIVE)
 
 
 def _judge_again(
@@ -176,13 +177,15 @@ def _judge_again(
         return CommandResult(ExitCode.INCONCLUSIVE)
     except (StatementError, ContractError, DescriptionError, OSError) as error:
         raise click.UsageError(str(error)) from error
-    for item in judged:
+    click.secho(warning(judged), fg="red", nl=False)
+    for item in judged["requirements"]:
         word = _WORDS.get(item["verdict"], "not judged")
         click.echo(f"{word}: {item['id']}: {inert(item['reason']) or 'passed'} ({_counted(item['cases'])})")
-    verdicts = {item["verdict"] for item in judged}
+    verdicts = {item["verdict"] for item in judged["requirements"]}
     if verdicts & {"fail", "warn"}:
         return CommandResult(ExitCode.FAILED)
-    return CommandResult(ExitCode.PASSED if verdicts == {"pass"} else ExitCode.INCONCLUSIVE)
+    gone = verdicts == {"pass"} and "stop_undelivered" not in judged
+    return CommandResult(ExitCode.PASSED if gone else ExitCode.INCONCLUSIVE)
 
 
 def _names_description(statement_file: Path) -> bool:

@@ -2,7 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from enum import StrEnum
@@ -13,15 +13,20 @@ import msgspec
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.observers import Observer
+from conformance.api.rest.stops import UNDELIVERED, stop_device
+from conformance.contract.described import MOTION
 from conformance.contract.generic import generic_ledger
 from conformance.contract.pack import Contract
+from conformance.documents.openapi import operations_of
 from conformance.engine.by_description import SECURITY, fails_by_description
 from conformance.engine.certification import certify
 from conformance.engine.connecting import connection_of
+from conformance.engine.permission import moves, strangers
 from conformance.engine.refused import is_refused
 from conformance.engine.resending import read_sequence, send_again
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.statement.statement import Statement, empty_statement
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import Calls, Statement, empty_statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Response, Unanswered
 from conformance.verdict.effort import Effort
@@ -128,6 +133,52 @@ def replay(
     return Replayed(id_, message, outcome, came[-1].came, len(requests), told_by, why)
 
 
+def replay_and_stop(
+    chosen: Iterable[tuple[str, Mapping[str, Any]]],
+    result: Mapping[str, Any],
+    connection: Connection,
+    contract: Contract | None,
+) -> tuple[list[Replayed], str]:
+    """Send several findings' requests again, and then stop the robot if they may have moved it.
+
+    The stop goes to the address of the result's robot, if one of the findings' requests went there.
+
+    Args:
+        chosen: ids of requirements with findings.
+        result: the result.
+        connection: settings for the robot's clients.
+        contract: the contract that judged, or None.
+
+    Returns:
+        What came of each, and why the robot may still move, or an empty text.
+
+    Raises:
+        ValueError, KeyError, TypeError: the result is malformed.
+    """
+    rest, found, unstopped = result["target"].get("rest"), [], ""
+    acting = False
+    try:
+        for id_, failure in chosen:
+            acting |= moves(failure, contract, rest or "") and not (rest and strangers(failure, [rest]))
+            found.append(replay(id_, failure, connection, rest if contract else None, contract))
+    finally:
+        if acting:
+            unstopped = _stopped(result, connection, rest, contract)
+    return found, unstopped
+
+
+def _stopped(result: Mapping[str, Any], connection: Connection, rest: str | None, contract: Contract | None) -> str:
+    """Stop the robot as the contract says; return why it may still move, or an empty text."""
+    moved = bool(result["statement"].get("motion_allowed"))
+    if contract is None or not rest:
+        return f"{UNDELIVERED}: nothing at hand says how it is stopped" if moved else ""
+    if moved and MOTION in result["classes"] and not any(operation.stop for operation in operations_of(contract)):
+        return f"{UNDELIVERED}: only its statement says how it is stopped: give --statement"
+    statement = msgspec.structs.replace(empty_statement(contract), calls=Calls(("*",)), endpoints=Endpoints(rest=rest))
+    with closing(HttpClient(rest, connection)) as client:
+        return stop_device(RestInterface(Run(statement, contract, allow_motion=True), client))
+
+
 def judged_by_checks(
     contract: Contract,
     statement: Statement,
@@ -136,7 +187,7 @@ def judged_by_checks(
     allow_motion: bool,
     seed: int,
     effort: str,
-) -> list[dict[str, Any]]:
+) -> dict[str, Any]:
     """Run the checks of some requirements on a robot.
 
     Args:
@@ -148,7 +199,7 @@ def judged_by_checks(
         effort: effort of the recorded run.
 
     Returns:
-        The requirements as in result.json, in the ledger's order.
+        The content of a result.json with these requirements.
 
     Raises:
         ContractError: the contract has no such requirement.
@@ -167,8 +218,7 @@ def judged_by_checks(
     )
     with tempfile.TemporaryDirectory() as folder:
         certification = certify(RobotUnderTest(run, connection_of(statement.endpoints)), Path(folder))
-    judged: list[dict[str, Any]] = certification.document["requirements"]
-    return judged
+    return certification.document
 
 
 def _still_there(

@@ -1,5 +1,6 @@
 """A robot that cannot be stopped is named before everything else; one that comes back in time is stopped."""
 
+import datetime as dt
 import json
 import os
 import socket
@@ -16,15 +17,20 @@ import moving_cart
 import moving_winch
 import msgspec
 import pytest
+from aiohttp import web
 from lxml import etree
 from moving_winch import Winch
 from processes import ended
-from small_device import certified
+from small_device import REFUSED, answers, certified, constant, described, error, reading, small_device
 from soap_devices import serving
 
 from conformance.api.rest.stops import UNDELIVERED
+from conformance.commandline.exit_codes import ExitCode
 from conformance.engine.describing import described_contract, soap_contract
 from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.fleet.fleet_file import Member
+from conformance.fleet.member_run import MemberResult, Outcome
+from conformance.fleet.result import exit_code, fleet_document
 from conformance.scenarios.motion.binding import binding_of
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.statement.endpoints import Endpoints
@@ -32,6 +38,11 @@ from conformance.statement.statement import load_statement
 from conformance.transport.client import Connection
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.run import Run
+from reports.fleet.page import fleet_html, fleet_markdown
+from reports.latency.junit import latency_junit
+from reports.latency.page import latency_html, latency_markdown
+
+_DATA = Path(__file__).parents[1] / "reports" / "data"
 
 
 @dataclass(frozen=True)
@@ -167,3 +178,69 @@ def test_a_robot_that_hangs_while_it_moves_fails_and_that_it_may_still_move_come
     assert json.loads(sarif.read_text(encoding="utf-8"))["runs"][0]["results"][0]["message"]["text"].startswith(
         UNDELIVERED
     )
+
+
+class _Crane:
+    """A crane whose moves fail with 500 and move it all the same; ``halts`` is the status of its stop."""
+
+    def __init__(self) -> None:
+        self.called, self.halts = list[str](), 200
+
+    async def go(self, _: web.Request) -> web.Response:
+        self.called.append("go")
+        return error(500, "broken")
+
+    async def halt(self, _: web.Request) -> web.Response:
+        self.called.append("halt")
+        return web.json_response({}, status=self.halts)
+
+
+def test_replay_stops_what_it_has_moved_and_says_where_it_could_not(tmp_path):
+    responses = {"200": answers({"type": "object"}), "5XX": REFUSED}
+    paths = {
+        "/state": reading({"type": "object"}),
+        "/go": {"post": {"responses": responses}},
+        "/halt": {"post": {"responses": responses, "x-roaas-stop": True}},
+    }
+    crane = _Crane()
+    routes = {"/state": constant({}), "/go": {"POST": crane.go}, "/halt": {"POST": crane.halt}}
+    with small_device(described(paths), routes) as url:
+        outcome = certified(
+            f"{url}/openapi.json", tmp_path, "--call", "POST /go", "--allow-motion", "--class", "robustness"
+        )
+        assert "go" in crane.called
+        assert crane.called[-1] == "halt"
+        assert "stop_undelivered" not in outcome.result
+        command = (sys.executable, "-m", "roaas", "replay", tmp_path, "robustness/no-server-error", "--allow-motion")
+        crane.called.clear()
+        done = ended(*command)
+        assert (done.returncode, crane.called[0], crane.called[-1]) == (1, "go", "halt"), done.stdout
+        assert UNDELIVERED not in done.stdout
+        crane.halts = 503
+        done = ended(*command)
+    assert done.stdout.startswith(f"WARNING: {UNDELIVERED}: POST /halt got status 503"), done.stdout
+    assert done.returncode == 1
+
+
+_MOVING = {"stop_undelivered": f"{UNDELIVERED}: POST /stop got status 503"}
+
+
+def test_a_fleet_says_which_robot_may_still_move():
+    member = Member("crane", Path("crane.toml"), Endpoints(), ("crane", ""), None, movable=True, time_limit_s=None)
+    found = json.loads((_DATA / "described-example.json").read_text(encoding="utf-8")) | _MOVING
+    result = MemberResult(member, Outcome.CONFORMANT, ExitCode.INCONCLUSIVE, document=found)
+    assert exit_code([result], interrupted=False) == ExitCode.INCONCLUSIVE
+    now = dt.datetime.now(dt.UTC)
+    document = fleet_document([result], started=now, finished=now, parallel=1, interrupted=False)
+    assert document["robots"][0]["stop_undelivered"] == _MOVING["stop_undelivered"]
+    assert UNDELIVERED in fleet_markdown(document).splitlines()[0]
+    page = fleet_html(document)
+    assert page.index(UNDELIVERED) < page.index("<header")
+
+
+def test_a_load_test_s_pages_begin_with_it():
+    found = json.loads((_DATA / "latency-example.json").read_text(encoding="utf-8")) | _MOVING
+    page = latency_html(found, "latency.json")
+    assert page.index(UNDELIVERED) < page.index("<header")
+    assert UNDELIVERED in latency_markdown(found, "latency.json").splitlines()[0]
+    assert UNDELIVERED in latency_junit(found)
