@@ -74,7 +74,7 @@ def compared(statement: Statement, directory: Path, statement_name: str | None) 
         elif name in there:
             found = _digest(directory / name)
             problem = "not the file that was signed" if found else "not a regular file"
-            yield Compared(name, "" if found == signed else problem)
+            yield Compared(name, "" if found and found == signed else problem)
     for name in sorted(there - _places(statement, statement_name).keys()):
         if statement.predicate.roaas.described and name.startswith(f"{DESCRIPTION}/"):
             yield Compared(name, "added after the signature: no run judged the device by it")
@@ -100,7 +100,7 @@ def _places(statement: Statement, statement_name: str | None) -> dict[str, str]:
         elif subject.name != STATEMENT_SUBJECT:
             found[subject.name] = subject.sha256
         elif statement_name:
-            found[statement_name] = subject.sha256
+            found.setdefault(statement_name, subject.sha256)
     return found
 
 

@@ -9,7 +9,16 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import msgspec
 
-from reports.attestation.statement import CONTRACT_SUBJECT, PROPERTY, Run, Statement, passed, property_name, seed_of
+from reports.attestation.statement import (
+    CONTRACT_SUBJECT,
+    PROPERTY,
+    Extent,
+    Run,
+    Statement,
+    passed,
+    property_name,
+    seed_of,
+)
 
 _LEVELS = frozenset({"MUST", "SHOULD", "MAY"})
 _VERDICTS = frozenset({"pass", "fail", "warn", "skip", "not-claimed", "error"})
@@ -85,11 +94,17 @@ def contradictions(run: Run) -> list[str]:
         found.append("the run is conformant, although not all claimed classes passed")
     if run.nonce is not None and run.seed != seed_of(run.nonce):
         found.append("the seed was not derived from the nonce")
-    if run.extent is not None and (unclaimed := sorted(claimed - {*run.extent.claims})):
-        found.append(f"{named(unclaimed)} has a verdict, but was not claimed")
-    if run.extent is not None and run.verdict == "conformant" and run.extent.suite_errors:
-        found.append(f"the run is conformant, although the suite could not judge {named(run.extent.suite_errors)}")
-    return found
+    return found if run.extent is None else [*found, *_beyond(run, run.extent, claimed)]
+
+
+def _beyond(run: Run, extent: Extent, claimed: set[str]) -> Iterator[str]:
+    """Yield what a run found beyond what it tested, in words."""
+    if unclaimed := sorted(claimed - {*extent.claims}):
+        yield f"{named(unclaimed)} has a verdict, but was not claimed"
+    if not extent.requests and any(verdict == "pass" for _, _, verdict in outcomes_of(run)):
+        yield "requirements passed, although no request was sent"
+    if run.verdict == "conformant" and extent.suite_errors:
+        yield f"the run is conformant, although the suite could not judge {named(extent.suite_errors)}"
 
 
 def statement_contradictions(statement: Statement) -> list[str]:

@@ -196,6 +196,7 @@ FORGED = [
     ("quick effort", run(effort="quick"), "efforts", "--effort"),
     ("claims shrunk", extent(claims=["http"]), "requirements", "was not claimed"),
     ("a class not claimed", run(classes={"http": "pass"}), "classes", "not claimed, so not tested: rest-resources"),
+    ("no requests", extent(requests=0), "requirements", "although no request was sent"),
     ("few cases", extent(cases=0.01), "cases", "at least 4%"),
     ("few operations", extent(operations=[1, 40]), "operations", "1 of 40 operations called"),
     ("cut short", extent(left_out=3.0), "left_out", "--minutes 3"),
@@ -502,6 +503,13 @@ def test_what_is_no_file_keeps_nobody_waiting(honest, tmp_path, name, kind):
         assert (done.exit_code, f"REFUSED  {name}" in done.output) == (int(signed), signed), done.output
 
 
+def test_a_file_without_a_digest_is_not_as_it_was_signed(vendor):
+    vendor.forge(conformant(), lambda document: document["subject"].append({"name": "x", "digest": {"md5": "0"}}))
+    (vendor.folder / "x").symlink_to("/dev/null")
+    done = vendor.verify("--result", vendor.folder)
+    assert (done.exit_code, "REFUSED  x " in done.output) == (1, True), done.output
+
+
 def test_an_envelope_that_contradicts_its_result_is_refused(vendor):
     result = conformant()
     vendor.forge(result, run(robot={"name": "Another"}))
@@ -570,6 +578,21 @@ def test_a_file_added_to_the_description_is_refused(device, tmp_path):
     (tmp_path / "sent" / "description" / "overlay.yaml").write_text("added")
     done = accepted(device, tmp_path / "sent")
     assert (done.exit_code, "REFUSED  description/overlay.yaml" in done.output) == (1, True), done.output
+
+
+def test_neither_sign_nor_verify_runs_code_of_a_description(device, tmp_path):
+    sent = tmp_path / "sent"
+    shutil.copytree(device.folder, sent)
+    evil = f"from pathlib import Path\nPath({str(tmp_path / 'ran')!r}).write_text('')\n"
+    for name in ("evil.py", "conftest.py", "rules/http/test_evil.py"):
+        (sent / "description" / name).parent.mkdir(parents=True, exist_ok=True)
+        (sent / "description" / name).write_text(evil)
+    manifest = sent / "description" / "pack.toml"
+    manifest.write_text('plugin = "evil.py"\n' + manifest.read_text())
+    policy = ("--policy", device.keys.parent / "policy.toml", "--contract", sent / "description")
+    assert device.verify("--result", sent, *policy).exit_code == 1
+    assert roaas("sign", sent, "--key", device.keys / PRIVATE_NAME).exit_code == 2
+    assert not (tmp_path / "ran").exists()
 
 
 def replaced_description(folder):
