@@ -120,7 +120,10 @@ class _Rooms(click.Group):
         import_module("conformance.commandline.secrecy").SECRETS.keep_userinfo(" ".join(sys.argv))
         try:
             return super().invoke(ctx)
-        except (click.ClickException, click.exceptions.Exit):
+        except click.ClickException as error:
+            error.message = guard.inert_lines(error.message)  # type: ignore[misc] # it may quote a file or a device
+            raise
+        except click.exceptions.Exit:
             raise
         except (KeyboardInterrupt, click.Abort):
             ctx.exit(_INTERRUPTED)

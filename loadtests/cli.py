@@ -227,10 +227,10 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
         with TemporaryDirectory(prefix="roaas-load-") as folder:
             result = _run_load(settings, Path(folder, "written"), summary)
     except (TomlFileError, SettingsError, BaselineError) as error:
-        click.echo(f"roaas load: {error}", err=True)
+        click.echo(f"roaas load: {inert(str(error))}", err=True)
         return CommandResult(ExitCode.USAGE)
     except CallError as error:
-        click.echo(f"roaas load: the robot cannot be reached: {error}", err=True)
+        click.echo(f"roaas load: the robot cannot be reached: {inert(str(error))}", err=True)
         return CommandResult(ExitCode.UNREACHABLE)
     except KeyboardInterrupt:
         return CommandResult(ExitCode.INTERRUPTED)
@@ -294,7 +294,7 @@ class _Baselines:
             try:
                 stored = store(result.file, self.store_in)
             except BaselineError as error:
-                click.echo(f"roaas load: {error}", err=True)
+                click.echo(f"roaas load: {inert(str(error))}", err=True)
                 return CommandResult(ExitCode.USAGE, result.file)
             click.echo(f"stored: {stored}" if stored else "not stored: the measurement is not valid", err=True)
             if stored is not None and door is not None:

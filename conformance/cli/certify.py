@@ -149,7 +149,7 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **options: Any) -> Com
     try:
         done = _judge(door, source, statement, options)
     except UnreachableError as unreachable:
-        click.echo(f"the device cannot be reached: {unreachable}", err=True)
+        click.echo(f"the device cannot be reached: {inert(str(unreachable))}", err=True)
         return CommandResult(ExitCode.UNREACHABLE)
     except (StatementError, ContractError, DescriptionError) as error:
         raise click.UsageError(str(error)) from error

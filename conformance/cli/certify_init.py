@@ -9,6 +9,7 @@ import click
 
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult
+from conformance.commandline.terminal import inert
 from conformance.contract.pack import Contract
 from conformance.engine.connecting import connection_of
 from conformance.engine.describing import fetch_description, is_wsdl
@@ -27,7 +28,7 @@ def init(path: Path | None, chosen: Statement, contract: Contract, *, force: boo
     path = _new_file(path, force=force)
     problem = write_first_statement(path, chosen, contract)
     if problem:
-        click.echo(f"the robot cannot be reached: {problem}", err=True)
+        click.echo(f"the robot cannot be reached: {inert(problem)}", err=True)
         return CommandResult(ExitCode.UNREACHABLE)
     click.echo(f"wrote {path}: look it over, then run `roaas certify {path}`")
     return CommandResult(ExitCode.PASSED)

@@ -55,6 +55,11 @@ def _lenient(stream: TextIO | None, own: TextIO | None) -> TextIO:
     return io.TextIOWrapper(_Masking(raw), stream.encoding, stream.errors, line_buffering=True)
 
 
+def inert_lines(text: str) -> str:
+    """Return a text whose lines control neither a terminal nor a CI job."""
+    return "\n".join(map(inert, text.split("\n")))
+
+
 def report_failure(error: Exception) -> ExitCode:
     """Print one sentence on an exception that no command expects, and where the details are; return the exit code."""
     if isinstance(error, OSError) and error.errno is not None:

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from conformance.commandline.terminal import inert
+
 _JUDGED = {
     "differs": "a difference",
     "bounded": "a difference, known only by a bound",
@@ -51,7 +53,7 @@ def summary(document: dict[str, Any]) -> str:
     lines += [f"note: {note}" for note in document["notes"]]
     words, sentence = document["headline"]["words"], document["headline"]["sentence"]
     lines.append(sentence if sentence.startswith(words) else f"{words}. {sentence}")
-    return "\n".join(lines) + "\n"
+    return "\n".join(map(inert, lines)) + "\n"
 
 
 def _medians(document: dict[str, Any]) -> list[str]:

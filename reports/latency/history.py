@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from reports.errors import ResultMissingError
+from reports.given_files import showing
 from reports.latency.figures.canvas import COLOUR, MARK, Panel, log_time_axis, picture
 from reports.latency.numbers import interval, ms, rate
 from reports.pages.page import html_page, write_pages
@@ -44,8 +45,10 @@ def write_history(folder: Path) -> list[Path]:
     files = sorted(folder.glob("20*.json"))
     if not files:
         raise ResultMissingError(f"{folder}: no result is stored in it")
-    runs = [_run(read_latency(path)) for path in files]
-    return write_pages(folder, {"history.html": history_html(folder.name, runs), "history.csv": history_csv(runs)})
+    with showing(folder):
+        runs = [_run(read_latency(path)) for path in files]
+        pages = {"history.html": history_html(folder.name, runs), "history.csv": history_csv(runs)}
+    return write_pages(folder, pages)
 
 
 def _run(result: Mapping[str, Any]) -> Run:

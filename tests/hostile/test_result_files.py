@@ -7,6 +7,7 @@ import gzip
 import json
 import os
 import socket
+import sys
 import threading
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import pytest
 from given_results import check, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from processes import ended
 
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.engine.permission import moves
@@ -118,6 +120,17 @@ def test_a_file_that_is_none(well_made, tmp_path, place, what):
         assert SECRET not in done.output
         assert done.exit_code == 0 or len(done.output) < 4000
     assert _tree(tmp_path) == before
+
+
+def test_a_command_in_a_process_of_its_own(well_made, tmp_path):
+    """It says one line on stderr, and ends: a pipe without a writer does not stop it."""
+    sent = well_made.sent(tmp_path / "sent")
+    (sent / "result" / "result.json").unlink()
+    a_pipe(sent / "result" / "result.json")
+    for command in ("replay", "report"):
+        done = ended(Path(sys.executable).with_name("roaas"), command, sent / "result", cwd=tmp_path, timeout=100)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr.splitlines()[-1].endswith("no regular file")
 
 
 BOMB = gzip.compress(gzip.compress(bytes(1 << 28))[:1] + bytes(1 << 28), 9)
