@@ -19,6 +19,7 @@ from conformance.commandline.secrecy import SECRETS
 def main() -> int:
     """Run the settings on standard input; returns the exit code."""
     make_streams_lenient()
+    make_streams_lenient()
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C during the imports ends it without a traceback
     try:
         from loadtests.engine.run import carry_out  # noqa: PLC0415 -- it takes a second: Ctrl-C has to work meanwhile

@@ -3,19 +3,24 @@
 Over 300 lines because half of them are the options.
 """
 
+from __future__ import annotations
+
 import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 from types import FrameType
-from typing import IO, Any, Self
+from typing import IO, TYPE_CHECKING, Any, Self
 
 import click
 
 from conformance.commandline.device_options import credential_options, description_options
+from conformance.commandline.endings import as_parent, end_like_ctrl_c, end_with_parent, ending_signals, undisturbed
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.out_folder import FolderError, held
 from conformance.commandline.result_command import CommandResult, ResultCommand
@@ -29,7 +34,7 @@ from loadtests.clients.failures import CallError
 from loadtests.described.device import DESCRIBED_ONLY, Named
 from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest, store
 from loadtests.result.files import with_unstopped
-from loadtests.schedule.plan import CLIENTS, INTERFACES
+from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES
 from loadtests.settings.cli_options import KNEE_SEARCHES, CliOptions
 from loadtests.settings.errors import SettingsError
 from loadtests.settings.option_types import COUNTS, RATES, SHARE
@@ -43,6 +48,10 @@ from loadtests.settings.settle import (
     settle,
 )
 
+if TYPE_CHECKING:
+    from loadtests.described.run import Described
+    from loadtests.described.stopping import Stopping
+
 DEFAULT_OUT = "out"  # as `roaas certify` does
 #: Threads of NumPy's linear algebra wait for one another by spinning, ten times as long on a busy machine.
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -50,7 +59,7 @@ _FILE = click.Path(path_type=Path)
 _DESCRIPTIONS = ("publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint")
 
 
-def _run_load(settings: Settings, written: Path, summary: IO[str]) -> CommandResult:
+def _run_load(settings: Settings, written: Path, summary: IO[str], stopping: Iterable[Stopping]) -> CommandResult:
     """Run a load test in its own process, which writes the path of its result into the file `written`.
 
     Its summary goes into another file, as it is printed once the robot has been stopped.
@@ -58,23 +67,26 @@ def _run_load(settings: Settings, written: Path, summary: IO[str]) -> CommandRes
     The process has its own session, so that Ctrl-C reaches it only through this process: it then writes a partial
     result.
     """
+    guards = [descriptor for each in stopping if (descriptor := each.guarded()) is not None]
     child = subprocess.Popen(
         [sys.executable, "-P", "-m", "loadtests"],
         stdin=subprocess.PIPE,
         stdout=summary,
         text=True,
         start_new_session=True,
-        env=os.environ | _ONE_THREAD,
+        env=as_parent(os.environ | _ONE_THREAD),
+        pass_fds=guards,
     )
 
     def forward(number: int, _: FrameType | None) -> None:
         child.send_signal(number)
 
-    earlier = {number: signal.signal(number, forward) for number in (signal.SIGINT, signal.SIGTERM)}
+    earlier = {number: signal.signal(number, forward) for number in ending_signals()}
     try:
         if child.stdin is not None:
-            child.stdin.write(f"{written}\n{settings.to_json()}")
-            child.stdin.close()
+            with suppress(BrokenPipeError):  # it was ended before it read them
+                child.stdin.write(f"{written}\n{settings.to_json()}")
+                child.stdin.close()
         code = child.wait()
     finally:
         for number, handler in earlier.items():
@@ -209,7 +221,10 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     Exit codes: 0 thresholds and service levels kept, and not slower; 1 one of them missed, or slower; 2 usage error; 3
     robot not reachable; 4 measurement not valid or inconclusive; 130 interrupted.
     """
-    device = None
+    end_like_ctrl_c()
+    end_with_parent()
+    device: Described | None = None
+    stopping: list[Stopping] = []
     context = click.get_current_context()
     summary = context.with_resource(TemporaryFile("w+", encoding="utf-8"))  # noqa: SIM115 - click closes it
     try:
@@ -219,13 +234,14 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
         tolerance = options["tolerance"]
         if named.source is None:
             settings = _papers_robot(named.statement, options)
+            stopping += _stopping_of(settings)
         else:
             from loadtests.described.run import Described  # noqa: PLC0415 -- the paper's robot need not pay 0.3 s for it
 
             device = Described.of(named, options)
             settings = device.settings(_command_line())
         with TemporaryDirectory(prefix="roaas-load-") as folder:
-            result = _run_load(settings, Path(folder, "written"), summary)
+            result = _run_load(settings, Path(folder, "written"), summary, device.stopping if device else stopping)
     except (TomlFileError, SettingsError, BaselineError) as error:
         click.echo(f"roaas load: {inert(str(error))}", err=True)
         return CommandResult(ExitCode.USAGE)
@@ -235,13 +251,25 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     except KeyboardInterrupt:
         return CommandResult(ExitCode.INTERRUPTED)
     finally:
-        unstopped = "; ".join(device.stop()) if device is not None else ""
+        with undisturbed():
+            unstopped = "; ".join(filter(None, (each.stop() for each in (device.stopping if device else stopping))))
         if unstopped:
             click.secho(f"WARNING: {inert(unstopped)}", fg="red")
     summary.seek(0)
     click.echo(summary.read(), nl=False)
     result = with_unstopped(result, unstopped) if unstopped else result
     return kept.after(result, tolerance, context.obj)
+
+
+def _stopping_of(settings: Settings) -> Iterator[Stopping]:
+    """Yield what stops each robot with the paper's interface over REST, if the run makes it drive."""
+    others = () if settings.against is None else (settings.against.robot,)
+    moved = [] if MOVES.isdisjoint(settings.selection.operations) else [settings.robot, *others]
+    for robot in moved:
+        if robot.rest:
+            from loadtests.described.stopping import Stopping  # noqa: PLC0415 -- it takes 0.3 s
+
+            yield Stopping.of_papers_robot(robot)
 
 
 def _papers_robot(statement: Path | None, options: dict[str, Any]) -> Settings:

@@ -8,8 +8,8 @@ import os
 import signal
 import sys
 import threading
-import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Final
 
 #: Names, in the environment, the process that a command belongs to: the command ends with it.
@@ -34,6 +34,20 @@ def end_like_ctrl_c() -> None:
         signal.signal(number, signal.default_int_handler)
 
 
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Ignore what would end the process, for what takes a bounded time: a robot is being stopped."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, lambda _number, _frame: None) for number in ending_signals()}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def end_with_parent() -> None:
     """Send this process SIGTERM when its parent process ends; call it in the main thread.
 
@@ -46,7 +60,7 @@ def end_with_parent() -> None:
 
     def follow() -> None:
         while os.getppid() == parent:
-            time.sleep(_OFTEN_S)
+            _parent_ended.wait(_OFTEN_S)
         _parent_ended.set()
         # To the main thread: its system call returns at once.
         signal.pthread_kill(main or 0, signal.SIGTERM)

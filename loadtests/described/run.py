@@ -132,9 +132,10 @@ class Described:
             scenario=scenario,
         )
 
-    def stop(self) -> list[str]:
-        """Stop each device if the run called what may change something; return why one may still move."""
-        return [problem for each in self._stopping if (problem := each.stop())]
+    @property
+    def stopping(self) -> tuple[Stopping, ...]:
+        """What stops each device, if the run calls what may change something."""
+        return self._stopping
 
 
 def _unmeasured(levels: Collection[str], names: Collection[str]) -> list[str]:

@@ -1,8 +1,6 @@
 """One run, from the first call to the written result."""
 
 import logging
-import os
-import signal
 import sys
 import traceback
 from contextlib import ExitStack
@@ -13,6 +11,7 @@ from pathlib import Path
 import gevent
 import locust  # patches the standard library, which has to come before our modules that use it
 
+from conformance.commandline.endings import ending_signals
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult
 from conformance.commandline.started import Started
@@ -22,7 +21,7 @@ from loadtests.clients.robot import Robot
 from loadtests.clients.wsdl import WsdlError, with_addresses
 from loadtests.engine.deciding import until_decided
 from loadtests.engine.planning import duel_plan
-from loadtests.engine.watching import Watch, show_web_ui, tell, tell_plan
+from loadtests.engine.watching import Watch, follow_parent, show_web_ui, tell, tell_plan
 from loadtests.measuring.distributed_executor import DistributedExecutor, Executor
 from loadtests.measuring.end_to_end import end_to_end
 from loadtests.measuring.errors import GeneratorError
@@ -60,9 +59,7 @@ class Run:
         return "the contract" if self.settings.description is None else "its description"
 
     def interrupt(self) -> None:
-        """End the run on Ctrl-C and keep what was measured; a second Ctrl-C ends the process at once."""
-        if self.outcome.interrupted:
-            os._exit(ExitCode.INTERRUPTED)  # the second Ctrl-C: do not wait for the result
+        """End the run on a signal, or when its parent process ends, and keep what was measured."""
         self.outcome.interrupted = True
 
     # Before the measurement.
@@ -272,8 +269,9 @@ def carry_out(settings: Settings) -> CommandResult:
     """Carry out a run and write its result."""
     logging.getLogger(locust.__name__).setLevel(logging.ERROR)  # it warns of fast spawning, which we want
     run = Run(settings)
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in ending_signals():
         gevent.signal_handler(number, run.interrupt)
+    gevent.spawn(follow_parent, run.interrupt)
     aborted: RunAborted | None = None
     try:
         run.resolve()

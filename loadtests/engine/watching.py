@@ -2,15 +2,19 @@
 
 import os
 import sys
+from collections.abc import Callable
 
 import gevent
 
+from conformance.commandline.endings import PARENT_VARIABLE
 from loadtests.engine.liveness import Liveness
 from loadtests.measuring.distributed_executor import Executor
 from loadtests.measuring.errors import GeneratorError
 from loadtests.result.outcome import Carried, Outcome
 from loadtests.schedule.plan import Plan
 from loadtests.statistics.recorder import Recorder
+
+_OFTEN_S = 0.2
 
 
 def tell(message: str) -> None:
@@ -42,6 +46,17 @@ def show_web_ui(executor: Executor, host: str, port: int) -> None:
     tell(f"Locust's web UI: http://{host}:{port}")
 
 
+def follow_parent(interrupt: Callable[[], None]) -> None:
+    """Interrupt the run when the process that started it ends.
+
+    A greenlet calls this: gevent cannot patch a process that has a thread, as end_with_parent() starts one.
+    """
+    parent = int(os.environ.pop(PARENT_VARIABLE, os.getppid()))
+    while os.getppid() == parent:
+        gevent.sleep(_OFTEN_S)
+    interrupt()
+
+
 class Watch:
     """Watches a run.
 
@@ -54,15 +69,12 @@ class Watch:
         self._outcome = outcome
         self._liveness = Liveness(report_s)
         self._told = 0.0
-        self._parent = os.getppid()
 
     def look(self, carried: Carried, recorder: Recorder, elapsed: float) -> bool:
         """Report progress; returns whether to end now."""
         plan, outcome = carried.plan, self._outcome
         carried.elapsed_s = max(0.0, min(elapsed, plan.length_s))
         elapsed += plan.offset_s
-        if os.getppid() != self._parent:  # the parent process has ended
-            outcome.interrupted = True
         if outcome.dead_at is None and self._liveness.is_due(elapsed):
             succeeded = sum(cell.service.total for cell in recorder.cells.values())
             failed = sum(failure.count for failure in recorder.failures.values())

@@ -269,3 +269,46 @@ def test_a_guard_stops_the_device_unless_that_is_done(told, tmp_path):
     server.server_close()
     assert len(server.stops) >= told.stops
     assert {*server.stops} == ({("/v", b"0")} if told.stops else set())
+
+
+def _load(folder: Path, url: str) -> subprocess.Popen[str]:
+    command = (sys.executable, "-m", "roaas", "load", _statement(folder, url), "--operation", "PUT /velocity")
+    more = (
+        "--allow-motion",
+        "--call",
+        "PUT /velocity",
+        "--rate",
+        "50",
+        "--duration",
+        "60",
+        "--warmup",
+        "0",
+        "--out",
+        folder / "out",
+    )
+    return subprocess.Popen((*command, *more), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+
+@pytest.mark.parametrize("numbers", [(signal.SIGHUP,), (signal.SIGINT, signal.SIGTERM, signal.SIGINT)], ids=str)
+def test_a_load_test_that_is_ended_leaves_the_device_at_rest_and_a_result(numbers, tmp_path):
+    device = Mover()
+    with small_device(DESCRIPTION, device.routes) as url, _load(tmp_path, url) as process:
+        assert device.await_that(lambda mover: mover.commands >= 50, process), process.communicate()
+        _send(*numbers)(process)
+        said, _ = process.communicate(timeout=120)
+        assert device.velocity == 0, said
+    assert process.returncode == 130, said
+    assert json.loads((tmp_path / "out/latency.json").read_text(encoding="utf-8"))["interrupted"] is True
+
+
+def test_a_load_test_that_is_killed_leaves_the_device_at_rest(tmp_path):
+    device = Mover()
+    with small_device(DESCRIPTION, device.routes) as url, _load(tmp_path, url) as process:
+        assert device.await_that(lambda mover: mover.commands >= 50, process), process.communicate()
+        process.kill()
+        process.communicate(timeout=120)  # its child has the same stdout
+        assert device.await_that(lambda mover: mover.velocity == 0)
+        received = device.received
+        assert device.await_that(lambda mover: mover.received >= received + 2)  # the guard stops it again
+        assert device.velocity == 0
+    assert json.loads((tmp_path / "out/latency.json").read_text(encoding="utf-8"))["interrupted"] is True
