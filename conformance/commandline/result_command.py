@@ -5,6 +5,8 @@ from typing import Any, NamedTuple, Protocol
 
 import click
 
+from conformance.commandline.terminal import inert
+
 
 class CommandResult(NamedTuple):
     """The return value of such a command.
@@ -53,8 +55,10 @@ class ResultCommand(click.Command):
                 for path in ctx.obj.render(result.file, result.notary):
                     if result.tell:
                         click.echo(f"report: {path}")
-            except (OSError, click.ClickException) as error:
-                # The verdict stands without its pages.
-                said = error.format_message() if isinstance(error, click.ClickException) else error
+            except ModuleNotFoundError:
+                raise  # the front door names the extra that brings it
+            except Exception as error:  # noqa: BLE001 - the verdict stands without its pages, also where memory ends
+                own = error.format_message() if isinstance(error, click.ClickException) else ""
+                said = own or inert(str(error)) or type(error).__name__
                 click.echo(f"the pages could not be written or signed: {said}. {result.file} is kept", err=True)
         ctx.exit(result.exit_code)
