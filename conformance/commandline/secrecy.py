@@ -9,10 +9,13 @@ stderr, logs and tracebacks. A secret is recognized in these forms, and in each 
 - broken over several lines, or cut short before an ellipsis or a quotation mark.
 
 Not recognized are a reversed or encrypted secret, and base64 of an escaped one.
+
+Over 300 lines because the forms of a secret, and the search for them, follow from one another.
 """
 
 import gzip
 import re
+import threading
 import zlib
 from array import array
 from base64 import b64encode
@@ -25,6 +28,9 @@ from urllib.parse import unquote
 # A secret of fewer characters, or a word or number of fewer than the second, would be masked where it is none.
 _SHORTEST: Final = 5
 _SHORTEST_WORD: Final = 8
+_MOST_KNOWN: Final = 100
+_REMEMBERED: Final = 1000
+_MOST_REMEMBERED: Final = 4096
 # The beginning of a secret that is recognized where the text is cut after it, and how long such a secret is at least.
 _BEGINNING: Final = 8
 _LONG: Final = 12
@@ -83,11 +89,14 @@ class Secrets:
     """The secrets of a process, each with the variable that stands for it in what is written."""
 
     def __init__(self) -> None:
+        self._lock = threading.Lock()
         self.forget()
 
     def forget(self) -> None:
         """Forget all secrets, as the tests of one process do between two runs."""
         self._known: set[str] = set()
+        # Many texts are written again and again.
+        self._seen: dict[str, str] = {}
         self._weak: dict[str, str] = {}
         # Those in which the case does not matter, and the others.
         self._folded: tuple[_Form, ...] = ()
@@ -105,9 +114,18 @@ class Secrets:
             secret: the text.
             variable: what stands in its place, such as ``$ROAAS_TOKEN``.
         """
+        with self._lock:
+            self._keep(secret, variable)
+
+    def _keep(self, secret: str, variable: str) -> None:
         if not secret or secret in self._known:
             return
+        if len(self._known) >= _MOST_KNOWN:
+            # A device may give out ever new ones, and each is searched for in everything.
+            self._weak[variable] = f"is one of more than {_MOST_KNOWN}"
+            return
         self._known.add(secret)
+        self._seen.clear()
         if why := _weakness(secret):
             self._weak[variable] = why
             return
@@ -138,6 +156,16 @@ class Secrets:
         """Return a text with variables in place of all secrets."""
         if not self._known:
             return text
+        shown = self._seen.get(text)
+        if shown is None:
+            shown = self._masked(text)
+            if len(text) <= _REMEMBERED:
+                if len(self._seen) >= _MOST_REMEMBERED:
+                    self._seen.clear()
+                self._seen[text] = shown
+        return shown
+
+    def _masked(self, text: str) -> str:
         for mark, place, shown in _PLACES:
             if mark in text:
                 text = place.sub(shown, text)
@@ -161,28 +189,23 @@ class Secrets:
             return octets if shown == plain else gzip.compress(shown, mtime=0)
         text = octets.decode("latin-1")
         shown_text = self.masked(text)
-        return octets if shown_text is text else shown_text.encode("latin-1", "replace")
+        return octets if shown_text == text else shown_text.encode("latin-1", "replace")
 
     def masked_json(self, value: Any) -> Any:
         """Return JSON, which may have bytes in it, with variables in place of the secrets in texts, names and bytes."""
         if not self._known:
             return value
-        seen = dict[str, str]()
-        return self._walked(value, seen)
+        return self._walked(value)
 
-    def _walked(self, value: Any, seen: dict[str, str]) -> Any:
+    def _walked(self, value: Any) -> Any:
         if isinstance(value, str):
-            if value not in seen:
-                seen[value] = self.masked(value)
-            return seen[value]
+            return self.masked(value)
         if isinstance(value, bytes):
             return self.masked_bytes(value)
         if isinstance(value, dict):
-            return {
-                self._walked(key, seen): _without_cookie(key, self._walked(item, seen)) for key, item in value.items()
-            }
+            return {self._walked(key): _without_cookie(key, self._walked(item)) for key, item in value.items()}
         if isinstance(value, list | tuple):
-            items = [self._walked(item, seen) for item in value]
+            items = [self._walked(item) for item in value]
             return [items[0], _without_cookie(*items)] if len(items) == 2 else items  # noqa: PLR2004 - name and value
         return value
 

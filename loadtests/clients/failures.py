@@ -8,6 +8,8 @@ from fnmatch import fnmatchcase
 from functools import cached_property
 from http import HTTPStatus
 
+from conformance.commandline.secrecy import SECRETS
+
 
 class CallError(Exception):
     """A call without a good response.
@@ -19,7 +21,8 @@ class CallError(Exception):
     """
 
     def __init__(self, kind: str, message: str, refused: int = 0) -> None:
-        super().__init__(message)
+        # Here already, because Locust's web UI shows it to a network.
+        super().__init__(SECRETS.masked(message))
         self.kind, self.refused = kind, refused
 
 

@@ -107,6 +107,15 @@ def test_what_is_too_short_or_a_word_is_told_and_not_masked(secret):
     assert secret not in note
 
 
+def test_a_device_that_gives_ever_new_secrets_slows_nothing_down():
+    secrets = Secrets()
+    secrets.keep(_TOKEN, "$ROAAS_TOKEN")
+    for number in range(1000):
+        secrets.keep(f"given-by-the-device-{number}", "$ROAAS_LOGIN")
+    assert secrets.masked(f"{_TOKEN}, given-by-the-device-7") == "$ROAAS_TOKEN, $ROAAS_LOGIN"
+    assert "more than 100" in secrets.notes[0]
+
+
 def test_bytes_are_masked_also_where_they_are_compressed():
     secrets = Secrets()
     secrets.keep(_PLAIN, "$ROAAS_TOKEN")
