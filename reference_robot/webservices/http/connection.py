@@ -31,7 +31,6 @@ from reference_robot.webservices.http.reading import (
     FRAMING_PER_BYTE,
     HEAD_LIMIT,
     TARGET_LIMIT,
-    VERSIONS,
     fields_by_name,
     framing_too_large,
     full,
@@ -153,12 +152,18 @@ class HttpConnection(PacedConnection):
             self._is_stopped = False
             return
         fields, parser = self._fields, self._parser
-        headers, version = dict(fields), parser.get_http_version()
-        if self._head_size > HEAD_LIMIT or b"transfer-encoding" in headers or version not in VERSIONS:
-            require_head(version, fields)
+        headers, keep_alive = dict(fields), parser.should_keep_alive()
+        # HTTP/1.1 is kept alive without a Connection field. To ask for the version takes long.
+        if (
+            not keep_alive
+            or b"connection" in headers
+            or b"transfer-encoding" in headers
+            or self._head_size > HEAD_LIMIT
+        ):
+            require_head(parser.get_http_version(), fields)
         self._in_head = False
         self._is_stopped = parser.should_upgrade()
-        request = Request(parser.get_method().decode(), self._target, headers, keep_alive=parser.should_keep_alive())
+        request = Request(parser.get_method().decode(), self._target, headers, keep_alive=keep_alive)
         self._request = request
         if self._is_proxied:
             take_forwarded(request)
@@ -166,7 +171,7 @@ class HttpConnection(PacedConnection):
             if len(headers) != len(fields):
                 request.headers = headers = fields_by_name(fields)
             if b"host" not in headers:
-                require_old_version(version)
+                require_old_version(parser.get_http_version())
             self._admit(request)
             if not self.is_known:
                 self._become_known()

@@ -11,7 +11,7 @@ HEAD_LIMIT: Final = 64 * 1024  # bytes: request line and fields (RFC 6585 5)
 FRAMING_LIMIT: Final = 64 * 1024  # bytes of chunk sizes, chunk extensions and trailers, besides those for each byte:
 FRAMING_PER_BYTE: Final = 8  # a chunk of one byte takes six
 _FIELD_MARKS: Final = 4  # bytes of a field line besides name and value: colon, space and line end
-VERSIONS: Final = frozenset({"1.1", "1.0"})
+_VERSIONS: Final = frozenset({"1.1", "1.0"})
 FRAMING_FIELDS: Final = (b"content-length", b"transfer-encoding")
 
 # Fields that may occur only once in a request (RFC 9110 5.3; 9112 3.2 for Host).
@@ -60,7 +60,7 @@ def require_head(version: str, fields: list[Field]) -> None:
     """
     if sum(len(name) + len(value) + _FIELD_MARKS for name, value in fields) > HEAD_LIMIT:
         raise head_too_large()
-    if version not in VERSIONS:
+    if version not in _VERSIONS:
         raise Problem(505, f"HTTP/{version} is not supported, only HTTP/1.1 and HTTP/1.0")
     codings = b",".join(value for name, value in fields if name == b"transfer-encoding")
     if codings and version == "1.0":
