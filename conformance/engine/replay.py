@@ -11,9 +11,11 @@ from typing import Any
 
 import msgspec
 
+from conformance.api.rest.guard import Guard
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.observers import Observer
 from conformance.api.rest.stops import UNDELIVERED, stop_device
+from conformance.commandline.endings import undisturbed
 from conformance.contract.described import MOTION
 from conformance.contract.generic import generic_ledger
 from conformance.contract.pack import Contract
@@ -156,27 +158,49 @@ def replay_and_stop(
         ValueError, KeyError, TypeError: the result is malformed.
     """
     rest, found, unstopped = result["target"].get("rest"), [], ""
-    acting = False
+    stop: _Stop | None = None
     try:
         for id_, failure in chosen:
-            acting |= moves(failure, contract, rest or "") and not (rest and strangers(failure, [rest]))
+            if stop is None and moves(failure, contract, rest or "") and not (rest and strangers(failure, [rest])):
+                stop = _Stop(result, connection, rest, contract)
             found.append(replay(id_, failure, connection, rest if contract else None, contract))
     finally:
-        if acting:
-            unstopped = _stopped(result, connection, rest, contract)
+        if stop is not None:
+            with undisturbed():
+                unstopped = stop.send()
     return found, unstopped
 
 
-def _stopped(result: Mapping[str, Any], connection: Connection, rest: str | None, contract: Contract | None) -> str:
-    """Stop the robot as the contract says; return why it may still move, or an empty text."""
-    moved = bool(result["statement"].get("motion_allowed"))
-    if contract is None or not rest:
-        return f"{UNDELIVERED}: nothing at hand says how it is stopped" if moved else ""
-    if moved and MOTION in result["classes"] and not any(operation.stop for operation in operations_of(contract)):
-        return f"{UNDELIVERED}: only its statement says how it is stopped: give --statement"
-    statement = msgspec.structs.replace(empty_statement(contract), calls=Calls(("*",)), endpoints=Endpoints(rest=rest))
-    with closing(HttpClient(rest, connection)) as client:
-        return stop_device(RestInterface(Run(statement, contract, allow_motion=True), client))
+class _Stop:
+    """The stop of the robot of a result, as the contract says; a guard process sends it if this one is killed."""
+
+    def __init__(
+        self, result: Mapping[str, Any], connection: Connection, rest: str | None, contract: Contract | None
+    ) -> None:
+        self._problem = ""
+        self._api: RestInterface | None = None
+        self._guard: Guard | None = None
+        moved = bool(result.get("statement", {}).get("motion_allowed"))
+        if contract is None or not rest:
+            self._problem = f"{UNDELIVERED}: nothing at hand says how it is stopped" if moved else ""
+            return
+        if moved and MOTION in result["classes"] and not any(operation.stop for operation in operations_of(contract)):
+            self._problem = f"{UNDELIVERED}: only its statement says how it is stopped: give --statement"
+            return
+        calls, where = Calls(("*",)), Endpoints(rest=rest)
+        statement = msgspec.structs.replace(empty_statement(contract), calls=calls, endpoints=where)
+        self._api = RestInterface(Run(statement, contract, allow_motion=True), HttpClient(rest, connection))
+        self._guard = Guard(self._api)
+        self._guard.start()
+
+    def send(self) -> str:
+        """Stop the robot; return why it may still move, or an empty text."""
+        if self._api is None or self._guard is None:
+            return self._problem
+        problem = stop_device(self._api)
+        self._api.client.close()
+        self._guard.release(stopped=not problem)
+        return problem
 
 
 def judged_by_checks(

@@ -18,7 +18,11 @@ from processes import ended
 from small_device import REFUSED, answers, described, error, reading, small_device
 
 import conformance.api.rest.guard
+from conformance.contract.pack import Contract
+from conformance.engine.resending import written
 from conformance.selftest.variants import certificate
+from conformance.transport.exchange import Request
+from conformance.verdict.finding import Sent
 
 _GUARD = Path(conformance.api.rest.guard.__file__).with_name("guard_process.py")
 _CERTIFY = (sys.executable, "-m", "roaas", "certify")
@@ -312,3 +316,36 @@ def test_a_load_test_that_is_killed_leaves_the_device_at_rest(tmp_path):
         assert device.await_that(lambda mover: mover.received >= received + 2)  # the guard stops it again
         assert device.velocity == 0
     assert json.loads((tmp_path / "out/latency.json").read_text(encoding="utf-8"))["interrupted"] is True
+
+
+def test_a_replay_that_is_killed_leaves_the_robot_at_rest(tmp_path):
+    moving, resting, seen = threading.Event(), threading.Event(), []
+
+    async def drive(request):
+        x = (await request.json())["linear"]["x"]
+        seen.append(x)
+        (moving if x else resting).set()
+        return web.Response(status=204)
+
+    still = {"x": 0.0, "y": 0.0, "z": 0.0}
+    contract = Contract.load()
+    with small_device(described({}), {"/robot/velocity/": {"PUT": drive}, "/robot/pose/": {"GET": drive}}) as url:
+        body = json.dumps({"linear": still | {"x": 0.3}, "angular": still}).encode()
+        put = Request("PUT", f"{url}/robot/velocity/", (("Content-Type", "application/json"),), body)
+        sequence = written([Sent(0.0, put), Sent(9.0, Request("GET", f"{url}/robot/pose/", ()))])  # killed in the pause
+        response = {"status": 500, "headers": {}, "body": None}
+        found = {"number": 1, "message": "500", "response": response, "sequence": sequence}
+        document = {
+            "format": "roaas-result/1",
+            "suite": {"contract": contract.label},
+            "target": {"rest": url},
+            "requirements": [{"id": "http/head", "failures": [found]}],
+        }
+        (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+        command = (sys.executable, "-m", "roaas", "replay", tmp_path, "--allow-motion")
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+            assert moving.wait(60)
+            process.kill()
+        assert resting.wait(60)
+    assert seen[0] == pytest.approx(0.3)
+    assert not any(seen[1:])
