@@ -87,27 +87,11 @@ class _Rooms(click.Group):
         return command
 
     def main(self, *args: Any, **options: Any) -> Any:
-        """Run a command and end the process with its exit code. By 1, nothing ends that is not a command's own verdict.
-
-        Click and Python end by 1 whatever they have no other code for: an exception, an interrupted prompt, a closed
-        pipe.
-        """
+        """Run a command and end the process with its exit code."""
         run: Callable[..., Any] = super().main
         if not options.get("standalone_mode", True):
             return run(*args, **options)
-        open_rooms()
-        guard = import_module("conformance.commandline.guard")
-        guard.make_streams_lenient()
-        try:
-            code = run(*args, **{**options, "standalone_mode": False})
-        except click.ClickException as error:
-            error.show()
-            code = _USAGE if error.exit_code == click.ClickException.exit_code else error.exit_code
-        except (KeyboardInterrupt, click.Abort):
-            code = _INTERRUPTED
-        except Exception as error:  # noqa: BLE001 - as in invoke()
-            code = guard.report_failure(error)
-        sys.exit(code if isinstance(code, int) else 0)
+        sys.exit(_exit_code(lambda: run(*args, **{**options, "standalone_mode": False})))
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; name the extra that it lacks, if it turns out to need one, as the report of a load test.
@@ -135,6 +119,27 @@ class _Rooms(click.Group):
             raise click.UsageError(problem) from missing
         except Exception as error:  # noqa: BLE001 - a traceback would end with 1, which means "not conformant"
             ctx.exit(guard.report_failure(error))
+
+
+def _exit_code(run: Callable[[], Any]) -> int:
+    """Run what returns an exit code or nothing, and return the exit code. It is 1 only if ``run`` returns 1.
+
+    Click and Python end with 1 whatever they have no other code for: an exception, an interrupted prompt, a closed
+    pipe.
+    """
+    open_rooms()
+    guard = import_module("conformance.commandline.guard")
+    guard.make_streams_lenient()
+    try:
+        code = run()
+    except click.ClickException as error:
+        error.show()
+        return _USAGE if error.exit_code == click.ClickException.exit_code else error.exit_code
+    except (KeyboardInterrupt, click.Abort):
+        return _INTERRUPTED
+    except Exception as error:  # noqa: BLE001 - as in _Rooms.invoke()
+        return int(guard.report_failure(error))
+    return code if isinstance(code, int) else 0
 
 
 class FrontDoor:
@@ -229,8 +234,7 @@ def main() -> None:
 
 def load_node() -> None:
     """Run the command ``roaas-load-node``: the master or a worker of a load test that is spread over machines."""
-    open_rooms()
-    import_module("loadtests.node").main(sys.argv[1:])
+    sys.exit(_exit_code(lambda: import_module("loadtests.node").main(sys.argv[1:])))
 
 
 if __name__ == "__main__":

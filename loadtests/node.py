@@ -10,6 +10,9 @@ import sys
 import time
 from pathlib import Path
 
+import click
+
+from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.guard import make_streams_lenient
 from loadtests.cli import DEFAULT_OUT, load
 from loadtests.described.device import CREDENTIALS, secrets_of
@@ -19,36 +22,39 @@ PORT = 5557
 LINGER_S = 600.0
 
 
-def main(words: list[str]) -> None:
-    """Run as the master or as a worker; ends with the exit code of `roaas load`."""
+def main(words: list[str]) -> int:
+    """Run as the master or as a worker; return the exit code of `roaas load`."""
     make_streams_lenient()
     if "--worker" in words:
-        _work(words)
-        return
+        return _work(words)
     own = [word for word in words if word != "--master"]
     defaults = ["--master-host", "*", "--master-port", str(PORT), "--processes", "0"]
     try:
-        load([*defaults, *own], prog_name="roaas load")
+        code: int | None = load.main([*defaults, *own], prog_name="roaas load", standalone_mode=False)
     finally:
         linger = float(os.environ.get("ROAAS_LINGER_S", LINGER_S))
         sys.stderr.write(f"the result is kept for {linger:g} s: fetch it now\n")
         sys.stderr.flush()
         time.sleep(linger)
+    return code or ExitCode.PASSED
 
 
-def _work(words: list[str]) -> None:
+def _work(words: list[str]) -> int:
     host = _value(words, "--master-host")
     if host is None:
-        sys.exit("--worker needs --master-host")
+        click.echo("--worker needs --master-host", err=True)
+        return ExitCode.USAGE
     try:
         secrets = secrets_of({name: _value(words, f"--{name.replace('_', '-')}") for name in CREDENTIALS})
     except SettingsError as error:
-        sys.exit(f"roaas-load-node: {error}")
+        click.echo(f"roaas-load-node: {error}", err=True)
+        return ExitCode.USAGE
     from loadtests.measuring.worker import serve  # noqa: PLC0415 -- imports Locust, which patches the process
 
     both = [secrets, secrets]  # the same for both robots of --against
     port, folder = int(_value(words, "--master-port") or PORT), Path(_value(words, "--out") or DEFAULT_OUT)
     serve(host, port, both, folder, scenario=_value(words, "--scenario"))
+    return ExitCode.PASSED
 
 
 def _value(words: list[str], option: str) -> str | None:
@@ -62,4 +68,4 @@ def _value(words: list[str], option: str) -> str | None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    sys.exit(main(sys.argv[1:]))

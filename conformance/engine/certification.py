@@ -274,7 +274,7 @@ def _judge(robot: RobotUnderTest, teller: Progress, remarks: list[str], recordin
             look_again(run, robot.connection, robot.rest)
             robot.is_at_rest = True
             robot.finish()
-    except Exception as error:  # noqa: BLE001 - as above
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - as above
         remarks.append(f"The suite itself failed, please report this: {type(error).__name__}: {error}")
         run.aborted = run.aborted or "the suite itself failed"
 
