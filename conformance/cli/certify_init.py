@@ -69,5 +69,7 @@ def init_described(path: Path | None, source: str, options: dict[str, Any]) -> C
         write_described_statement(path, found, api, Calls(tuple(options["allow"]), tuple(options["never"])))
     except OSError as error:
         raise StatementError(str(error)) from error
+    for remark in (*found.remarks, *found.unread):
+        click.echo(inert(remark), err=True)
     click.echo(f"wrote {path}: look it over, then run `roaas certify {path}`")
     return CommandResult(ExitCode.PASSED)

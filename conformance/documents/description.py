@@ -22,7 +22,7 @@ from conformance.documents.schema_words import in_one_version
 from conformance.documents.sent_parameters import not_called, with_sent
 from conformance.documents.swagger import as_openapi_3
 from conformance.documents.unreadable_parts import without_unreadable
-from conformance.transport.reach import ElsewhereError, Trust, is_same
+from conformance.transport.reach import ElsewhereError, Trust, is_same, joined
 
 # All files of a description together: their number, their octets, and the time to fetch them, s.
 _MOST_FILES: Final = 5_000
@@ -266,7 +266,7 @@ def _base_url(source: str, document: Schema, trust: Trust) -> tuple[str, tuple[s
     if not is_url(source):
         wholes = [f"http:{url}" if url.startswith("//") else url for url in urls]
         return next(filter(is_url, wholes), "").rstrip("/"), ()
-    wholes = [_joined(source, url) for url in urls]
+    wholes = [joined(source, url) for url in urls]
     known = [one for one in wholes if is_same(one, source)] or [one for one in wholes if trust.trusts(one)]
     if known:
         return trust.place(known[0]).partition("?")[0].rstrip("/"), ()
@@ -276,14 +276,6 @@ def _base_url(source: str, document: Schema, trust: Trust) -> tuple[str, tuple[s
         "that."
     )
     return here, (remark,)
-
-
-def _joined(base: str, reference: str) -> str:
-    """Return a reference as a URL; one that is none, as it is."""
-    try:
-        return urljoin(base, reference)
-    except ValueError:
-        return reference
 
 
 def _with_defaults(server: Schema) -> str:

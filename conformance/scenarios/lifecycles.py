@@ -16,6 +16,7 @@ from conformance.documents.openapi import Operation, operations_of
 from conformance.scenarios.scenario import NotPossibleError, NotSeenError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange, NoAnswerError
+from conformance.transport.reach import is_same, joined
 
 _CREATED = 201
 
@@ -99,11 +100,10 @@ def _live(
 def _path_of(created: Exchange, create: Operation, read: Operation) -> str:
     """Return the path of a created thing, by its Location or by an identifier in the body."""
     location = created.response.header("location")
-    prefix = created.request.url.removesuffix(created.request.target)
     if location:
-        path = urlsplit(location).path
+        target = joined(created.request.url, location)
         below = urlsplit(created.request.url).path.removesuffix(create.template)
-        return path.removeprefix(below) if not location.startswith("http") or location.startswith(prefix) else ""
+        return urlsplit(target).path.removeprefix(below) if is_same(target, created.request.url) else ""
     value: Any = read_json(created.response.body).value
     members = value if isinstance(value, dict) else {}
     id_ = next((members[name] for name in IDS if isinstance(members.get(name), str | int)), None)

@@ -10,13 +10,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple, Self
-from urllib.parse import urlsplit, urlunsplit
+from urllib.parse import urljoin, urlsplit, urlunsplit
 
 #: The port of a scheme where a URL names none.
 PORTS: Final = {"http": 80, "https": 443}
 _BLANK: Final = re.compile(r"[\x00-\x20\x7f]")
 _NAME: Final = re.compile(r"[a-z0-9._~-]+")
 _SCHEME: Final = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")
+# Names of the machine itself, which differ all the same: one may be forwarded elsewhere.
+_HERE: Final = frozenset({"localhost", "127.0.0.1", "::1"})
 _MOST_OCTETS: Final = 32 * 1024 * 1024
 
 
@@ -115,7 +117,9 @@ class Trust:
         if (wanted.host, wanted.port) in self._hosts or (wanted.host, None) in self._hosts:
             return ""
         flag = f"[{wanted.host}]" if ":" in wanted.host else wanted.host
-        return f"it is on another server; --trust-host {flag}:{wanted.port} allows that"
+        alike = next((one.host for one, _ in known if {one.host, wanted.host} <= _HERE and one.host != wanted.host), "")
+        names = f", as {alike} and {wanted.host} are different names" if alike else ""
+        return f"it is on another server{names}; --trust-host {flag}:{wanted.port} allows that"
 
     def trusts(self, url: str) -> bool:
         """Return whether a URL is on a server to which credentials may go."""
@@ -144,6 +148,14 @@ def is_same(one: str, other: str) -> bool:
         return Origin.of(one) == Origin.of(other)
     except ValueError:
         return False
+
+
+def joined(base: str, reference: str) -> str:
+    """Return a reference as a URL; one that is none, as it is."""
+    try:
+        return urljoin(base, reference)
+    except ValueError:
+        return reference
 
 
 def server_of(url: str) -> str:

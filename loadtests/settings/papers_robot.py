@@ -8,6 +8,7 @@ import msgspec
 from conformance.commandline.secret_file import read_secret
 from conformance.packs.table1.statement import Statement
 from conformance.statement.endpoints import Endpoints
+from conformance.transport.reach import trusted_host
 from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import bridge_endpoint
@@ -76,8 +77,12 @@ def _check_endpoints(endpoints: Endpoints) -> None:
                 Endpoint.parse(location)
         if endpoints.ca_file:
             tls_context(Path(endpoints.ca_file))
+        for host in endpoints.trust_hosts:
+            trusted_host(host)
     except EndpointError as error:
         raise SettingsError(str(error)) from None
+    except ValueError as error:
+        raise SettingsError(f"--trust-host: {error}") from None
 
 
 def _interfaces(options: CliOptions, endpoints: Endpoints) -> tuple[str, ...]:

@@ -6,12 +6,13 @@ from collections import defaultdict
 from collections.abc import Iterable
 from http import HTTPStatus
 from typing import Any, Final
-from urllib.parse import unquote, urljoin, urlsplit
+from urllib.parse import unquote, urlsplit
 
 from conformance.api.rest.values import IDS
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
 from conformance.transport.exchange import Exchange
+from conformance.transport.reach import is_same, joined
 
 # As many ids, paths and operations a line of the summary names; the result has all.
 _NAMED: Final = 3
@@ -75,7 +76,8 @@ class LeftBehind:
         if operation.method != "POST":
             return ""
         if location and answer.status == HTTPStatus.CREATED:
-            made = urlsplit(urljoin(exchange.request.url, location)).path
+            target = joined(exchange.request.url, location)
+            made = urlsplit(target).path if is_same(target, exchange.request.url) else ""
             return made.removeprefix(urlsplit(self._base_url).path.rstrip("/"))
         if answer.status != HTTPStatus.CREATED and operation.template.rstrip("/") not in self._collections:
             return ""
