@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from os.path import normpath
 from pathlib import Path
 from typing import Any, Final
-from urllib.parse import urljoin, urlsplit
+from urllib.parse import urlsplit
 
 from conformance.contract.document_text import parsed
 from conformance.documents.description_faults import unresolved
@@ -22,7 +22,7 @@ from conformance.documents.schema_words import in_one_version
 from conformance.documents.sent_parameters import not_called, with_sent
 from conformance.documents.swagger import as_openapi_3
 from conformance.documents.unreadable_parts import without_unreadable
-from conformance.transport.reach import ElsewhereError, Trust, is_same, joined
+from conformance.transport.reach import ElsewhereError, Trust, is_same, joined, path_of
 
 # All files of a description together: their number, their octets, and the time to fetch them, s.
 _MOST_FILES: Final = 5_000
@@ -228,7 +228,7 @@ class _Bundle:
         file, _, pointer = reference.partition("#")
         if not file:
             return f"{root}{self._pointer(location, pointer)}"
-        target = file if is_url(file) else urljoin(location, file)
+        target = file if is_url(file) else joined(location, file)
         if not is_url(location) and not is_url(file):
             target = file if _SCHEME.match(file) else normpath(Path(location).parent / file)
         if target == (self.source if is_url(self.source) else normpath(self.source)):
@@ -270,7 +270,7 @@ def _base_url(source: str, document: Schema, trust: Trust) -> tuple[str, tuple[s
     known = [one for one in wholes if is_same(one, source)] or [one for one in wholes if trust.trusts(one)]
     if known:
         return trust.place(known[0]).partition("?")[0].rstrip("/"), ()
-    here = f"{urlsplit(source).scheme}://{urlsplit(source).netloc}{urlsplit(wholes[0]).path}".rstrip("/")
+    here = f"{urlsplit(source).scheme}://{urlsplit(source).netloc}{path_of(wholes[0])}".rstrip("/")
     remark = (
         f"The description names the server {wholes[0]}. Tested was {here}, from where it was read; --base-url changes "
         "that."

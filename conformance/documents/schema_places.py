@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any, Final
-from urllib.parse import unquote, urldefrag, urljoin
+from urllib.parse import unquote
+
+from conformance.transport.reach import joined
 
 #: Where the contents of other files stand in a description that has been made one document.
 FILES: Final = "x-roaas-files"
@@ -85,7 +87,7 @@ def make_plain(document: Any, location: str) -> dict[str, str]:  # noqa: C901 - 
     Returns:
         The pointer of each anchor that other files may refer to.
     """
-    base = urljoin(location, document.get("$self", "")) if isinstance(document, dict) else location
+    base = joined(location, document.get("$self", "")) if isinstance(document, dict) else location
     bases = {"": base}
     anchors: dict[tuple[str, str], str] = {}
     dynamic: dict[str, list[str]] = {}
@@ -102,7 +104,7 @@ def make_plain(document: Any, location: str) -> dict[str, str]:  # noqa: C901 - 
         own = _base_of(pointer, bases)
         schema.pop("$schema", None)
         if isinstance(given := schema.pop("$id", None), str):
-            bases[pointer] = own = urljoin(own, urldefrag(given)[0])
+            bases[pointer] = own = joined(own, given.partition("#")[0])
             roots[own] = pointer
         for word in ("$anchor", "$dynamicAnchor"):
             if isinstance(name := schema.pop(word, None), str):
@@ -113,7 +115,7 @@ def make_plain(document: Any, location: str) -> dict[str, str]:  # noqa: C901 - 
     for schema, own in placed:
         wanted = schema.pop("$dynamicRef", None)
         if isinstance(wanted, str):
-            named = dynamic.get(urldefrag(wanted)[1], [])
+            named = dynamic.get(wanted.partition("#")[2], [])
             if len(named) < 2:  # noqa: PLR2004 - of several, the caller decides
                 schema["$ref"] = f"#{named[0]}" if named else wanted
         if isinstance(schema.get("$ref"), str):
@@ -132,7 +134,9 @@ def _base_of(pointer: str, bases: dict[str, str]) -> str:
 
 def _by_pointer(reference: str, base: str, roots: dict[str, str], anchors: dict[tuple[str, str], str]) -> str:
     """Return a reference to a schema of the same document as a JSON pointer; another one as it is."""
-    uri, fragment = urldefrag(urljoin(base, reference)) if not reference.startswith("#") else (base, reference[1:])
+    uri, fragment = base, reference[1:]
+    if not reference.startswith("#"):
+        uri, _, fragment = joined(base, reference).partition("#")
     if uri not in roots:
         return reference
     if fragment and not fragment.startswith("/"):

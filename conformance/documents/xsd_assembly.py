@@ -10,12 +10,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
-from urllib.parse import urljoin
 
 from lxml import etree
 
 from conformance.documents.xml_names import XSD, clark, local, namespace
 from conformance.documents.xsd_unknown import Component, allow_anything, stand_ins
+from conformance.transport.reach import joined
 
 _IMPORT, _INCLUDE = clark(XSD, "import"), clark(XSD, "include")
 _REDEFINE: Final = (clark(XSD, "redefine"), clark(XSD, "override"))
@@ -77,7 +77,7 @@ class Assembly:
 def resolved(place: str, reference: str) -> str:
     """Return a reference in a document as a location, without "." and ".."."""
     if "://" in reference or "://" in place:
-        return urljoin(place, reference)
+        return joined(place, reference)
     return os.path.normpath(Path(place).parent / reference)
 
 

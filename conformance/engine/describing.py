@@ -113,7 +113,7 @@ def _check_server(source: str, base: str, endpoints: Endpoints, connection: Conn
     if not is_url(source) and (secret or endpoints.api_key_file) and not trusting(connection).trusts(base):
         raise DescriptionError(
             f"{source} names the server {base}, and no description decides where credentials go: name the server "
-            f"yourself, as by --base-url {base}"
+            f"yourself, as by --base-url {base}, or allow it by --trust-host {urlsplit(base).netloc.rpartition('@')[2]}"
         )
 
 

@@ -16,7 +16,7 @@ from conformance.documents.openapi import Operation, operations_of
 from conformance.scenarios.scenario import NotPossibleError, NotSeenError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange, NoAnswerError
-from conformance.transport.reach import is_same, joined
+from conformance.transport.reach import is_same, joined, path_of
 
 _CREATED = 201
 
@@ -103,7 +103,7 @@ def _path_of(created: Exchange, create: Operation, read: Operation) -> str:
     if location:
         target = joined(created.request.url, location)
         below = urlsplit(created.request.url).path.removesuffix(create.template)
-        return urlsplit(target).path.removeprefix(below) if is_same(target, created.request.url) else ""
+        return path_of(target).removeprefix(below) if is_same(target, created.request.url) else ""
     value: Any = read_json(created.response.body).value
     members = value if isinstance(value, dict) else {}
     id_ = next((members[name] for name in IDS if isinstance(members.get(name), str | int)), None)

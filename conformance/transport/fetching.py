@@ -38,13 +38,9 @@ class Fetcher:
         connection: deadline, credentials and TLS.
         trust: the servers that get the credentials.
         public: further URLs that the user named; their servers get no credentials.
-
-    Attributes:
-        refused: the URLs that were not fetched because of their server, each with the reason.
     """
 
     def __init__(self, connection: Connection, trust: Trust, public: Iterable[str] = ()) -> None:
-        self.refused: dict[str, str] = {}
         self._connection, self._trust = connection, trust
         self._guard = _Guard(connection, trust, Trust.of(*public))
         self._silent: dict[str, str] = {}
@@ -61,7 +57,6 @@ class Fetcher:
         try:
             server = httpx.URL(self._guard.place(url)[0]).netloc.decode("ascii")
         except (ElsewhereError, httpx.InvalidURL) as error:
-            self.refused[url] = str(error)
             raise ElsewhereError(str(error)) from error
         if server in self._silent:
             raise UnreachableError(f"{url}: {self._silent[server]}")
@@ -82,8 +77,6 @@ class Fetcher:
         if isinstance(found, httpx.TransportError):
             self._silent[server] = _worded(found, seconds)
             raise UnreachableError(f"{url}: {self._silent[server]}") from found
-        if isinstance(found, ElsewhereError):
-            self.refused[url] = str(found)
         raise found
 
     def _outcome(self, url: str) -> bytes | Exception:

@@ -158,6 +158,14 @@ def joined(base: str, reference: str) -> str:
         return reference
 
 
+def path_of(url: str) -> str:
+    """Return the path of a URL; an empty text for what is none."""
+    try:
+        return urlsplit(url).path
+    except ValueError:
+        return ""
+
+
 def server_of(url: str) -> str:
     """Return scheme, host and port of a URL as they are written."""
     parts = urlsplit(url)
@@ -211,7 +219,7 @@ class Folder:
         return octets
 
     def _is_named(self, file: Path) -> bool:
-        return any(str(file) == one or (Path(one).is_dir() and _is_inside(file, Path(one))) for one in self.named)
+        return any(file == Path(one) or (Path(one).is_dir() and _is_inside(file, Path(one))) for one in self.named)
 
 
 def _is_inside(file: Path, folder: Path) -> bool:

@@ -17,7 +17,7 @@ from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.documents.description import DescriptionError, is_url
 from conformance.documents.openapi import Operation, operations_of
 from conformance.engine.connecting import connection_of
-from conformance.engine.describing import is_wsdl, soap_contract
+from conformance.engine.describing import is_wsdl, soap_contract, trusting
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.motion_map import shape_of
@@ -176,7 +176,8 @@ class Device:
             SettingsError: the WSDL cannot be used.
             CallError: its server does not respond.
         """
-        said, connection = self.statement, replace(self.api.client.connection, permit=lambda *_: "")
+        said, known = self.statement, self.api.client.connection
+        connection = replace(known, permit=lambda *_: "", trust=trusting(known, wsdl))
         where = msgspec.structs.replace(said.endpoints, rest=None)
         try:
             with TemporaryDirectory(prefix="roaas-load-") as folder:

@@ -153,6 +153,35 @@ def test_an_openapi_description_leads_nowhere_else(pointer, device, elsewhere, t
         assert any("names the server" in one for one in remarks), remarks
 
 
+BROKEN = [
+    "http://[",
+    "//[",
+    "http://[::1",
+    "https://a:b/",
+    "\\\\x",
+    "?",
+    "http://",
+    "\0",
+    "é.json",
+    "mailto:x",
+    "x" * 5000,
+]
+
+
+@pytest.mark.parametrize("pointer", BROKEN)
+def test_a_pointer_that_is_no_url_is_survived(pointer, device, tmp_path):
+    named = {"a": {"$id": pointer, "$ref": "x"}, "b": {"$ref": pointer}, "c": {"$ref": f"x#{pointer}"}}
+    whole = openapi(servers=[{"url": pointer}], components={"schemas": named}, **{"$self": pointer})
+    device.answers["/openapi.json"] = document(whole)
+    (tmp_path / "openapi.json").write_text(json.dumps(whole))
+    for source in (f"{device.url}/openapi.json", str(tmp_path / "openapi.json")):
+        _, where, _ = described_contract(source, (), device.url, Endpoints(), connection(), tmp_path / "out")
+        assert where.rest == device.url
+    types = f'<xs:import namespace="urn:else" schemaLocation="{pointer.strip(chr(0))}"/>'
+    device.answers["/camera.wsdl"] = document(camera(types, f"{device.url}/camera"), "text/xml")
+    assert soap_contract(f"{device.url}/camera.wsdl", None, Endpoints(), connection(), tmp_path)[1].rest == device.url
+
+
 @pytest.mark.parametrize("pointer", WSDL)
 def test_a_wsdl_leads_nowhere_else(pointer, device, elsewhere, tmp_path):
     types, imports, address = written(WSDL[pointer], device, elsewhere)

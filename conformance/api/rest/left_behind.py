@@ -12,7 +12,7 @@ from conformance.api.rest.values import IDS
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
 from conformance.transport.exchange import Exchange
-from conformance.transport.reach import is_same, joined
+from conformance.transport.reach import is_same, joined, path_of
 
 # As many ids, paths and operations a line of the summary names; the result has all.
 _NAMED: Final = 3
@@ -77,7 +77,7 @@ class LeftBehind:
             return ""
         if location and answer.status == HTTPStatus.CREATED:
             target = joined(exchange.request.url, location)
-            made = urlsplit(target).path if is_same(target, exchange.request.url) else ""
+            made = path_of(target) if is_same(target, exchange.request.url) else ""
             return made.removeprefix(urlsplit(self._base_url).path.rstrip("/"))
         if answer.status != HTTPStatus.CREATED and operation.template.rstrip("/") not in self._collections:
             return ""

@@ -1,7 +1,6 @@
 """Targets: unknown paths, trailing slashes, and targets and fields that are too long."""
 
 from functools import partial
-from urllib.parse import urljoin, urlsplit
 
 import pytest
 
@@ -16,6 +15,7 @@ from conformance.documents.resources import inside_prefix, known_path, resources
 from conformance.transport import raw
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError
+from conformance.transport.reach import joined, path_of
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
@@ -68,8 +68,8 @@ def _leads_nowhere(api: RestInterface, exchange: Exchange) -> bool:
     location = exchange.response.header("location")
     if exchange.response.status not in {301, 302, 303, 307, 308} or location is None:
         return False
-    target = urljoin(exchange.request.url, location)
-    path = urlsplit(target).path.removeprefix(api.client.prefix)
+    target = joined(exchange.request.url, location)
+    path = path_of(target).removeprefix(api.client.prefix)
     return not target.startswith(api.client.base_url) or not known_path(api.run.contract, path)
 
 
@@ -100,7 +100,7 @@ def test_trailing_slash(api: RestInterface, rest: HttpClient, judge: Judge) -> N
 
 def _leads_to(exchange: Exchange, path: str) -> bool:
     location = exchange.response.header("location")
-    return location is not None and urlsplit(urljoin(exchange.request.url, location)).path == path
+    return location is not None and path_of(joined(exchange.request.url, location)) == path
 
 
 @pytest.mark.requirement("http/uri-too-long", "http/declared-body")
