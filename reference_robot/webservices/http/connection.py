@@ -96,7 +96,9 @@ class HttpConnection(PacedConnection):
         else:
             self._after_head += len(data)
         try:
-            self._parse(data)
+            self._parser.feed_data(data)
+        except HttpParserUpgrade as stopped:
+            self._ignore_upgrade(data[stopped.args[0] :])
         except HttpParserCallbackError as error:
             problem = error.__context__
             self._refuse(problem if isinstance(problem, Problem) else no_request(problem or error))
@@ -108,24 +110,19 @@ class HttpConnection(PacedConnection):
                 if self._after_head > FRAMING_LIMIT + FRAMING_PER_BYTE * self._received:
                     self._refuse(framing_too_large())
 
-    def _parse(self, data: bytes | memoryview) -> None:
-        """Feed bytes to the parser; ignore offers to upgrade (RFC 9110 7.8).
+    def _ignore_upgrade(self, rest: bytes) -> None:
+        """Continue after the head of a request that offers an upgrade, or of CONNECT (RFC 9110 7.8).
 
-        After the head of a request that offers an upgrade, or of CONNECT, the parser stops, because data of another
-        protocol may follow. The robot supports none. So a new parser gets a head that has only the framing of the
-        request's body, and then what follows. Java's HttpClient offers h2c with every first request.
+        The parser stops there, because data of another protocol may follow. The robot supports none. So a new parser
+        gets a head that has only the framing of the request's body, and then what follows. Java's HttpClient offers h2c
+        with every first request.
         """
-        while True:
-            try:
-                self._parser.feed_data(data)
-            except HttpParserUpgrade as stopped:
-                data = memoryview(data)[stopped.args[0] :]
-                self._parser = HttpRequestParser(self)
-                headers = self._request.headers if self._request is not None else {}
-                framing = [b"%b: %b\r\n" % (name, headers[name]) for name in FRAMING_FIELDS if name in headers]
-                self._parser.feed_data(b"POST / HTTP/1.1\r\nhost: a\r\n%b\r\n" % b"".join(framing))
-            else:
-                return
+        self._parser = HttpRequestParser(self)
+        headers = self._request.headers if self._request is not None else {}
+        framing = [b"%b: %b\r\n" % (name, headers[name]) for name in FRAMING_FIELDS if name in headers]
+        self._parser.feed_data(b"POST / HTTP/1.1\r\nhost: a\r\n%b\r\n" % b"".join(framing))
+        if rest:
+            self._take(rest)
 
     # Callbacks of the parser; an exception stops it
 

@@ -37,7 +37,7 @@ async def serve(
     """
     listener.listen(_BACKLOG)
     accepting = _Accepting(port, listener, context)
-    accepting.resume()
+    await accepting.begin()
     ticking = port.loop.create_task(_tick(port))
     started.set()
     await stop.wait()
@@ -54,24 +54,38 @@ class _Accepting:
     """Accepts connections, many at a time.
 
     ``create_server`` accepts one connection in each turn of the event loop. New clients would wait behind the
-    connections of a client that opens many.
+    connections of a client that opens many. So whenever it has accepted one, this class accepts those that wait, too.
     """
 
     def __init__(self, port: Port, listener: socket.socket, context: ssl.SSLContext | None) -> None:
         self._port = port
         self._listener = listener
         self._context = context
+        self._server: asyncio.Server | None = None
         self._tasks: set[asyncio.Task[Any]] = set()
 
-    def resume(self) -> None:
+    async def begin(self) -> None:
         """Accept connections from now on."""
-        if self._listener.fileno() >= 0:
-            self._port.loop.add_reader(self._listener, self._accept)
+        if self._context is None:
+            self._server = await self._port.loop.create_server(self._accepted, sock=self._listener, backlog=_BACKLOG)
+        else:
+            self._resume()
 
     def end(self) -> None:
         """Accept no more connections."""
-        self._port.loop.remove_reader(self._listener)
-        self._listener.close()
+        if self._server is not None:
+            self._server.close()
+        else:
+            self._port.loop.remove_reader(self._listener)
+            self._listener.close()
+
+    def _resume(self) -> None:
+        if self._listener.fileno() >= 0:
+            self._port.loop.add_reader(self._listener, self._accept)
+
+    def _accepted(self) -> HttpConnection:
+        self._accept()
+        return HttpConnection(self._port)
 
     def _accept(self) -> None:
         for _ in range(_AT_ONCE):
@@ -81,8 +95,9 @@ class _Accepting:
                 return
             except OSError as error:  # no file descriptor is left, or the client has disconnected
                 _LOGGER.warning("cannot accept a connection: %s", error)
-                self._port.loop.remove_reader(self._listener)
-                self._port.loop.call_later(_PAUSE, self.resume)
+                if self._context is not None:
+                    self._port.loop.remove_reader(self._listener)
+                    self._port.loop.call_later(_PAUSE, self._resume)
                 return
             client.setblocking(False)  # noqa: FBT003 - the standard library's signature
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
