@@ -33,6 +33,8 @@ _SCHEME: Final = "roaas-lazy:"
 _LAZY: Final[list[tuple[Schema, str]]] = []
 _LAZY_NUMBERS: Final[dict[tuple[int, str], int]] = {}
 _VALUES: Final = frozenset({"example", "examples", "default", "enum", "const"})
+_DATA: Final = frozenset({"enum", "const"})
+_NAMING: Final = frozenset({"properties", "patternProperties", "dependentSchemas", "$defs", "definitions", "schemas"})
 _CONSTRAINTS: Final = frozenset(
     {
         "type", "enum", "const", "properties", "required", "items", "prefixItems", "additionalProperties", "allOf",
@@ -93,7 +95,8 @@ class _Resolver:
         self._nodes = 0
         self._alone = str(document.get("openapi", "")).startswith("3.0")
 
-    def copy(self, value: Any, trail: tuple[str, ...]) -> Any:
+    def copy(self, value: Any, trail: tuple[str, ...], *, names: bool = False) -> Any:
+        """Copy a part; ``names``: its keys are names that the author gave, and no words of JSON Schema."""
         self._nodes += 1
         if isinstance(value, list):
             return [self.copy(item, trail) for item in value]
@@ -101,9 +104,9 @@ class _Resolver:
             return value
         if isinstance(value.get("$ref"), str):
             return self._referred(value, value["$ref"], trail)
-        # The values of an enum are data, whatever they look like.
+        # The values of an enum or a const are data, whatever they look like.
         return {
-            key: item if key == "enum" and isinstance(item, list) else self.copy(item, trail)
+            key: item if key in _DATA and not names else self.copy(item, trail, names=key in _NAMING and not names)
             for key, item in value.items()
         }
 

@@ -211,15 +211,23 @@ def projected(value: Any, schema: Schema) -> Any:
     return {name: projected(item, properties[name]) for name, item in value.items() if name in properties}
 
 
-def flat(schema: Schema) -> Schema:
-    """Return a schema with the properties of its allOf, or of its first alternative, merged into it."""
-    schema = whole(schema)
+def flat(schema: Schema, within: frozenset[str] = frozenset()) -> Schema:
+    """Return a schema with the properties of its allOf, or of its first alternative, merged into it.
+
+    Args:
+        schema: the schema.
+        within: references that are being merged; a schema that combines itself adds nothing to itself.
+    """
+    reference = str(schema.get("$ref", ""))
+    if reference and reference in within:
+        return {}
+    within, schema = within | {reference}, whole(schema)
     if _COMBINING.isdisjoint(schema):
         return schema
     parts = [*schema.get("allOf", ()), *schema.get("oneOf", ())[:1], *schema.get("anyOf", ())[:1]]
     result = {key: item for key, item in schema.items() if key not in _COMBINING}
     for part in parts:
-        inner = flat(part)
+        inner = flat(part, within)
         properties = {**inner.get("properties", {}), **result.get("properties", {})}
         for name in inner.get("properties", {}).keys() & result.get("properties", {}).keys():
             one, other = inner["properties"][name], result["properties"][name]

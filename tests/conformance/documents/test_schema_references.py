@@ -9,6 +9,7 @@ from conformance.contract.document_text import parsed
 from conformance.documents.description import read_description
 from conformance.documents.json_schema import shape_of
 from conformance.documents.openapi import read_operations
+from conformance.documents.representation import flat
 
 BASE = "http://device.invalid/"
 
@@ -93,6 +94,29 @@ def test_the_place_below_a_recursive_schema_is_named() -> None:
 def test_openapi_3_0_ignores_constraints_beside_a_reference() -> None:
     schema, named = {"$ref": "#/components/schemas/N", "required": ["b"]}, {"N": {"required": ["a"]}}
     assert _problem({"a": 1}, _document(schema, named, "3.0.3")) == ""
+
+
+@pytest.mark.parametrize("value", [{"$ref": "elsewhere.json#/a"}, {"a": {"$ref": "#/nowhere"}}, [{"$ref": "#/paths"}]])
+def test_a_constant_is_data_though_it_looks_like_a_reference(value: Any) -> None:
+    document = _document(
+        {"oneOf": [{"const": value}, {"enum": [value, 1]}]}, {"const": {"$ref": "#/components/schemas/T"}, **TREE}
+    )
+    operation = read_operations(document, closed=True)[0]
+    assert shape_of(operation.responses["200"]["application/json"]).holds(1)
+
+
+def test_a_property_named_const_is_a_schema() -> None:
+    document = _document({"properties": {"const": {"$ref": "#/components/schemas/T"}}}, TREE)
+    assert not _problem({"const": {"v": 1}}, document)
+    assert _problem({"const": {"v": "a"}}, document)
+
+
+@pytest.mark.parametrize("word", ["allOf", "oneOf", "anyOf"])
+def test_a_schema_that_combines_itself_can_be_merged(word: str) -> None:
+    itself = {"type": "object", "properties": {"n": {"type": "integer"}}, word: [{"$ref": "#/components/schemas/A"}]}
+    schema = read_operations(_document({"$ref": "#/components/schemas/A"}, {"A": itself}), closed=False)[0]
+    merged = flat(schema.responses["200"]["application/json"])
+    assert merged["properties"] == {"n": {"type": "integer"}}
 
 
 def test_files_refer_to_each_other_by_anchor_and_to_themselves() -> None:
