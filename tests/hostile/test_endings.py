@@ -349,3 +349,29 @@ def test_a_replay_that_is_killed_leaves_the_robot_at_rest(tmp_path):
         assert resting.wait(60)
     assert seen[0] == pytest.approx(0.3)
     assert not any(seen[1:])
+
+
+def test_the_runs_of_a_fleet_that_is_killed_end_in_order(tmp_path):
+    device, out = Mover(), tmp_path / "out"
+    with small_device(DESCRIPTION, device.routes) as url:
+        statement = _statement(tmp_path, url)
+        fleet = tmp_path / "fleet.toml"
+        fleet.write_text(f'[[robot]]\nname = "cart"\nstatement = "{statement.name}"\n', encoding="utf-8")
+        command = (
+            *_CERTIFY,
+            "--fleet",
+            fleet,
+            "--allow-motion",
+            "--effort",
+            "quick",
+            "--class",
+            "motion",
+            "--out",
+            out,
+        )
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, text=True) as process:
+            assert device.await_that(_drives(1), process)
+            process.kill()
+        path = out / "robots/cart/result.json"
+        assert device.await_that(lambda _: "the end of its parent process" in path.read_text(encoding="utf-8"))
+        assert device.velocity == 0
