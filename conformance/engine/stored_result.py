@@ -50,6 +50,10 @@ class _WebServer(msgspec.Struct):
     requirements: list[_Requirement] = []
 
 
+class _Target(msgspec.Struct):
+    rest: str | None = None
+
+
 class _Result(msgspec.Struct):
     """What a replay reads of a result."""
 
@@ -57,7 +61,9 @@ class _Result(msgspec.Struct):
     web_server: _WebServer | None = None
     suite: dict[str, Any] = {}
     pack: dict[str, Any] = {}
-    target: dict[str, Any] = {}
+    target: _Target = msgspec.field(default_factory=_Target)
+    statement: dict[str, Any] = {}
+    classes: dict[str, str] = {}
     seed: Annotated[int, msgspec.Meta(ge=0)] | None = None
     effort: str | None = None
 
