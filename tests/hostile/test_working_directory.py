@@ -81,13 +81,13 @@ def test_no_conftest_above_the_checks_is_run(place, tmp_path):
 
 
 def test_every_python_that_the_product_starts_ignores_the_working_directory():
-    """`-m` searches the working directory first, unless `-P` stands before it."""
+    """`-m` searches the working directory first, unless `-P` or `-I` stands before it; a script does not."""
     root, started = Path(__file__).parents[2], 0
     for room in ("conformance", "loadtests", "reference_robot", "reports"):
         for file in sorted((root / room).rglob("*.py")):
             words = file.read_text(encoding="utf-8").split("sys.executable,")
             for before, after in itertools.pairwise(words):
                 started += 1
-                is_script = after.lstrip().startswith("str(Path")
-                assert is_script or after.lstrip().startswith('"-P"'), f"{file}:{before.count(chr(10)) + 1}"
+                isolated = after.lstrip().startswith(('"-P"', '"-I"', "str(Path"))
+                assert isolated, f"{file}:{before.count(chr(10)) + 1}"
     assert started > 5
