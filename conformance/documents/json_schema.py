@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 Schema = dict[str, Any]
 # So many nodes of a document, and references one behind the other, are copied before the others stay lazy references.
-_MOST_NODES: Final = 10_000
+_MOST_NODES: Final = 2_000
 _DEEPEST: Final = 8
 _SCHEME: Final = "roaas-lazy:"
 _LAZY: Final[list[tuple[Schema, str]]] = []
@@ -334,29 +334,36 @@ def _further(validator: Any, schema: Any, instance: Any, beside: Schema) -> Iter
 
 def bundled(schema: Schema) -> Schema:
     """Return a schema with what its lazy references lead to below ``$defs``; one without any as it is."""
-    found: dict[str, Any] = {}
-
-    def local(value: Any) -> Any:
-        if isinstance(value, list):
-            return [local(item) for item in value]
-        if not isinstance(value, dict):
-            return value
-        result = {key: local(item) for key, item in value.items()}
-        uri = value.get("$ref")
-        if isinstance(uri, str) and uri.startswith(_SCHEME):
-            name = uri.removeprefix(f"{_SCHEME}/")
-            if name not in found:
-                found[name] = {}
-                waiting.append(uri)
-            result["$ref"] = f"#/$defs/{name}"
-        return result
-
     waiting: list[str] = []
-    result: Schema = local(schema)
+    result: Schema = _local(schema, waiting)
+    found: dict[str, Any] = {}
     while waiting:
         uri = waiting.pop()
-        found[uri.removeprefix(f"{_SCHEME}/")] = local(_lazy(uri))
+        if (name := uri.removeprefix(f"{_SCHEME}/")) not in found:
+            found[name], more = _localized(uri)
+            waiting += more
     return {**result, "$defs": found} if found else schema
+
+
+def _local(value: Any, uris: list[str]) -> Any:
+    """Return a copy of a schema whose lazy references lead below ``$defs``, and add their URIs to a list."""
+    if isinstance(value, list):
+        return [_local(item, uris) for item in value]
+    if not isinstance(value, dict):
+        return value
+    result = {key: _local(item, uris) for key, item in value.items()}
+    uri = value.get("$ref")
+    if isinstance(uri, str) and uri.startswith(_SCHEME):
+        uris.append(uri)
+        result["$ref"] = f"#/$defs/{uri.removeprefix(f'{_SCHEME}/')}"
+    return result
+
+
+@lru_cache(maxsize=4096)
+def _localized(uri: str) -> tuple[Any, tuple[str, ...]]:
+    """Return the schema of a lazy reference as `bundled` has it, and the URIs that it refers to; many share it."""
+    uris: list[str] = []
+    return _local(_lazy(uri), uris), tuple(uris)
 
 
 def _unevaluated(validator: Any, schema: Any, instance: Any, beside: Schema) -> Iterator[ValidationError]:
@@ -504,12 +511,16 @@ def _described(error: ValidationError, where: str) -> str:
 
 
 _SHAPES: dict[int, Shape] = {}
+# Each keeps its schema, which may be large and made for one question.
+_MOST_SHAPES: Final = 400
 
 
 def shape_of(schema: Schema) -> Shape:
     """Return the Shape of a schema, cached by the schema object."""
     shape = _SHAPES.get(id(schema))
     if shape is None or shape.schema is not schema:
+        if len(_SHAPES) >= _MOST_SHAPES:
+            _SHAPES.clear()
         shape = _SHAPES[id(schema)] = Shape(schema)
     return shape
 

@@ -11,9 +11,10 @@ from conformance.documents.pattern_python import for_python
 from conformance.documents.representation import discriminator_of, flat
 
 _DEPTH = 6
-# A value with so many members and items gets no more optional members; with so many more, it gets nothing else.
-_ENOUGH = 2_000
-_MOST = 20_000
+# A value gets about so many optional members in all, and so many members and items that it must have. Each has an
+# equal share of both for its own members, as schemas that refer to each other in many ways have no end.
+_OPTIONAL = 1_000
+_REQUIRED = 20_000
 #: A value of each format that JSON Schema and OpenAPI name.
 FORMATS: Mapping[str, str] = {
     "uuid": "3fa85f64-5717-4562-b3fc-2c963f66afa6",
@@ -47,12 +48,11 @@ def sample(schema: Schema, depth: int = 0, *, whole: bool = False) -> Any:
         depth: how deep the value lies in another one.
         whole: whether objects get their optional members too.
     """
-    return _made(schema, depth, [_ENOUGH], whole=whole)
+    return _made(schema, depth, (_OPTIONAL, _REQUIRED), whole=whole)
 
 
-def _made(schema: Schema, depth: int, room: list[int], *, whole: bool) -> Any:
-    """Return a value; ``room`` holds how many more members and items it may have."""
-    room[0] -= 1
+def _made(schema: Schema, depth: int, room: tuple[int, int], *, whole: bool) -> Any:
+    """Return a value with room for so many optional members, and so many others."""
     schema = flat(_not_null(schema))
     named = [schema[key] for key in ("example", "const", "default") if key in schema]
     named += [value for key in ("examples", "enum") if isinstance(schema.get(key), list) for value in schema[key]]
@@ -90,15 +90,19 @@ def _not_null(schema: Schema) -> Schema:
     return {**schema, **{key: parts for key, parts in kept.items() if parts}}
 
 
-def _object(schema: Schema, depth: int, room: list[int], *, whole: bool) -> dict[str, Any]:
+def _object(schema: Schema, depth: int, room: tuple[int, int], *, whole: bool) -> dict[str, Any]:
     properties = schema.get("properties", {})
     required = [name for name in schema.get("required", ()) if not properties.get(name, {}).get("readOnly")]
     optional = [name for name in properties if name not in required and not properties[name].get("readOnly")]
-    made: dict[str, Any] = {}
-    for name in required + (optional if whole else []) if depth < _DEPTH else []:
-        if room[0] > 0 or (name in required and room[0] > -_MOST):
-            made[name] = _made(properties.get(name, {}), depth + 1, room, whole=whole)
+    names = required if len(required) <= room[1] and depth < _DEPTH else []
+    names = names + optional if whole and len(names) + len(optional) <= room[0] and depth < _DEPTH else names
+    share = _share(room, len(names))
+    made = {name: _made(properties.get(name, {}), depth + 1, share, whole=whole) for name in names}
     return {**made, **_discriminating(schema, made)}
+
+
+def _share(room: tuple[int, int], count: int) -> tuple[int, int]:
+    return room[0] // max(1, count), room[1] // max(1, count)
 
 
 def _discriminating(schema: Schema, made: dict[str, Any]) -> dict[str, Any]:
@@ -107,15 +111,14 @@ def _discriminating(schema: Schema, made: dict[str, Any]) -> dict[str, Any]:
     return {name: known[0]} if known and name in made and made[name] not in known else {}
 
 
-def _array(schema: Schema, depth: int, room: list[int], *, whole: bool) -> list[Any]:
+def _array(schema: Schema, depth: int, room: tuple[int, int], *, whole: bool) -> list[Any]:
     prefix = schema.get("prefixItems", [])
     least = max(int(schema.get("minItems", 0)), 1 if whole else 0)
     items = [_made(part, depth + 1, room, whole=False) for part in prefix]
     rest = schema.get("items") if isinstance(schema.get("items"), dict) else {}
-    for _ in range(min(least, schema.get("maxItems", least), 64) - len(items)):
-        if room[0] <= -_MOST:
-            break
-        item = _made(rest or {}, depth + 1, room, whole=False)
+    count = min(least, schema.get("maxItems", least), 64, room[1]) - len(items)
+    for _ in range(count):
+        item = _made(rest or {}, depth + 1, _share(room, count), whole=False)
         items.append(_another(rest or {}, item, items) if schema.get("uniqueItems") else item)
     return items
 
