@@ -93,7 +93,7 @@ def test_a_folder_that_takes_no_result_is_found_before_the_first_request(tmp_pat
 
 
 def test_a_run_keeps_others_out_of_its_folder_until_it_ends_or_is_killed(tmp_path):
-    waits, reached = threading.Event(), threading.Event()
+    reached = threading.Event()
 
     async def handle(_: web.Request) -> web.Response:
         reached.set()
@@ -110,7 +110,6 @@ def test_a_run_keeps_others_out_of_its_folder_until_it_ends_or_is_killed(tmp_pat
             first.wait(30)
         assert (tmp_path / LOCK_NAME).exists()
         third = ended(*command)
-    waits.set()
     assert third.returncode == 0, third.stderr
     assert not (tmp_path / LOCK_NAME).exists()
 
