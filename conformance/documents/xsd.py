@@ -29,6 +29,13 @@ _PATTERN: Final = clark(XSD, "pattern")
 _SLOW: Final = re.compile(r"\((?:.*[+*}|].*)\)[+*{]", re.DOTALL)
 
 
+# The compilers build an automaton for each type, of a size that may be the square of its particles; a group counts as
+# often as it is referred to.
+_MOST_PARTICLES: Final = 1_000
+_DEEPEST: Final = 100
+_PARTICLES: Final = tuple(clark(XSD, name) for name in ("element", "any", "attribute", "group", "attributeGroup"))
+
+
 class SchemaError(ValueError):
     """Raised for schemas that do not compile; the message is the compiler's."""
 
@@ -53,6 +60,8 @@ class Types:
         self.is_11 = False
         self._errors = xmlschema.XMLSchemaException
         self._shapes: dict[str, Element | None] = {}
+        if name := _too_large(documents):
+            raise SchemaError(f"{name} has more than {_MOST_PARTICLES:,} elements or attributes, groups included")
         with tempfile.TemporaryDirectory(prefix="roaas-xsd-") as folder:
             try:
                 assembly = assemble(documents, Path(folder))
@@ -143,6 +152,29 @@ class Types:
 
 
 _COMPILED: Final[dict[tuple[tuple[str, bytes], ...], Types]] = {}
+
+
+def _too_large(documents: Sequence[SchemaDocument]) -> str:
+    """Return the name of a type or group that no compiler can be given; empty if there is none."""
+    wholes = [whole for one in documents for whole in one.root.iterchildren(etree.Element)]
+    groups = {(whole.tag, whole.get("name")): whole for whole in wholes}
+    sizes: dict[etree._Element, int] = {}
+
+    def size(whole: etree._Element, depth: int = 0) -> int:
+        if whole not in sizes:
+            sizes[whole] = 1  # of a group within itself
+            total = 0
+            for part in whole.iter(*_PARTICLES):
+                group = groups.get((part.tag, part.get("ref", "").rpartition(":")[2])) if part.get("ref") else None
+                is_group = group is not None and part.tag.endswith("roup") and depth <= _DEEPEST
+                total += size(group, depth + 1) if group is not None and is_group else 1
+                if total > _MOST_PARTICLES:
+                    break
+            sizes[whole] = total
+        return sizes[whole]
+
+    found = next((one for one in wholes if size(one) > _MOST_PARTICLES), None)
+    return "" if found is None else f"{etree.QName(found).localname} {found.get('name')}"
 
 
 def _without_slow_patterns(folder: Path) -> bool:

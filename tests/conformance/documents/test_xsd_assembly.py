@@ -6,7 +6,7 @@ import pytest
 from lxml import etree
 
 from conformance.api.soap.messages import ordinary, unknown_in
-from conformance.documents.soap_services import read_services
+from conformance.documents.soap_services import WsdlError, read_services
 from conformance.documents.wsdl_imports import SchemaFolder
 from conformance.documents.xml_names import XSD
 
@@ -303,3 +303,32 @@ def test_header_parts_and_attachments_of_a_binding():
         assert (operation.request, operation.headers) == ("{urn:t}Get", ("{urn:t}Head",))
         assert remark in operation.remark
         assert bool(operation.remark) is bool(remark)
+
+
+def _nested(kind: str, inner: str) -> str:
+    """Return twelve groups, each of which names the next one ten times, and a type of them."""
+    more = {"group": "<xs:sequence>{}</xs:sequence>", "attributeGroup": "{}"}[kind]
+    parts = [more.format(f'<xs:{kind} ref="t:g{number + 1}"/>' * 10) for number in range(12)] + [more.format(inner)]
+    groups = "".join(f'<xs:{kind} name="g{number}">{part}</xs:{kind}>' for number, part in enumerate(parts))
+    return groups + _got(f'<xs:{kind} ref="t:g0"/>')
+
+
+_OPTIONAL = '<xs:element name="v" type="xs:int" minOccurs="0"/>'
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        _nested("group", _OPTIONAL),
+        _nested("attributeGroup", '<xs:attribute name="a"/>'),
+        _got(f"<xs:sequence>{_OPTIONAL * 3000}</xs:sequence>"),
+    ],
+    ids=["groups", "groups of attributes", "one type"],
+)
+def test_a_type_that_no_compiler_ends_with_is_refused(content: str) -> None:
+    started = time.process_time()
+
+    with pytest.raises(WsdlError, match="more than 1,000 elements or attributes, groups included"):
+        _read(_schema("urn:t", content))
+
+    assert time.process_time() - started < 5
