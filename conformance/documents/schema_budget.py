@@ -33,6 +33,9 @@ _CROWDS: Final = {
     "links": 1_000, "security": 1_000, "servers": 1_000, "encoding": 1_000, "examples": 10_000,
     "securitySchemes": 1_000,
 }  # fmt: skip
+# A generator that follows each reference walks through so many parts, so many references deep.
+_MOST_UNROLLED: Final = 50_000
+_UNROLLED_DEEPEST: Final = 8
 _SEVERAL: Final = ("allOf", "anyOf", "oneOf")
 _ONE: Final = ("not", "if", "then", "else")
 
@@ -213,3 +216,19 @@ def crowd_in(document: Schema) -> str:
                 return f"{place}/{name} has {len(part):,} members; the limit is {most:,}"
             waiting.append((part, f"{place}/{str(name)[:_SHOWN]}"))
     return ""
+
+
+def unrolls(document: Schema, value: Any) -> bool:
+    """Return whether a part of a document has more parts than a generator can walk through, references followed."""
+    waiting, seen = [(value, 0)], 0
+    while waiting and seen <= _MOST_UNROLLED:
+        part, depth = waiting.pop()
+        seen += 1
+        if isinstance(part, dict) and isinstance(part.get("$ref"), str) and depth < _UNROLLED_DEEPEST:
+            try:
+                waiting.append((pointed(document, part["$ref"]), depth + 1))
+            except UnresolvedError:
+                continue
+        inner = part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
+        waiting += [(one, depth) for one in inner if isinstance(one, dict | list)]
+    return seen > _MOST_UNROLLED

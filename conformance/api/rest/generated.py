@@ -27,6 +27,7 @@ from schemathesis.generation.overrides import Override
 from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.contract.pack import Contract
 from conformance.documents.pattern_python import with_python_patterns
+from conformance.documents.schema_budget import unrolls
 from conformance.transport.exchange import Exchange
 
 #: Raised where no case can be made: schemas allow everything or nothing, or Schemathesis does not know a media type.
@@ -69,6 +70,9 @@ class Target:
 
     def covering(self) -> Any:
         """Return an iterable of Schemathesis cases on both sides of each constraint of the schemas."""
+        # Schemathesis follows each reference of each member, in time and memory without bound.
+        if unrolls(self.schema.raw_schema, self.operation.definition.raw):
+            return ()
         config = self.schema.config.generation_for(operation=self.operation, phase="coverage")
         return CoverageGenerator(
             operation=self.operation,
