@@ -446,7 +446,9 @@ class Shape:
         self.schema = schema
         self._quick = validator_of(schema)
         # By such names, jsonschema-rs allows too much.
-        self._is_exact = _are_plain(_patterns_in(bundled(schema), names=True))
+        whole = bundled(schema)
+        self._is_exact = _are_plain(_patterns_in(whole, names=True))
+        self.size = 1 + len(whole.get("$defs", ()))
 
     def problem(self, value: Any, where: str = "") -> str:
         """Return the first violation in ``value``, with its place below ``where``; empty if the value is valid."""
@@ -511,15 +513,15 @@ def _described(error: ValidationError, where: str) -> str:
 
 
 _SHAPES: dict[int, Shape] = {}
-# Each keeps its schema, which may be large and made for one question.
-_MOST_SHAPES: Final = 400
+# Each keeps the schemas that it refers to, compiled for it alone.
+_MOST_SCHEMAS: Final = 20_000
 
 
 def shape_of(schema: Schema) -> Shape:
     """Return the Shape of a schema, cached by the schema object."""
     shape = _SHAPES.get(id(schema))
     if shape is None or shape.schema is not schema:
-        if len(_SHAPES) >= _MOST_SHAPES:
+        if sum(one.size for one in _SHAPES.values()) > _MOST_SCHEMAS:
             _SHAPES.clear()
         shape = _SHAPES[id(schema)] = Shape(schema)
     return shape
