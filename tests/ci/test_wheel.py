@@ -114,7 +114,7 @@ def test_it_certifies_among_modules_of_the_rooms_names(installed, elsewhere):
 def test_processes_that_it_starts_find_the_rooms_as_well(installed, elsewhere):
     script = (
         "import roaas, subprocess, sys; roaas.open_rooms(); import conformance, loadtests; print(conformance.__file__);"
-        "sys.exit(subprocess.call([sys.executable, '-m', 'loadtests.node', '--worker']))"
+        "sys.exit(subprocess.call([sys.executable, '-P', '-m', 'loadtests.node', '--worker']))"
     )
     done = run(installed, elsewhere, "-c", script)
     assert done.stdout.strip() == str(installed / "roaas_rooms" / "conformance" / "__init__.py")
