@@ -1,6 +1,7 @@
 """What a device may answer to hurt whoever reads it, as data, and a server that sends it byte by byte."""
 
 import socket
+import struct
 import threading
 import time
 import zlib
@@ -35,9 +36,16 @@ def _dripping(head: bytes, piece: bytes) -> Callable[[], Iterator[bytes]]:
     return answer
 
 
-def _packed(wbits: int) -> bytes:
-    packer = zlib.compressobj(9, zlib.DEFLATED, wbits)
-    return b"".join(packer.compress(b"\0" * MEGABYTE) for _ in range(1500)) + packer.flush()
+def _packed(head: bytes, tail: bytes) -> bytes:
+    """Return 1500 MB of zeros, packed: a packed megabyte, repeated, as each test process imports this module."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    piece = packer.compress(b"\0" * MEGABYTE) + packer.flush(zlib.Z_FULL_FLUSH)
+    return head + piece * 1500 + packer.flush() + tail
+
+
+# The tails are the CRC-32 and the size, and the Adler-32, of that many zeros.
+_GZIPPED = _packed(b"\x1f\x8b\x08" + bytes(7), struct.pack("<II", 0xAA4BAF42, 1500 * MEGABYTE))
+_DEFLATED = _packed(b"\x78\xda", struct.pack(">I", 0x7E8B0001))
 
 
 def _laughs(line: str, top: str) -> bytes:
@@ -71,8 +79,8 @@ ANSWERS: dict[str, bytes | Callable[[], Iterator[bytes]]] = {
     "two responses for one": _GOOD + _GOOD.replace(b"200 OK", b"201 No"),
     "a second response without end": _after(_GOOD, _KILOBYTES),
     "HTTP/1.0 with chunks": _CHUNKED.replace(b"HTTP/1.1", b"HTTP/1.0") + b"2\r\n{}\r\n0\r\n\r\n",
-    "a gzip bomb": _whole(_packed(31), "application/json", "Content-Encoding: gzip"),
-    "a deflate bomb": _whole(_packed(15), "application/json", "Content-Encoding: deflate"),
+    "a gzip bomb": _whole(_GZIPPED, "application/json", "Content-Encoding: gzip"),
+    "a deflate bomb": _whole(_DEFLATED, "application/json", "Content-Encoding: deflate"),
     "deep JSON": _whole(b"[" * 100_000 + b"]" * 100_000),
     "deep JSON objects": _whole(b'{"a":' * 100_000 + b"1" + b"}" * 100_000),
     "a JSON number of 8 MB": _whole(b"1" * (8 * MEGABYTE)),
