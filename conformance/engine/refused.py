@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.statuses import REFUSALS
 from conformance.documents.openapi import operations_of
 from conformance.documents.resources import matching
 from conformance.documents.wsdl_pack import services_of
@@ -18,9 +19,6 @@ from conformance.transport.exchange import Exchange, Listener, NoAnswerError, Re
 from conformance.verdict.finding import Finding
 from conformance.verdict.run import Run
 
-#: By these a device refuses a request because of who sends it, or because another client has it (RFC 9110 15.5,
-#: RFC 4918 11.3, RFC 6585 3).
-REFUSALS: Final = frozenset({401, 403, 407, 423, 428})
 # What a SOAP fault says of the same (WS-Security 12, ONVIF Core 5.11.2.2).
 _FAULT: Final = re.compile(rb"FailedAuthentication|FailedCheck|InvalidSecurityToken|NotAuthorized")
 _EXPIRED: Final = frozenset({401, 403, 407})

@@ -19,7 +19,7 @@ import h11
 
 from conformance.commandline.secrecy import SECRETS
 from conformance.transport.connections import ClosedError, Connections, NoConnectionError, tls_context
-from conformance.transport.credentials import Credentials, bearer
+from conformance.transport.credentials import Credential, Credentials, bearer
 from conformance.transport.deadline import Deadline
 from conformance.transport.exchange import (
     OF_GATEWAY,
@@ -57,8 +57,8 @@ _CRASHED: Final = "the server closed the connection without a response, and acce
 class BeforeSending(Protocol):
     """What a connection calls before each message."""
 
-    def __call__(self, *, acts: bool) -> None:
-        """Prepare for a message; ``acts``: whether a request in it has an unsafe method."""
+    def __call__(self, *requests: tuple[str, str]) -> None:
+        """Prepare for a message with these requests: method and URL of each."""
 
 
 @dataclass
@@ -70,6 +70,7 @@ class Connection:
         ca_file: certificate authorities to trust instead of the system's, or None.
         token: bearer token, or None; it is one of the credentials.
         credentials: what every request carries.
+        log_in: logs in, and returns the credential that this gives, the last of all; None: the run has no login.
         certificate: client certificate and key (PEM) for TLS, or None; the key may be in the certificate's file.
         trust: the servers to which the credentials may go; None: to each that a client is made for.
         patience_s: how long the run may yet wait for a device that puts requests off, s.
@@ -101,9 +102,10 @@ class Connection:
     resends: bool = False
     recent: deque[Sending] = field(default_factory=lambda: deque(maxlen=_RECENT))
     is_away: Callable[[Exchange], bool] = lambda _exchange: False
-    before_sending: BeforeSending = lambda *, acts: None  # noqa: ARG005 - see the protocol
+    before_sending: BeforeSending = lambda *_requests: None
     permit: Permit = lambda _method, _url: ""
     credentials: Credentials = field(default_factory=Credentials)
+    log_in: Callable[[], Credential] | None = None
     certificate: tuple[Path, Path | None] | None = None
     trust: Trust | None = None
     patience_s: float = 120.0
@@ -141,7 +143,12 @@ class Connection:
             self._next_slot = max(now, self._next_slot) + 1 / self.request_rate
         for method, _ in requests:
             self.note(method)
-        self.before_sending(acts=any(method not in SAFE_METHODS for method, _ in requests))
+        self.before_sending(*requests)
+
+    def log_in_again(self) -> None:
+        """Get new credentials from the login, if there is one; raises what the login raises."""
+        if self.log_in is not None:
+            self.credentials = Credentials((*self.credentials.items[:-1], self.log_in()))
 
     def note(self, method: str) -> None:
         """Update ``acted_at`` if the method is unsafe: called when a request is sent, answered or given up."""

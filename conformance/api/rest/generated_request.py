@@ -1,9 +1,14 @@
 """Generated requests, in a module of their own, because importing Schemathesis takes 0.25 s."""
 
-from dataclasses import dataclass
+from __future__ import annotations
 
-from conformance.api.rest.interface import RestInterface
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
 from conformance.transport.exchange import Exchange, media_type_of
+
+if TYPE_CHECKING:
+    from conformance.api.rest.interface import RestInterface
 
 
 @dataclass(frozen=True)

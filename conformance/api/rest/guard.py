@@ -14,6 +14,7 @@ from typing import Any, Final
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.stops import stop_once
 from conformance.transport.client import Draft, drafted
+from conformance.transport.credentials import Kind
 from conformance.transport.exchange import SAFE_METHODS
 
 _PROGRAM: Final = Path(__file__).with_name("guard_process.py")
@@ -37,14 +38,21 @@ class Guard:
         self._lock = threading.Lock()
         self._process: subprocess.Popen[bytes] | None = None
         self._told: list[dict[str, Any]] = []
+        self._login: dict[str, Any] | None = None
         self._is_stale = True
         self._began, self._spent_s = time.monotonic(), 0.0
 
-    def before_sending(self, *, acts: bool) -> None:
+    def before_sending(self, *requests: tuple[str, str]) -> None:
         """Tell how the device is stopped now: before a request that acts, and before the next one after it.
 
-        What the device has responded to a move may be a part of its stop.
+        What the device has responded to a move may be a part of its stop, and so may what is moved.
         """
+        if self._api.driven is not None:
+            for method, url in requests:
+                self._api.driven.sends(method, url)
+        self._before_sending(acts=any(method not in SAFE_METHODS for method, _ in requests))
+
+    def _before_sending(self, *, acts: bool) -> None:
         if not (acts or self._is_stale) or (self._process is None and not acts):
             return
         with self._lock:
@@ -65,7 +73,7 @@ class Guard:
 
     def start(self) -> int | None:
         """Start the process; return the descriptor that other processes which move the device inherit, or None."""
-        self.before_sending(acts=True)
+        self._before_sending(acts=True)
         process = self._process
         return process.stdin.fileno() if process is not None and process.stdin is not None else None
 
@@ -91,7 +99,12 @@ class Guard:
 
     def _tell(self, stops: list[dict[str, Any]]) -> None:
         """Write the stops to the process, which is started if there is none; a run without it goes on."""
-        message = {"stops": stops, "for_s": self._api.run.tries_stop_s, "deadline_s": _DEADLINE_S}
+        message = {
+            "stops": stops,
+            "login": self._renewal(),
+            "for_s": self._api.run.tries_stop_s,
+            "deadline_s": _DEADLINE_S,
+        }
         try:
             if not self._is_alive:
                 # Isolated, in a session of its own. The credentials in the stops go through the pipe alone.
@@ -108,6 +121,19 @@ class Guard:
             self._told = stops
         except OSError:
             self._told = []
+
+    def _renewal(self) -> dict[str, Any] | None:
+        """Return how the process gets a new token if the device refuses that of the stops; None: there is no login."""
+        connection, auth = self._api.client.connection, self._api.run.statement.endpoints.auth
+        if connection.log_in is None or auth is None:
+            return None
+        if self._login is None:
+            with drafted() as drafts, contextlib.suppress(Exception):
+                connection.log_in()
+            self._login = _told_of(drafts[-1]) if drafts else {}
+        is_quoted = connection.credentials.items[-1].kind is Kind.QUERY
+        sent = connection.credentials.items[-1].sent
+        return {**self._login, "token": auth.token, "sent": sent, "is_quoted": is_quoted} if self._login else None
 
 
 def _told_of(draft: Draft) -> dict[str, Any]:

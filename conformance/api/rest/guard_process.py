@@ -8,6 +8,7 @@ of a second, and takes little memory.
 from __future__ import annotations
 
 import base64
+import contextlib
 import json
 import os
 import signal
@@ -17,8 +18,11 @@ import time
 
 TYPE_CHECKING = False  # typing takes longer to import than all of the above
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from ssl import SSLContext
     from typing import Any
+
+    Contexts = dict[str | None, SSLContext | None]
 
 # Each stop is sent several times: what the other process sent last may arrive after the first one, and a device with a
 # queue of missions begins the next one.
@@ -27,37 +31,79 @@ _BETWEEN_S = 0.4
 # Not for this request, or not now: it is sent again (RFC 9110 15.5.9, RFC 8470 5.2, RFC 6585 4; 15.6).
 _AGAIN = frozenset({408, 425, 429})
 _SERVER_ERROR = 500
+_NO_RESPONSE = 599
 _LONGEST_STATUS_LINE = 4096
+# The device refuses who sends the stop (RFC 9110 15.5, RFC 4918 11.3): after a login it is sent again.
+_REFUSALS = frozenset({401, 403, 407, 423, 428})
+_LONGEST_LOGIN = 1 << 20
 
 
-def _is_delivered(stop: dict[str, Any], contexts: dict[str | None, SSLContext | None], deadline_s: float) -> bool:
-    """Send one request over a new connection; return whether the device took it."""
+@contextlib.contextmanager
+def _sent(request: dict[str, Any], contexts: Contexts, deadline_s: float) -> Iterator[socket.socket]:
+    """Send one request over a new connection, from which its response is read."""
+    with socket.create_connection((request["host"], request["port"]), deadline_s) as link:
+        tls = contexts.get(request["tls"])
+        sent = link if tls is None else tls.wrap_socket(link, server_hostname=request["host"])
+        sent.settimeout(deadline_s)
+        sent.sendall(base64.b64decode(request["request"]))
+        yield sent
+
+
+def _status(stop: dict[str, Any], contexts: Contexts, deadline_s: float) -> int:
+    """Send a stop; return the status of the response, 599 without one."""
+    came = b""
     try:
-        with socket.create_connection((stop["host"], stop["port"]), deadline_s) as link:
-            tls = contexts.get(stop["tls"])
-            sent = link if tls is None else tls.wrap_socket(link, server_hostname=stop["host"])
-            sent.settimeout(deadline_s)
-            sent.sendall(base64.b64decode(stop["request"]))
-            came = b""
+        with _sent(stop, contexts, deadline_s) as link:
             while b"\n" not in came and len(came) < _LONGEST_STATUS_LINE:
-                part = sent.recv(_LONGEST_STATUS_LINE)
+                part = link.recv(_LONGEST_STATUS_LINE)
                 if not part:
                     break
                 came += part
-        status = int(came.split(None, 2)[1])
+        return int(came.split(None, 2)[1])
     except (OSError, ValueError, IndexError):
-        return False
-    return status < _SERVER_ERROR and status not in _AGAIN
+        return _NO_RESPONSE
 
 
-def _stop(told: dict[str, Any], contexts: dict[str | None, SSLContext | None]) -> None:
+def _log_in(told: dict[str, Any], contexts: Contexts) -> None:
+    """Log in, and put the new token into the stops in the place of the old one; without one they stay as they are."""
+    import http.client  # noqa: PLC0415 - it is seldom needed, and takes longer than everything else here
+    from urllib.parse import quote  # noqa: PLC0415
+
+    login = told["login"]
+    try:
+        with _sent(login, contexts, told["deadline_s"]) as link, http.client.HTTPResponse(link) as response:
+            response.begin()
+            token = json.loads(response.read(_LONGEST_LOGIN))
+        for part in login["token"].split("/")[1:]:
+            name = part.replace("~1", "/").replace("~0", "~")
+            token = token[int(name) if isinstance(token, list) else name]
+    except (OSError, ValueError, LookupError, TypeError, http.client.HTTPException):
+        return
+    if not isinstance(token, str) or not token.isprintable():
+        return
+    sent = quote(token, safe="") if login["is_quoted"] else token
+    for stop in told["stops"]:
+        request = base64.b64decode(stop["request"]).replace(login["sent"].encode(), sent.encode())
+        stop["request"] = base64.b64encode(request).decode()
+    login["sent"] = sent
+
+
+def _stop(told: dict[str, Any], contexts: Contexts) -> None:
     """Send each stop several times, and those that the device does not take until the time is over."""
     until = time.monotonic() + told["for_s"]
     passes = 0
     waiting = told["stops"]
     while passes < _ROUNDS or (waiting and time.monotonic() < until):
         stops = told["stops"] if passes < _ROUNDS else waiting
-        waiting = [stop for stop in stops if not _is_delivered(stop, contexts, told["deadline_s"])]
+        statuses = [_status(stop, contexts, told["deadline_s"]) for stop in stops]
+        if told.get("login") and not _REFUSALS.isdisjoint(statuses) and time.monotonic() < until:
+            _log_in(told, contexts)
+            statuses = [_status(stop, contexts, told["deadline_s"]) for stop in stops]
+        waiting = [
+            stop
+            for stop, status in zip(stops, statuses, strict=True)
+            if status >= _SERVER_ERROR or status in _AGAIN or (told.get("login") and status in _REFUSALS)
+        ]
         passes += 1
         time.sleep(_BETWEEN_S)
 
@@ -85,14 +131,15 @@ def main() -> None:
         except OSError:  # SIGKILL, SIGSTOP
             continue
     told: dict[str, Any] | None = None
-    contexts: dict[str | None, SSLContext | None] = {}
+    contexts: Contexts = {}
     for line in sys.stdin.buffer:
         if line == b"done\n":
             return
         if line.endswith(b"\n"):  # a line that is cut short was never told
             told = json.loads(line)
             # Now, as the files may be gone when it counts.
-            contexts = {stop["tls"]: contexts.get(stop["tls"]) or _context(stop["tls"]) for stop in told["stops"]}
+            files = {one["tls"] for one in (*told["stops"], told.get("login")) if one}
+            contexts = {one: contexts.get(one) or _context(one) for one in files}
     if told is not None:
         _stop(told, contexts)
 

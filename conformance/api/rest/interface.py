@@ -7,6 +7,7 @@ from typing import Any
 
 from conformance.api.call_rules import CallRules
 from conformance.api.device import Device, device_of
+from conformance.api.rest.driven import Driven
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.transport.client import HttpClient
@@ -36,6 +37,7 @@ class RestInterface:
         looked: the exchanges by which the run has connected, before anything observed them.
         server: the Server field of the first response that had one; empty: none had.
         is_shut_out: whether the device has refused the suite for too many wrong credentials.
+        driven: by which values the run has named what it may have moved; None: the device has no own description.
         is_recorded: whether the present exchange is recorded by a scenario, whose rules judge it.
     """
 
@@ -56,9 +58,13 @@ class RestInterface:
     is_recorded: bool = False
     is_shut_out: bool = False
     device: Device = field(init=False)
+    driven: Driven | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         self.device = device_of(self.run)
+        if self.run.contract.described:
+            self.driven = Driven(self.run.contract, self.client.base_url)
+            self.client.connection.listeners.append(self.driven)
 
     @cached_property
     def call_rules(self) -> CallRules:

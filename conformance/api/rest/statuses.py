@@ -16,6 +16,9 @@ HELD: Final = frozenset({409, 412, 423, 428, 429, 503, 507})
 _NAMED = 4
 # Statuses that refuse a request for another reason than its content.
 _TRIES = 3
+#: By these a device refuses a request because of who sends it, or because another client has it (RFC 9110 15.5,
+#: RFC 4918 11.3, RFC 6585 3).
+REFUSALS: Final = frozenset({401, 403, 407, 423, 428})
 _NO_REFUSALS = frozenset({401, 405, 406, 408, 429})
 
 

@@ -8,17 +8,18 @@ default.
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from http import HTTPStatus
 from typing import Final
 
 from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.statuses import REFUSALS
 from conformance.api.rest.values import Values
 from conformance.documents.openapi import Operation, operations_of
 from conformance.transport.client import HttpClient
-from conformance.transport.exchange import NoAnswerError, NotPermittedError
+from conformance.transport.exchange import Exchange, Listener, NoAnswerError, NotPermittedError
 
 #: What is said of a device that may still move begins with these words.
 UNDELIVERED: Final = "the stop could not be delivered; the robot may still move"
@@ -54,8 +55,12 @@ def stop_device(api: RestInterface, tell: Callable[[str], None] = lambda _: None
         tell(f"the device was not stopped: {'; '.join(open_.values())}. The stop is tried for {run.tries_stop_s:g} s")
     while open_ and time.monotonic() < until:
         time.sleep(_AGAIN_S)
-        with _unheard(api.client):
+        with _unheard(api.client) as refusals:
             open_ = _still_open(open_)
+            if open_ and refusals.seen:
+                # The token of a login has expired, or the device has forgotten it.
+                with suppress(Exception):
+                    api.client.connection.log_in_again()
     run.stop_undelivered = f"{UNDELIVERED}: {'; '.join(open_.values())}" if open_ else ""
     return run.stop_undelivered
 
@@ -78,13 +83,23 @@ def _still_open(ways: Iterable[_Way]) -> dict[_Way, str]:
     return found
 
 
+class _Refusals(Listener):
+    """Notices that the device refuses the run's credentials."""
+
+    seen = False
+
+    def answered(self, exchange: Exchange) -> None:
+        """Look at the status of a response."""
+        self.seen = self.seen or exchange.response.status in REFUSALS
+
+
 @contextmanager
-def _unheard(client: HttpClient) -> Iterator[None]:
+def _unheard(client: HttpClient) -> Iterator[_Refusals]:
     """Send over new connections what nothing judges or counts, and what no hang or slow response before holds back."""
     connection = client.connection
     deadline_s = max(_DEADLINE_S, _ANSWERS * connection.pace.usual_s)
     changed = {
-        "listeners": [],
+        "listeners": [refusals := _Refusals()],
         "recent": deque(maxlen=1),
         "is_away": lambda _exchange: False,
         "request_rate": None,
@@ -96,7 +111,7 @@ def _unheard(client: HttpClient) -> Iterator[None]:
     client.close()
     client.forget_hangs()
     try:
-        yield
+        yield refusals
     finally:
         for name, value in kept.items():
             setattr(connection, name, value)
@@ -114,22 +129,25 @@ def _stop_as_marked(api: RestInterface) -> str:
     """Send what the description marks as a stop (x-roaas-stop); return what was not accepted, or an empty text."""
     if not (api.call_rules.allow or api.run.statement.motion_map):
         return ""
-    until = time.monotonic() + _LONGEST_S
     marked = (operation for operation in operations_of(api.run.contract) if operation.stop)
-    return "; ".join(filter(None, (_send(api, operation, until) for operation in marked)))
+    return "; ".join(filter(None, (_send(api, operation) for operation in marked)))
 
 
-def _send(api: RestInterface, operation: Operation, until: float) -> str:
-    """Send a stop with each value that the run knows for it, such as the ids of the newest moves.
+def _send(api: RestInterface, operation: Operation) -> str:
+    """Send a stop with each value that the run knows for it: of all that it may have moved, and the newest ids.
 
     Returns:
-        Why none was accepted, or an empty text.
+        Why none was accepted, or why something that the run may have moved was not stopped, or an empty text.
     """
-    problem, accepted = f"no request to {operation.label} could be made", False
+    until = time.monotonic() + _LONGEST_S
+    problem, accepted, open_ = f"no request to {operation.label} could be made", False, ""
     names_one = operation.method == "DELETE" or bool(operation.parameters)
-    for inputs in usual_inputs(operation, api.values or Values()):
+    usual = usual_inputs(operation, api.values or Values())
+    driven = api.driven.inputs(operation, usual[0]) if api.driven is not None else []
+    for inputs in [*driven, *(one for one in usual if one not in driven)]:
         if time.monotonic() > until:
             break
+        moved = inputs in driven
         request = written(operation, inputs)
         fields = [*request.headers, *([("Content-Type", request.content_type)] if request.content_type else [])]
         try:
@@ -140,7 +158,12 @@ def _send(api: RestInterface, operation: Operation, until: float) -> str:
             return ""  # the user's --never
         except NoAnswerError as none:
             problem = f"{operation.label}: {none}"
+            open_ = open_ or (problem if moved else "")
             continue
+        until += exchange.response.elapsed_ms / 1000  # a device that responds is sent each of them
         accepted |= exchange.response.ok or (names_one and exchange.response.status in _OVER)
         problem = f"{operation.label} got {exchange.came}"
-    return "" if accepted else problem
+        status = exchange.response.status
+        if moved and (status >= HTTPStatus.INTERNAL_SERVER_ERROR or status in REFUSALS):
+            open_ = open_ or problem
+    return open_ if accepted else problem

@@ -1,0 +1,137 @@
+"""Remember by which values a run has named what it may have moved: a stop of one drive has to name each of them."""
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+from itertools import islice, product
+from typing import Any, Final
+from urllib.parse import unquote
+
+from conformance.api.rest.inputs import Inputs
+from conformance.api.rest.references import plain_name
+from conformance.api.rest.samples import fits
+from conformance.contract.pack import Contract
+from conformance.documents.field_reading import pairs_of
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation, operations_of
+from conformance.documents.parameter_reading import decoded_query
+from conformance.documents.representation import flat
+from conformance.documents.resources import PARAMETER, matching
+from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener
+
+# As many values of one name are remembered, and as many requests are made of them for one stop.
+_MOST: Final = 64
+_REFUSED: Final = range(400, 500)
+
+
+class Driven(Listener):
+    """The values in the requests that may have moved the device, by the names that its stops have for them.
+
+    A value counts from before its request is sent until a response with 4xx shows that nothing was moved by it.
+
+    Args:
+        contract: the description.
+        base_url: URL below which the operations are.
+    """
+
+    def __init__(self, contract: Contract, base_url: str) -> None:
+        self._contract, self._base_url = contract, base_url
+        stops = [operation for operation in operations_of(contract) if operation.stop]
+        self._names = {name for stop in stops for names, _, _ in _places(stop) for name in names}
+        # By name and value, whether a response has shown that the device takes the value.
+        self._values: dict[str, dict[Any, bool]] = defaultdict(dict)
+
+    def sends(self, method: str, url: str) -> None:
+        """Note the values in a request that is sent now."""
+        self._note(method, url, b"", taken=False)
+
+    def answered(self, exchange: Exchange) -> None:
+        """Keep the values of a request, or forget them if the device refused it."""
+        request = exchange.request
+        if exchange.response.status not in _REFUSED:
+            self._note(request.method, request.url, request.body, taken=True)
+            return
+        for name, value in self._named(request.method, request.url, request.body):
+            if self._values[name].get(value) is False:
+                del self._values[name][value]
+
+    def _note(self, method: str, url: str, body: bytes, *, taken: bool) -> None:
+        for name, value in self._named(method, url, body):
+            known = self._values[name]
+            known[value] = known.pop(value, False) or taken
+            if len(known) > _MOST:
+                del known[next((one for one, is_taken in known.items() if not is_taken), next(iter(known)))]
+
+    def _named(self, method: str, url: str, body: bytes) -> Iterator[tuple[str, Any]]:
+        """Yield name and value of what a request names, if a stop has that name; nothing for a stop itself."""
+        if not self._names or method in SAFE_METHODS or not url.startswith(self._base_url):
+            return
+        path, _, query = url[len(self._base_url) :].partition("?")
+        operation = matching(self._contract, method, path)
+        if operation is None or operation.stop:
+            return
+        literal = PARAMETER.split(operation.template)[::2]
+        found = re.fullmatch("([^/]*)".join(map(re.escape, literal)), path)
+        named: list[tuple[str, Any]] = []
+        for names, text in zip(_path_names(operation.template), found.groups() if found else (), strict=False):
+            named += [(name, unquote(text)) for name in names]
+        with suppress(ValueError):
+            named += [(plain_name(name), decoded_query(text)) for name, text in pairs_of(query)]
+        value = read_json(body).value if body else None
+        if isinstance(value, dict):
+            named += [(plain_name(name), one) for name, one in value.items() if isinstance(one, str | int)]
+        yield from ((name, one) for name, one in named if name in self._names)
+
+    def inputs(self, operation: Operation, base: Inputs) -> list[Inputs]:
+        """Return the inputs of a stop that name all that the run may have moved, the newest first.
+
+        Args:
+            operation: the stop.
+            base: its usual inputs.
+        """
+        known = []
+        for names, schema, place in _places(operation):
+            values = {value: None for name in names for text in self._values[name] for value in _fitting(schema, text)}
+            known.append([(place, value) for value in reversed(values)] or [(place, None)])
+        found = []
+        for chosen in islice(product(*known), _MOST) if any(one[0][1] is not None for one in known) else ():
+            inputs = base
+            for (where, name), value in chosen:
+                if value is None:
+                    continue
+                if where == "body" and isinstance(inputs.body, dict):
+                    inputs = replace(inputs, body={**inputs.body, name: value})
+                elif where != "body":
+                    inputs = inputs.having(where, name, value)
+            found.append(inputs)
+        return found
+
+
+def _path_names(template: str) -> list[tuple[str, str]]:
+    """Return for each parameter in a path its plain name, and what stands before it: /arms/{id} is /arms/{arm}."""
+    return [(plain_name(found[1]), template[: found.start()]) for found in PARAMETER.finditer(template)]
+
+
+def _places(stop: Operation) -> Iterator[tuple[tuple[str, ...], Any, tuple[str, str]]]:
+    """Yield the names, the schema and the place of each value by which a stop says what it stops."""
+    before = dict(_path_names(stop.template))
+    for item in stop.parameters:
+        if item.where == "path" or (item.where == "query" and item.required):
+            name = plain_name(item.name)
+            names = (name, before[name]) if item.where == "path" and name in before else (name,)
+            yield names, item.schema, (item.where, item.name)
+    for body in list(stop.bodies.values())[:1]:
+        schema = flat(body.schema)
+        for name in schema.get("required", ()):
+            member = schema.get("properties", {}).get(name, {})
+            yield (plain_name(name),), member, ("body", name)
+
+
+def _fitting(schema: Any, text: Any) -> Iterator[Any]:
+    """Yield a value as a schema allows it: a number may have been the text of a path."""
+    for value in (text, read_json(text.encode("utf-8", "replace")).value if isinstance(text, str) else str(text)):
+        if isinstance(value, str | int) and not isinstance(value, bool) and fits(schema, value):
+            yield value
+            return

@@ -1,0 +1,96 @@
+"""By which values a run has named what it may have moved, and how a stop names them again."""
+
+import pytest
+from small_device import described
+
+from conformance.api.rest.driven import Driven
+from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.values import Values
+from conformance.contract.described import write_described_pack
+from conformance.contract.pack import Contract
+from conformance.documents.openapi import operations_of
+from conformance.transport.exchange import Exchange, Request, Response
+
+_BASE = "http://robot/api"
+
+
+def _parameter(name, where, kind="string"):
+    return {"name": name, "in": where, "required": True, "schema": {"type": kind}}
+
+
+def _operation(*parameters, body=None, **members):
+    content = {"content": {"application/json": {"schema": body}}}
+    asked = {"requestBody": content} if body else {}
+    return {"post": {"parameters": list(parameters), "responses": {"200": {"description": "ok"}}, **asked, **members}}
+
+
+def _driven(folder, stop, path):
+    axis = {"type": "object", "properties": {"axis": {"type": "integer"}}, "required": ["axis"]}
+    document = described(
+        {
+            "/arms/{arm}/speed": _operation(_parameter("arm", "path")),
+            "/axes/{axis}/jog": _operation(_parameter("axis", "path", "integer")),
+            "/jog": _operation(_parameter("axis", "query", "integer")),
+            "/turn": _operation(body=axis),
+            path: stop | {"post": stop["post"] | {"x-roaas-stop": True}},
+        }
+    )
+    contract = Contract.load(write_described_pack(folder, document, document))
+    operation = next(one for one in operations_of(contract) if one.stop)
+    return Driven(contract, _BASE), operation
+
+
+def _stops(driven, operation):
+    found = driven.inputs(operation, usual_inputs(operation, Values())[0])
+    return [(request.target, request.body) for one in found for request in [written(operation, one)]]
+
+
+CASES = (
+    # path of the stop, the stop, what was sent, the requests that stop it
+    ("/arms/{arm}/stop", _operation(_parameter("arm", "path")), ["/arms/left/speed", "/arms/right%20one/speed"],
+     [("/arms/right%20one/stop", b""), ("/arms/left/stop", b"")]),
+    ("/arms/{id}/stop", _operation(_parameter("id", "path")), ["/arms/left/speed"], [("/arms/left/stop", b"")]),
+    ("/axes/{axis}/stop", _operation(_parameter("axis", "path", "integer")), ["/axes/3/jog", "/axes/x/jog"],
+     [("/axes/3/stop", b"")]),
+    ("/stop", _operation(_parameter("axis", "query", "integer")), ["/jog?axis=2", "/jog?axis=7"],
+     [("/stop?axis=7", b""), ("/stop?axis=2", b"")]),
+    ("/stop", _operation(body={"type": "object", "required": ["axis"], "properties": {"axis": {"type": "integer"}}}),
+     ["/axes/4/jog", ("/turn", b'{"axis": 5}')], [("/stop", b'{"axis": 5}'), ("/stop", b'{"axis": 4}')]),
+    ("/stop", _operation(), ["/axes/4/jog"], []),
+    ("/cells/{cell}/stop", _operation(_parameter("cell", "path")), ["/arms/left/speed"], []),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("path", "stop", "sent", "stops"), CASES)
+def test_a_stop_names_all_that_was_moved(path, stop, sent, stops, tmp_path):
+    driven, operation = _driven(tmp_path, stop, path)
+    for one in sent:
+        target, body = (one, b"") if isinstance(one, str) else one
+        driven.sends("POST", _BASE + target)
+        request = Request("POST", _BASE + target, (("Content-Type", "application/json"),), body)
+        driven.answered(Exchange(request, Response(200, (), b"", 1.0)))
+    assert _stops(driven, operation) == stops
+
+
+def test_what_was_refused_is_not_stopped_and_what_was_not_answered_is(tmp_path):
+    driven, operation = _driven(tmp_path, _operation(_parameter("arm", "path")), "/arms/{arm}/stop")
+    for arm, status in (("lost", None), ("taken", 200), ("unknown", 404), ("taken", 409), ("broken", 500)):
+        request = Request("POST", f"{_BASE}/arms/{arm}/speed")
+        driven.sends(request.method, request.url)
+        if status is not None:
+            driven.answered(Exchange(request, Response(status, (), b"", 1.0)))
+    driven.sends("GET", f"{_BASE}/arms/read/speed")
+    driven.sends("POST", f"{_BASE}/arms/stopped/stop")
+    assert {target for target, _ in _stops(driven, operation)} == {
+        "/arms/lost/stop", "/arms/taken/stop", "/arms/broken/stop",
+    }  # fmt: skip
+
+
+def test_thousands_of_values_cost_a_bounded_number_of_stops(tmp_path):
+    driven, operation = _driven(tmp_path, _operation(_parameter("arm", "path")), "/arms/{arm}/stop")
+    driven.answered(Exchange(Request("POST", f"{_BASE}/arms/real/speed"), Response(200, (), b"", 1.0)))
+    for number in range(2000):
+        driven.sends("POST", f"{_BASE}/arms/made-up-{number}/speed")
+    found = _stops(driven, operation)
+    assert len(found) <= 64
+    assert ("/arms/real/stop", b"") in found
