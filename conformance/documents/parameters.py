@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from conformance.documents.json_schema import Schema, modern
+
+_NO_LETTER: Final = re.compile(r"[^a-z0-9]")
 
 
 @dataclass(frozen=True)
@@ -97,3 +100,8 @@ def examples_of(given: dict[str, Any]) -> tuple[Any, ...]:
     if named:
         return named
     return (schema["example"],) if "example" in schema else tuple(schema.get("examples", ()))
+
+
+def plain_name(name: str) -> str:
+    """Return a name without case and separators, so that ``job_id`` and ``jobId`` are one."""
+    return _NO_LETTER.sub("", name.lower())

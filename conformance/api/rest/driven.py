@@ -4,19 +4,17 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import replace
 from itertools import islice, product
 from typing import Any, Final
 from urllib.parse import unquote
 
-from conformance.api.rest.inputs import Inputs
-from conformance.api.rest.references import plain_name
 from conformance.api.rest.samples import fits
 from conformance.contract.pack import Contract
 from conformance.documents.field_reading import pairs_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, operations_of
 from conformance.documents.parameter_reading import decoded_query
+from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.resources import PARAMETER, matching
 from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener
@@ -84,29 +82,19 @@ class Driven(Listener):
             named += [(plain_name(name), one) for name, one in value.items() if isinstance(one, str | int)]
         yield from ((name, one) for name, one in named if name in self._names)
 
-    def inputs(self, operation: Operation, base: Inputs) -> list[Inputs]:
-        """Return the inputs of a stop that name all that the run may have moved, the newest first.
+    def named_by(self, stop: Operation) -> list[list[tuple[str, str, Any]]]:
+        """Return for all that the run may have moved by which values a stop names it, the newest first.
 
-        Args:
-            operation: the stop.
-            base: its usual inputs.
+        A value is given with its place and its name there: path, query or body. The list is empty if the stop names
+        nothing that was moved.
         """
         known = []
-        for names, schema, place in _places(operation):
-            values = {value: None for name in names for text in self._values[name] for value in _fitting(schema, text)}
-            known.append([(place, value) for value in reversed(values)] or [(place, None)])
-        found = []
-        for chosen in islice(product(*known), _MOST) if any(one[0][1] is not None for one in known) else ():
-            inputs = base
-            for (where, name), value in chosen:
-                if value is None:
-                    continue
-                if where == "body" and isinstance(inputs.body, dict):
-                    inputs = replace(inputs, body={**inputs.body, name: value})
-                elif where != "body":
-                    inputs = inputs.having(where, name, value)
-            found.append(inputs)
-        return found
+        for names, schema, (where, called) in _places(stop):
+            texts = (text for name in names for text in self._values[name])
+            values = dict.fromkeys(value for text in texts for value in _fitting(schema, text))
+            if values:
+                known.append([(where, called, value) for value in reversed(values)])
+        return [list(chosen) for chosen in islice(product(*known), _MOST)] if known else []
 
 
 def _path_names(template: str) -> list[tuple[str, str]]:

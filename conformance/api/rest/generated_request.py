@@ -1,14 +1,9 @@
 """Generated requests, in a module of their own, because importing Schemathesis takes 0.25 s."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from conformance.api.rest.interface import RestInterface
 from conformance.transport.exchange import Exchange, media_type_of
-
-if TYPE_CHECKING:
-    from conformance.api.rest.interface import RestInterface
 
 
 @dataclass(frozen=True)

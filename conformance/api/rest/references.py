@@ -13,10 +13,10 @@ from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameter_reading import decoded_query
+from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
 
-_NO_LETTER: Final = re.compile(r"[^a-z0-9]")
 # How the names of references end: what they identify, or where a list goes on.
 _ENDS: Final = ("id", "ids", "uuid", "guid", "cursor", "token", "reference", "href", "parent", "etag")
 # Whole names of the same kind, which are also the ends of other words.
@@ -51,11 +51,6 @@ _NO_REFERENCES: Final = frozenset(
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _FORM: Final = "application/x-www-form-urlencoded"
 _DEPTH: Final = 6
-
-
-def plain_name(name: str) -> str:
-    """Return a name without case and separators, so that ``job_id`` and ``jobId`` are one."""
-    return _NO_LETTER.sub("", name.lower())
 
 
 def collections_of(operations: Iterable[Operation]) -> frozenset[str]:

@@ -9,11 +9,12 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from http import HTTPStatus
-from typing import Final
+from typing import Any, Final
 
-from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.statuses import REFUSALS
 from conformance.api.rest.values import Values
@@ -133,6 +134,16 @@ def _stop_as_marked(api: RestInterface) -> str:
     return "; ".join(filter(None, (_send(api, operation) for operation in marked)))
 
 
+def _naming(inputs: Inputs, values: Iterable[tuple[str, str, Any]]) -> Inputs:
+    """Return inputs with other values, each given with its place and its name there."""
+    for where, name, value in values:
+        if where != "body":
+            inputs = inputs.having(where, name, value)
+        elif isinstance(inputs.body, dict):
+            inputs = replace(inputs, body={**inputs.body, name: value})
+    return inputs
+
+
 def _send(api: RestInterface, operation: Operation) -> str:
     """Send a stop with each value that the run knows for it: of all that it may have moved, and the newest ids.
 
@@ -143,7 +154,7 @@ def _send(api: RestInterface, operation: Operation) -> str:
     problem, accepted, open_ = f"no request to {operation.label} could be made", False, ""
     names_one = operation.method == "DELETE" or bool(operation.parameters)
     usual = usual_inputs(operation, api.values or Values())
-    driven = api.driven.inputs(operation, usual[0]) if api.driven is not None else []
+    driven = [_naming(usual[0], values) for values in api.driven.named_by(operation)] if api.driven is not None else []
     for inputs in [*driven, *(one for one in usual if one not in driven)]:
         if time.monotonic() > until:
             break

@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from conformance.api.rest.generated_request import GeneratedRequest
-from conformance.api.rest.references import in_link, plain_name, refers, singular, thing_of, values_in
+from conformance.api.rest.references import in_link, refers, singular, thing_of, values_in
 from conformance.api.rest.samples import backwards, fits, sample
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
-from conformance.documents.parameters import Parameter
+from conformance.documents.parameters import Parameter, plain_name
 from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
 from conformance.transport.exchange import Exchange
