@@ -64,7 +64,7 @@ def init_described(path: Path | None, source: str, options: dict[str, Any]) -> C
     api = Api(overlays=tuple(options["overlays"]), base_url=options["base_url"] or options["rest"])
     try:
         found = fetch_description(
-            source, api.overlays, connection_of(Endpoints(**given)), allow_files=options["allow_files"]
+            source, api.overlays, connection_of(Endpoints(**given)), api.base_url, allow_files=options["allow_files"]
         )
         write_described_statement(path, found, api, Calls(tuple(options["allow"]), tuple(options["never"])))
     except OSError as error:

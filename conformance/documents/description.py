@@ -115,7 +115,9 @@ def _description(source: str, load: Load, overlays: Iterable[str], trust: Trust)
     broken = unresolved(document)
     document = _without(document, frozenset(broken)) if broken else document
     uncalled: tuple[str, ...] = ()
-    if not version.startswith("2."):
+    if version.startswith("2."):
+        document = with_sent(document, document, frozenset())
+    else:
         uncalled, document = not_called(document), with_sent(document, document)
     document, unread = without_unreadable(in_one_version(document))
     base_url, remarks = _base_url(source, document, trust)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any, Final
 
 from conformance.documents.json_schema import Schema, pointed
@@ -9,21 +10,36 @@ from conformance.documents.openapi import methods_of
 
 # Other keywords of OpenAPI 3 describe these, so header parameters of these names are ignored (OpenAPI 3.1, 4.8.12.2).
 _IGNORED: Final = frozenset({"accept", "content-type", "authorization"})
+# By these a server takes another method or target than the request line's, or sees another end of the request: they
+# would make a permitted GET a DELETE, and lead a credential to another host behind the same gateway.
+_STEERING: Final = re.compile(
+    r"x-(?:http-?)?method(?:-?override)?|(?:http-?)?method-?override|(?:x-)?(?:original|rewrite|forwarded)-?(?:url|uri|path|prefix|host|server)"
+    r"|x-host|forwarded|host|content-length|transfer-encoding|te|trailer|connection|keep-alive|upgrade|expect"
+    r"|proxy-(?:connection|authorization)",
+    re.IGNORECASE,
+)
+_METHOD_IN_QUERY: Final = re.compile(r"_method|_?x?-?http-?method(?:-?override)?|x-method-override", re.IGNORECASE)
 _FORM: Final = "application/x-www-form-urlencoded"
 
 
-def with_sent(value: Any, document: Schema) -> Any:
+def with_sent(value: Any, document: Schema, ignored: frozenset[str] = _IGNORED) -> Any:
     """Return a part of an OpenAPI 3 document with the parameters that are sent, each by its own name.
 
-    The specification ignores some header parameters. A query string is written as the parameters in it.
+    The specification ignores some header parameters. Those by which a request becomes another one are not sent either.
+    A query string is written as the parameters in it.
+
+    Args:
+        value: the part.
+        document: the document.
+        ignored: names of header parameters that the specification ignores; Swagger 2.0 ignores none.
     """
     if isinstance(value, list):
-        return [with_sent(item, document) for item in value]
+        return [with_sent(item, document, ignored) for item in value]
     if not isinstance(value, dict):
         return value
-    found = {key: with_sent(item, document) for key, item in value.items()}
+    found = {key: with_sent(item, document, ignored) for key, item in value.items()}
     if isinstance(value.get("parameters"), list):
-        found["parameters"] = [sent for one in found["parameters"] for sent in _sent(one, document)]
+        found["parameters"] = [sent for one in found["parameters"] for sent in _sent(one, document, ignored)]
         if _unwritten(value["parameters"], document):
             found["x-roaas-never"] = True
     return found
@@ -51,13 +67,16 @@ def not_called(document: Schema) -> tuple[str, ...]:
     )
 
 
-def _sent(given: Any, document: Schema) -> list[Any]:
+def _sent(given: Any, document: Schema, ignored: frozenset[str]) -> list[Any]:
     parameter = _followed(given, document)
     if not isinstance(parameter, dict):
         return [given]
     if parameter.get("in") == "querystring":
         return _in_query(parameter, document)
-    return [] if parameter.get("in") == "header" and str(parameter.get("name")).lower() in _IGNORED else [given]
+    name, where = str(parameter.get("name")).lower(), parameter.get("in")
+    steers = {"header": _STEERING, "query": _METHOD_IN_QUERY}.get(str(where))
+    is_left_out = (where == "header" and name in ignored) or (steers and steers.fullmatch(name))
+    return [] if is_left_out else [given]
 
 
 def _in_query(parameter: Schema, document: Schema) -> list[Schema]:

@@ -73,8 +73,27 @@ def trusting(connection: Connection, *named: str | None) -> Trust:
     return Trust.of(*known.named, *named, hosts=known.hosts)
 
 
+def _trust_in(source: str, connection: Connection, *api: str | None) -> tuple[Trust, tuple[str, ...]]:
+    """Return the servers that get the credentials, and the description's URL if its server is none of them.
+
+    Args:
+        source: URL or file of the description.
+        connection: what it trusts.
+        api: URLs by which the user says where the API is. Only those get the credentials then.
+    """
+    named = trusting(connection, *api)
+    if not any(api) or not is_url(source) or named.trusts(source):
+        return trusting(connection, *api, source), ()
+    return named, (source,)
+
+
 def fetch_description(
-    source: str, overlays: tuple[str, ...], connection: Connection, *, allow_files: bool = False
+    source: str,
+    overlays: tuple[str, ...],
+    connection: Connection,
+    base_url: str | None = None,
+    *,
+    allow_files: bool = False,
 ) -> Description:
     """Return the description at a URL or in a file; at a URL that is none, try the usual places on its server.
 
@@ -82,14 +101,17 @@ def fetch_description(
         source: URL or file of the description.
         overlays: URLs or files of overlays.
         connection: deadline, credentials and TLS.
+        base_url: where the user says that the API is. A description elsewhere is then fetched without credentials.
         allow_files: whether a description in a file may refer to files outside its folder.
 
     Raises:
         DescriptionError: there is no usable description.
         UnreachableError: the server does not respond.
     """
+    trust, public = _trust_in(source, connection, base_url)
+    load = Loader(connection, trust, source, (*overlays, *public), anywhere=allow_files)
+    # Which of its servers is used: that is no request.
     trust = trusting(connection, source)
-    load = Loader(connection, trust, source, overlays, anywhere=allow_files)
     try:
         return read_description(source, load, overlays, trust)
     except DescriptionError as error:
@@ -147,7 +169,7 @@ def described_contract(
     """
     import msgspec  # noqa: PLC0415 - read already where this is used
 
-    found = fetch_description(source, overlays, connection, allow_files=allow_files)
+    found = fetch_description(source, overlays, connection, base_url or endpoints.rest, allow_files=allow_files)
     base = base_url or endpoints.rest or found.base_url
     if not base:
         raise DescriptionError(
@@ -213,8 +235,8 @@ def soap_contract(
     # xmlschema and lxml take a third of a second, which other devices need not pay.
     from conformance.documents.wsdl_pack import each, label_of, write_soap_pack  # noqa: PLC0415
 
-    trust = trusting(connection, source, base_url, endpoints.rest)
-    load = Loader(connection, trust, source, [str(schemas)] if schemas else (), anywhere=allow_files)
+    trust, public = _trust_in(source, connection, base_url, endpoints.rest)
+    load = Loader(connection, trust, source, (*([str(schemas)] if schemas else ()), *public), anywhere=allow_files)
     documents, named = dict[str, bytes](), dict[str, str]()
     folder = SchemaFolder(schemas) if schemas else None
 

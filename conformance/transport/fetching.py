@@ -96,14 +96,21 @@ class Fetcher:
         )
         with client.stream("GET", self._guard.place(url)[0]) as response:
             if response.status_code != httpx.codes.OK:
-                asks = {httpx.codes.UNAUTHORIZED, httpx.codes.FORBIDDEN}
-                hint = "; are credentials missing, as by --token-file?" if response.status_code in asks else ""
-                raise ValueError(f"the server responded {response.status_code}{hint}")
+                raise ValueError(f"the server responded {response.status_code}{self._hint(url, response.status_code)}")
             octets = _decoded(response)
         self._octets += len(octets)
         if self._octets > _MOST_IN_ALL:
             raise ValueError(f"the documents have more than {_MOST_IN_ALL:,} bytes in all")
         return octets
+
+    def _hint(self, url: str, status: int) -> str:
+        """Return which option sends the credentials that a server asks for."""
+        if status not in {httpx.codes.UNAUTHORIZED, httpx.codes.FORBIDDEN}:
+            return ""
+        reason = self._trust.refusal(url)
+        if reason and self._connection.credentials:
+            return f"; it got no credentials: {reason}"
+        return "; are credentials missing, as by --token-file or --basic-file?"
 
 
 class _Guard(httpx.BaseTransport):

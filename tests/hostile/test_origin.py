@@ -10,6 +10,7 @@ import sys
 import time
 
 import pytest
+from hypothesis import find, settings
 from origin_servers import SECRET, XSD, document, packed, redirect, serving
 from processes import ended
 from schemathesis.specs.openapi.examples import get_strategies_from_examples
@@ -215,6 +216,68 @@ def test_an_overlay_that_the_user_named_is_fetched_without_credentials(device, e
     assert device.with_secret == ["GET /openapi.json"]
 
 
+DESCRIBED_ELSEWHERE = {
+    "an OpenAPI description": (described_contract, "/openapi.json", document(openapi())),
+    "a WSDL": (soap_contract, "/camera.wsdl", document(camera("", "http://factory.example/camera"), "text/xml")),
+}
+
+
+@pytest.mark.parametrize("trusted", [False, True])
+@pytest.mark.parametrize("kind", DESCRIBED_ELSEWHERE)
+def test_a_description_on_another_server_than_the_api_is_fetched_without_credentials(
+    kind, trusted, device, elsewhere, tmp_path
+):
+    contract_of, path, answer = DESCRIBED_ELSEWHERE[kind]
+    elsewhere.answers[path] = answer
+    more = () if contract_of is soap_contract else ((),)
+    known = connection(*[elsewhere.url.removeprefix("http://")] * trusted)
+    _, where, _ = contract_of(f"{elsewhere.url}{path}", *more, device.url, Endpoints(), known, tmp_path)
+    assert where.rest == device.url
+    lines = [line for line, _ in elsewhere.seen]
+    assert lines[0] == f"GET {path}"
+    assert elsewhere.with_secret == lines * trusted
+
+
+def test_a_server_that_wants_credentials_it_does_not_get_is_told(device, elsewhere, tmp_path):
+    elsewhere.answers["/openapi.json"] = document({}, status=401)
+    option = f"it got no credentials: .*--trust-host {elsewhere.url.removeprefix('http://')}"
+    with pytest.raises(DescriptionError, match=option):
+        described_contract(f"{elsewhere.url}/openapi.json", (), device.url, Endpoints(), connection(), tmp_path)
+
+
+# Parameters by which a server may take a request for another one, and others like them.
+STEERING = {
+    "header": [
+        *("Host", "Forwarded", "X-Forwarded-Host", "X-Forwarded-Server", "X-Forwarded-Prefix", "X-Host"),
+        *("X-Original-URL", "X-Rewrite-Url", "X-HTTP-Method-Override", "X-HTTP-Method", "x-method-override"),
+        *("Content-Length", "Transfer-Encoding", "TE", "Connection", "Upgrade", "Expect", "Proxy-Authorization"),
+    ],
+    "query": ["_method", "x-http-method-override", "_HttpMethod", "httpMethod"],
+}
+HARMLESS = {
+    "header": ["X-Request-Id", "If-Match", "X-Tenant", "Host-Name", "X-Calibration-Method", "Prefer"],
+    "query": ["method", "host", "path", "url", "connection", "method_id"],
+}
+
+
+@pytest.mark.parametrize("version", ["swagger", "openapi"])
+def test_no_parameter_makes_a_request_another_one(version, device):
+    parameters = [
+        {"name": name, "in": where, **({"type": "string"} if version == "swagger" else {"schema": {"enum": ["x"]}})}
+        for table in (STEERING, HARMLESS)
+        for where, names in table.items()
+        for name in names
+    ]
+    shared = parameters[::2]
+    whole = openapi(**({"swagger": "2.0"} if version == "swagger" else {}))
+    whole["paths"]["/state"]["parameters"] = shared
+    whole["paths"]["/state"]["get"]["parameters"] = [one for one in parameters if one not in shared]
+    device.answers["/openapi.json"] = document(whole)
+    found = fetch_description(f"{device.url}/openapi.json", (), connection()).document["paths"]["/state"]
+    left = {(one["in"], one["name"]) for one in (*found.get("parameters", ()), *found["get"]["parameters"])}
+    assert left == {(where, name) for where, names in HARMLESS.items() for name in names}
+
+
 def test_credentials_in_a_url_s_query_and_headers_stay_too(device, elsewhere, tmp_path):
     files = {"api_key_file": "key", "headers_file": "headers", "basic_file": "basic"}
     (tmp_path / "key").write_text(SECRET)
@@ -360,6 +423,10 @@ def test_what_generates_requests_and_what_judges_responses_fetch_nothing(elsewhe
     paths = {"/a": {"post": {"requestBody": taken, "responses": answers}}}
     for one in _loaded({**openapi(), "paths": paths}).get_all_operations():
         get_strategies_from_examples(one.ok())
+    number = {"name": "n", "in": "query", "schema": {"$schema": f"{elsewhere.url}/four", "type": "integer"}}
+    paths = {"/a": {"get": {"parameters": [number], "responses": answers}}}
+    for one in _loaded({"$schema": f"{elsewhere.url}/five", **openapi(), "paths": paths}).get_all_operations():
+        find(one.ok().as_strategy(), lambda _: True, settings=settings(database=None))
     with pytest.raises(Exception, match="Retrieval is disabled"):
         shape_of({"anyOf": [{"$ref": f"{elsewhere.url}/three"}]}).problem(1)
     assert elsewhere.seen == []
