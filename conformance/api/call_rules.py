@@ -104,8 +104,13 @@ def harmful_words(operation: Operation) -> list[str]:
     text = f"{_PARAMETER.sub(' ', operation.template)} {operation.id}"
     # Tags name a group: of what only reads in it, nothing is to be feared.
     text += "" if operation.safe else f" {' '.join(operation.tags)}"
-    words = {word.lower() for word in _WORD.findall(text)} - _OF_METHODS.get(operation.method, frozenset())
+    words = words_of(text) - _OF_METHODS.get(operation.method, frozenset())
     return sorted(words & (_HARMFUL | _SEVERAL))
+
+
+def words_of(text: str) -> set[str]:
+    """Return the words of a path, a query or an id in lower case, those within camelCase included."""
+    return {word.lower() for word in _WORD.findall(text)}
 
 
 def told(rules: CallRules, operations: Sequence[Operation], mapped: Collection[str] = ()) -> list[str]:

@@ -12,7 +12,7 @@ from urllib.parse import unquote, urlsplit
 
 import msgspec
 
-from conformance.api.call_rules import CallRules
+from conformance.api.call_rules import harmful_words, words_of
 from conformance.api.permission import Permission
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation
@@ -24,13 +24,25 @@ from conformance.verdict.run import Run
 
 # By these a server may take another method than the request line's, in the query or in a field: _method=PUT,
 # X-HTTP-Method-Override.
-_OVERRIDES: Final = re.compile(r"method|(?:PUT|POST|DELETE|PATCH)[ \t]", re.IGNORECASE)
+_OVERRIDES: Final = re.compile(r"method|verb|override|(?:PUT|POST|DELETE|PATCH)[ \t]", re.IGNORECASE)
 # Fields by which a server may take another target, or see the request end elsewhere: X-Original-URL, Transfer-Encoding.
 _ALTERS: Final = re.compile(
     r"transfer|trailer|upgrade|expect|settings|destination"
     r"|(?:original|rewrite|forwarded)[-_]?(?:url|uri|path|prefix)",
     re.IGNORECASE,
 )
+# Words in a target that say that a device acts on it, whatever the method: GET /robot/move, GET /relay/0?turn=on.
+_ACTS: Final = frozenset(
+    {
+        "move", "moveto", "drive", "walk", "run", "go", "goto", "turn", "rotate", "spin", "jog", "start", "launch",
+        "activate", "engage", "enable", "disarm", "takeoff", "undock", "open", "close", "grip", "grasp", "lift",
+        "unlock", "toggle", "trigger", "fire", "jump", "set",
+    }
+)  # fmt: skip
+# Parameters of a query that name data by such a word: ?format=json, ?start=20.
+_DATA: Final = re.compile(r"(?i)(?:^|(?<=[&;]))(?:format|start|open|auth|token|script|network|firmware)(?==)")
+# Percent-encoding within percent-encoding is undone so often: a proxy may undo one and the server another.
+_MOST_DECODINGS: Final = 8
 _PORTS: Final = {"http": 80, "https": 443}
 
 
@@ -83,16 +95,27 @@ def _only_reads(request: Request, permission: Permission | None) -> bool:
 
     Raw bytes never do: each server reads them in its own way.
     """
-    parts = (unquote(urlsplit(request.url).query), *(part for pair in request.headers for part in pair))
+    target = urlsplit(request.url)
+    path, query = _decoded(target.path), _decoded(target.query)
+    parts = (query, *(part for pair in request.headers for part in pair))
     alters = any(map(_OVERRIDES.search, parts)) or any(_ALTERS.search(name) for name, _ in request.headers)
     if request.raw is not None or alters:
         return False
     if request.method == "POST":
         return _asks(request)
-    path = unquote(urlsplit(request.url).path)
-    harmless = CallRules().decide(Operation(path, request.method, path)).may
+    said = f"{path} {_DATA.sub('', query)}"
+    warns = harmful_words(Operation(said, request.method, said)) or not _ACTS.isdisjoint(words_of(said))
     allowed = permission is None or not permission.refusal(request.method, request.url)
-    return request.method in SAFE_METHODS and not request.body and harmless and allowed
+    return request.method in SAFE_METHODS and not request.body and not warns and allowed
+
+
+def _decoded(text: str) -> str:
+    """Return a part of a target without percent-encoding, however often it was encoded."""
+    for _ in range(_MOST_DECODINGS):
+        before, text = text, unquote(text)
+        if text == before:
+            break
+    return text
 
 
 def _asks(request: Request) -> bool:

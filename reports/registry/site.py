@@ -40,6 +40,9 @@ def write_site(site: Path, found: Sequence[History], refused: Sequence[Refused],
     }
     try:
         for folder, names in ((ROBOTS, robots), (ENVELOPES, envelopes)):
+            # A link in its place would lead out of the site.
+            if (site / folder).is_symlink():
+                (site / folder).unlink()
             for path in (site / folder).glob("*"):
                 if path.name not in names and _OURS[folder].fullmatch(path.name):
                     path.unlink()

@@ -6,12 +6,15 @@ Every command ends within a bound, says in a line what is wrong, and runs, reads
 import gzip
 import json
 import os
+import re
+import shutil
 import socket
 import sys
 import threading
 from pathlib import Path
 
 import given_results
+import jsonschema_rs
 import pytest
 from given_results import check, run
 from hypothesis import given, settings
@@ -25,7 +28,9 @@ from conformance.statement.statement import StatementError, load_statement
 from conformance.transport import raw
 from conformance.transport.exchange import Request
 from conformance.verdict.finding import Sent
+from reports.attestation.keys import PUBLIC_NAME
 
+SCHEMAS = Path(__file__).parents[2] / "reports" / "schemas"
 SECRET = "the content of another file"  # noqa: S105 - of no account
 
 # What is in place of a file: its content, or how it is made.
@@ -205,6 +210,17 @@ ACTING = {
     "another target": {"headers": (("X-Original-URL", "/start"),)},
     "a harmful name": {"path": "/system/shutdown"},
     "an encoded harmful name": {"path": "/system/%73hutdown"},
+    "a harmful name, encoded twice": {"path": "/system/%2573hutdown"},
+    "a harmful value": {"path": "/cgi?do=reboot"},
+    "a harmful parameter": {"path": "/cgi?factoryReset=1"},
+    "a name that acts": {"path": "/robot/move"},
+    "a name that acts, within a word": {"path": "/robotMoveTo?x=1"},
+    "a name that acts, behind dots": {"path": "/state/%2e%2e/m%6fve"},
+    "a name that acts, as a path parameter": {"path": "/state;do=drive"},
+    "a value that acts": {"path": "/cgi-bin/ptz.cgi?action=start&code=Up"},
+    "a parameter that acts": {"path": "/relay/0?turn=on"},
+    "a parameter that names data, and one that acts": {"path": "/cgi?format=json&cmd=drive"},
+    "an override by its verb": {"headers": (("X-HTTP-Verb-Override", "PUT"),)},
 }  # fmt: skip
 
 
@@ -237,7 +253,7 @@ def _accepted(server):
         return "closed"
 
 
-@pytest.mark.parametrize("path", ["/a", "/a?b=c", "/robot/pose/", ""])
+@pytest.mark.parametrize("path", ["/a", "/a?b=c", "/robot/pose/", "", "/a?format=json&start=20", "/moved"])
 @pytest.mark.parametrize("method", ["GET", "HEAD", "OPTIONS"])
 def test_what_reads_needs_no_permission(method, path):
     assert not moves(_failure("http://r2", method=method, path=path, headers=(("Accept", "application/json"),)))
@@ -312,7 +328,9 @@ def _check_pages(folder):
         assert "<img src=x" not in text
         assert 'href="javascript:' not in text
     for page in folder.rglob("*.md"):
-        assert "](javascript:" not in page.read_text(encoding="utf-8").replace("\\]", "")
+        # Neither code nor a line of HTML holds Markdown.
+        text = re.sub(r"(?ms)^<details>.*?$|(?<![`\\])(`+)(?!`).*?(?<!`)\1(?!`)", "", page.read_text(encoding="utf-8"))
+        assert not re.search(r"(?<!\\)<(?:img|script|/style)|(?<!\\)\]\(javascript", text)
 
 
 @pytest.mark.parametrize(
@@ -364,3 +382,51 @@ def test_changed_statements(tmp_path_factory, data):
     except StatementError as error:
         said = str(error)
     assert str(path) in said
+
+
+MARKUP = "\n\n<img src=x onerror=alert(1)> [a](javascript:alert(1))"
+
+
+@pytest.mark.parametrize(
+    ("place", "schema", "commands"),
+    [
+        ("load/latency.json", "latency", ("report {}/load", "compare {}/load {}/load --out {}/load")),
+        ("fleet/fleet.json", "fleet", ("report {}/fleet",)),
+        ("result/result.json", "result", ("report {}/result", "diff {}/result {}/result --out {}/result")),
+    ],
+)
+def test_markup_in_all_texts_at_once_is_none_on_a_page(well_made, tmp_path, place, schema, commands):
+    sent = well_made.sent(tmp_path / "sent")
+    document = well_made.document(place)
+    fits = jsonschema_rs.validator_for(json.loads((SCHEMAS / f"roaas-{schema}-1.schema.json").read_bytes())).is_valid
+    for *way, last in [one for one in _places(document) if one]:
+        inner = document
+        for key in way:
+            inner = inner[key]
+        text = inner[last]
+        # Dates and histograms have a form of their own, which the schema does not know in full.
+        if isinstance(text, str) and last not in {"started", "finished", "at", "histogram", "response_histogram"}:
+            inner[last] = text + MARKUP
+            inner[last] = inner[last] if fits(document) else text
+    (sent / place).write_text(json.dumps(document), encoding="utf-8")
+    for command in commands:
+        check(run(command, sent), 0, 1, 4)
+    assert any("img src" in page.read_text(encoding="utf-8") for page in (sent / place).parent.rglob("*.md"))
+    _check_pages((sent / place).parent)
+
+
+@pytest.mark.parametrize("name", ["robots", "envelopes"])
+def test_a_link_in_a_registry_leads_nothing_out_of_it(well_made, tmp_path, name):
+    sent = well_made.sent(tmp_path / "sent")
+    check(run("sign {}/result --key {key}", sent), 0)
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    old = outside / {"robots": "r-0123456789ab.html", "envelopes": f"{'0' * 64}.intoto.json"}[name]
+    old.write_text(SECRET)
+    (sent / "site").mkdir()
+    (sent / "site" / name).symlink_to(outside)
+    (sent / "trusted").mkdir()
+    shutil.copy(sent / "keys" / PUBLIC_NAME, sent / "trusted" / "vendor.pem")
+    check(run("registry build {}/result --keys {}/trusted --out {}/site", sent), 0)
+    assert [path.name for path in outside.iterdir()] == [old.name]
+    assert list((sent / "site" / name).iterdir())
