@@ -5,7 +5,8 @@ stderr, logs and tracebacks. A secret is recognized in these forms, and in each 
 
 - as it is, in any case, and as UTF-16;
 - percent-encoded, as JSON (``\u0073``), as entities (``&#115;``), with backslashes, quoted-printable, in whole or part;
-- in base64 (both alphabets, at each of the three alignments) and in hexadecimal digits;
+- in base64 (both alphabets, at each of the three alignments);
+- as a dump of its bytes: hexadecimal digits, also with a mark between them or ``0x`` before each, or decimal numbers;
 - broken over several lines, or cut short before an ellipsis or a quotation mark.
 
 Not recognized are a reversed or encrypted secret, and base64 of an escaped one.
@@ -44,7 +45,8 @@ _DEPTH: Final = 4
 _ESCAPE: Final = re.compile(
     r"%(?:25){0,8}(?:(?P<wide>(?:[C-Dc-d][0-9A-Fa-f]|[Ee][0-9A-Fa-f]%(?:25){0,8}[89ABab][0-9A-Fa-f])"
     r"%(?:25){0,8}[89ABab][0-9A-Fa-f])|(?P<percent>[0-9A-Fa-f]{2}))"
-    r"|\\\\{0,15}(?:u(?P<u>[0-9A-Fa-f]{4})|x(?P<x>[0-9A-Fa-f]{2})|(?P<octal>[01][0-7]{2})|(?P<itself>[\"'/<>&]))"
+    r"|%u(?P<percent_u>[0-9A-Fa-f]{4})"
+    r"|\\\\{0,15}(?:u(?P<u>[0-9A-Fa-f]{4})|u\{0{0,5}(?P<braced>[0-9A-Fa-f]{1,4})\}|U0{4}(?P<long>[0-9A-Fa-f]{4})|x(?P<x>[0-9A-Fa-f]{2})|(?P<octal>[01][0-7]{2})|(?P<itself>[\"'/<>&]))"
     r"|\\\\{1,15}(?P<backslash>)"
     r"|&(?:amp;){0,8}(?:#[xX]0{0,6}(?P<hex>[0-9A-Fa-f]{1,4})|#0{0,6}(?P<decimal>[0-9]{1,5})"
     r"|(?P<name>amp|lt|gt|quot|apos));?"
@@ -101,6 +103,7 @@ class Secrets:
         # Those in which the case does not matter, and the others.
         self._folded: tuple[_Form, ...] = ()
         self._exact: tuple[_Form, ...] = ()
+        self._dumps: tuple[_Form, ...] = ()
         # By the last characters before an ellipsis: what may be cut there, and after how many characters.
         self._cuts: dict[str, list[tuple[_Form, int]]] = {}
 
@@ -132,6 +135,8 @@ class Secrets:
         folded, exact = _forms(secret)
         self._folded = _with(self._folded, folded, variable)
         self._exact = _with(self._exact, exact, variable)
+        # A dump that is cut short is a few numbers, as any list has them.
+        self._dumps = (*self._dumps, *(_Form(dump, dump, variable) for dump in _dumps(secret)))
         cuts: dict[str, list[tuple[_Form, int]]] = {}
         for form in (*self._folded, *self._exact):
             for length in range(min(len(form.whole), _LONGEST_CUT), _SHORTEST_CUT - 1, -1):
@@ -214,7 +219,7 @@ class Secrets:
         lowered = text.lower()
         if len(lowered) != len(text):
             lowered = "".join(small if len(small := char.lower()) == 1 else char for char in text)
-        for forms, where in ((self._folded, lowered), (self._exact, text)):
+        for forms, where in ((self._folded, lowered), (self._exact, text), (self._dumps, lowered)):
             for form in forms:
                 yield from _found(form, where)
         for cut in _ELLIPSIS.finditer(lowered):
@@ -250,6 +255,13 @@ def _forms(secret: str) -> tuple[set[str], set[str]]:
     exact = {_base64(form, shift) for form in (octets, wide) for shift in range(3)}
     exact |= {form.translate(_URLSAFE) for form in exact}
     return {form.lower() for form in small}, {form for form in exact if len(form) >= _SHORTEST}
+
+
+def _dumps(secret: str) -> set[str]:
+    """Return the bytes of a secret as lists of numbers."""
+    octets = secret.encode("utf-8", "surrogateescape")
+    numbers = [gap.join(map(write, octets)) for gap in (" ", ",", ", ") for write in (str, hex)]
+    return {*numbers, *(octets.hex(mark) for mark in ":- ")}
 
 
 def _base64(octets: bytes, shift: int) -> str:
