@@ -11,7 +11,7 @@ import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
 import msgspec
 from msgspec import Meta, inspect
@@ -150,11 +150,23 @@ def _number(kind: inspect.IntType | inspect.FloatType, _: str) -> str:
     return f"a {noun}, and not negative" if low == 0 else f"a finite {noun}"
 
 
+# By the patterns of statements: what a text has to be.
+_TEXTS: Final = {
+    r"^[A-Z]+ /\S*$": "a method and a path on the device, such as 'POST /login', and no URL",
+    "^/": "a JSON pointer, such as '/access_token'",
+    r"^(bearer|(header|query|cookie) \S+)$": "'bearer', 'header NAME', 'query NAME' or 'cookie NAME'",
+}
+
+
+def _text(kind: inspect.StrType, _: str) -> str:
+    return _TEXTS.get(kind.pattern or "", "a string that is not empty" if kind.min_length else "a string")
+
+
 _WORDS: dict[type[inspect.Type], Callable[[Any, str], str]] = {
     inspect.BoolType: lambda _, __: "true or false",
     inspect.IntType: _number,
     inspect.FloatType: _number,
-    inspect.StrType: lambda kind, _: "a string that is not empty" if kind.min_length else "a string",
+    inspect.StrType: _text,
     inspect.DateType: lambda _, __: "a date: YYYY-MM-DD, without quotes",
     inspect.LiteralType: lambda kind, _: f"one of {', '.join(map(str, kind.values))}",
     inspect.EnumType: lambda kind, _: f"one of {', '.join(str(one.value) for one in kind.cls)}",

@@ -6,6 +6,7 @@ and validated as all others are.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
@@ -27,6 +28,7 @@ _MULTIPART, _PART, _CONTENT = (
     f"{{http://schemas.xmlsoap.org/wsdl/mime/}}{name}" for name in ("multipartRelated", "part", "content")
 )
 _PREFIXES: Final = {"w": WSDL, "xs": XSD}
+_CONTROL: Final = re.compile(r"[\x00-\x1f\x7f]")
 
 
 class WsdlError(ValueError):
@@ -228,6 +230,8 @@ class _Reader:
                     break
                 tags[way] = self._tag(message, style, name if way == "input" else f"{name}Response", part)
             action = (own.get("soapAction") if own is not None else None) or ""
+            if _CONTROL.search(action):
+                remark = "its soapAction has a control character, which no header field can have"
             headers = tuple(self._headers(bound))
             addressed = addressing_action(declared, kind, action)
             yield SoapOperation(name, action, tags.get("input", ""), tags.get("output"), remark, headers, addressed)

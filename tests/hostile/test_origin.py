@@ -195,6 +195,13 @@ def test_a_wsdl_leads_nowhere_else(pointer, device, elsewhere, tmp_path):
     assert pointer == "a redirect" or "another server" in " ".join(remarks), remarks
 
 
+def test_a_soap_action_that_no_field_can_have_is_a_remark(device, tmp_path):
+    wsdl = camera("", f"{device.url}/camera").replace('soapAction="', 'soapAction="a&#13;&#10;X-Injected: 1')
+    device.answers["/camera.wsdl"] = document(wsdl, "text/xml")
+    _, _, remarks = soap_contract(f"{device.url}/camera.wsdl", None, Endpoints(), connection(), tmp_path)
+    assert "its soapAction has a control character" in " ".join(remarks)
+
+
 @pytest.mark.parametrize("pointer", ["$ref", "$ref that redirects", "servers"])
 def test_a_trusted_host_gets_the_credentials(pointer, device, elsewhere, tmp_path):
     named = written(OPENAPI[pointer], device, elsewhere)

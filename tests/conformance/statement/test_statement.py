@@ -73,6 +73,11 @@ def test_a_full_statement(tmp_path):
         ("[limts]\nhold_s = 1", "unknown key 'limts'"),
         ("[endpoints]\nrset = 'x'", "[endpoints] unknown key 'rset'; known are api_key,"),
         ("[endpoints]\nrest = 7003", "[endpoints] rest = 7003 must be a string"),
+        (
+            "[auth]\nlogin = 'POST https://sso.example/token'\ntoken = '/t'",
+            "[auth] login = 'POST https://sso.example/token' must be a method and a path on the device, such as",
+        ),
+        ("[auth]\nlogin = 'POST /t'\ntoken = 't'", "[auth] token = 't' must be a JSON pointer"),
         ("[endpoints]\ntimeout_s = -1", "[endpoints] timeout_s = -1 must be a positive number"),
         ("[claims]\nprofile = 'half'", "[claims] profile = 'half' must be one of paper, full"),
         ("[claims]\nclasses = ['rest']", "[claims] classes[0] = 'rest' must be one of rest-resources, rest-delivery,"),
