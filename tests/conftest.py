@@ -1,8 +1,10 @@
-"""Fixtures for every room's tests: a ROS domain of one's own."""
+"""Fixtures for every room's tests, such as a ROS domain of one's own, and the order in which processes share tests."""
 
 import fcntl
+import os
 import signal
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +20,17 @@ settings.load_profile("tests")
 
 # Who runs the tests in the background has Ctrl-C ignored, and so would all that they start and interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Folders whose tests start whole commands: few tests that take long. One that began last would run alone at the end.
+_OF_COMMANDS = {"ci", "first_verdict", "hostile", "loadtests", "motion", "selftest"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the modules that start commands, and with those that have most tests, if processes share the tests."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        tests = Counter(item.path for item in items)
+        items.sort(key=lambda item: (item.path.parent.name not in _OF_COMMANDS, -tests[item.path], item.path))
+
 
 # Ids up to 101 leave DDS's ports below Linux's ephemeral range.
 _DOMAIN_IDS = range(40, 102)
