@@ -56,6 +56,8 @@ DEFAULT_OUT = "out"  # as `roaas certify` does
 #: Threads of NumPy's linear algebra wait for one another by spinning, ten times as long on a busy machine.
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 _FILE = click.Path(path_type=Path)
+# How often signals are looked for while a load test runs, s.
+_LOOKS_S = 0.2
 _DESCRIPTIONS = ("publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint")
 
 
@@ -87,7 +89,11 @@ def _run_load(settings: Settings, written: Path, summary: IO[str], stopping: Ite
             with suppress(BrokenPipeError):  # it was ended before it read them
                 child.stdin.write(f"{written}\n{settings.to_json()}")
                 child.stdin.close()
-        code = child.wait()
+        # Of two signals at once, a thread of a library may take both: then they do not interrupt a wait without an end.
+        while child.poll() is None:
+            with suppress(subprocess.TimeoutExpired):
+                child.wait(_LOOKS_S)
+        code = child.returncode
     finally:
         for number, handler in earlier.items():
             signal.signal(number, handler)
