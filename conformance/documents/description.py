@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from os.path import normpath
 from pathlib import Path
 from typing import Any, Final
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 from conformance.contract.document_text import parsed
 from conformance.documents.description_faults import unresolved
@@ -37,6 +37,7 @@ _BY_NAME: Final = frozenset(
     }
 )  # fmt: skip
 _VARIABLE: Final = re.compile(r"\{([^{}]+)\}")
+_SERVER: Final = re.compile(r"(?:[A-Za-z][A-Za-z0-9+.-]*:)?//[^/?#]*")
 _BLANK: Final = b"\xef\xbb\xbf \t\r\n"
 _SCHEME: Final = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")
 # Returns the content of a URL or file.
@@ -281,7 +282,7 @@ def _base_url(source: str, document: Schema, trust: Trust) -> tuple[str, tuple[s
 
 
 def _with_defaults(server: Schema) -> str:
-    """Return a server's URL with the defaults of its variables."""
+    """Return a server's URL with the defaults of its variables, percent-encoded where a path must be."""
     given = server.get("variables")
     variables = given if isinstance(given, dict) else {}
 
@@ -289,4 +290,8 @@ def _with_defaults(server: Schema) -> str:
         variable = variables.get(found[1], {})
         return str(variable.get("default", "")) if isinstance(variable, dict) else ""
 
-    return _VARIABLE.sub(default, str(server.get("url", "/")))
+    url = _VARIABLE.sub(default, str(server.get("url", "/")))
+    server_part = _SERVER.match(url)
+    begin = server_part.end() if server_part else 0
+    # No request target has a space or a line end.
+    return url[:begin] + quote(url[begin:], safe="%/:?#[]@!$&'()*+,;=~\\")

@@ -223,6 +223,26 @@ def test_an_overlay_that_the_user_named_is_fetched_without_credentials(device, e
     assert device.with_secret == ["GET /openapi.json"]
 
 
+# What follows the device's address in its description's servers, and the path below which its operations are then.
+SERVER_PATHS = {
+    "/api v1": "/api%20v1",
+    "/a\r\nX-Injected: 1": "/a%0D%0AX-Injected:%201",
+    '/"<x>\0': "/%22%3Cx%3E%00",
+    "/\u00e9/%7Eme": "/%C3%A9/%7Eme",
+    "/v1;a=b/(c)": "/v1;a=b/(c)",
+}
+
+
+@pytest.mark.parametrize("whole", [False, True])
+@pytest.mark.parametrize("path", SERVER_PATHS)
+def test_the_path_of_a_server_can_always_be_sent(path, whole, device, tmp_path):
+    server = f"{device.url}{path}" if whole else path
+    device.answers["/openapi.json"] = document(openapi(servers=[{"url": server}]))
+    source = f"{device.url}/openapi.json"
+    _, where, _ = described_contract(source, (), None, Endpoints(), connection(), tmp_path)
+    assert where.rest == f"{device.url}{SERVER_PATHS[path]}"
+
+
 DESCRIBED_ELSEWHERE = {
     "an OpenAPI description": (described_contract, "/openapi.json", document(openapi())),
     "a WSDL": (soap_contract, "/camera.wsdl", document(camera("", "http://factory.example/camera"), "text/xml")),
