@@ -13,7 +13,8 @@ _IGNORED: Final = frozenset({"accept", "content-type", "authorization"})
 # By these a server takes another method or target than the request line's, or sees another end of the request: they
 # would make a permitted GET a DELETE, and lead a credential to another host behind the same gateway.
 _STEERING: Final = re.compile(
-    r"x-(?:http-?)?method(?:-?override)?|(?:http-?)?method-?override|(?:x-)?(?:original|rewrite|forwarded)-?(?:url|uri|path|prefix|host|server)"
+    r"x-(?:http-?)?(?:method|verb)(?:-?override)?|(?:http-?)?method-?override"
+    r"|(?:x-)?(?:original|rewrite|forwarded)-?(?:url|uri|path|prefix|host|server)"
     r"|x-host|forwarded|host|content-length|transfer-encoding|te|trailer|connection|keep-alive|upgrade|expect"
     r"|proxy-(?:connection|authorization)",
     re.IGNORECASE,
@@ -75,7 +76,9 @@ def _sent(given: Any, document: Schema, ignored: frozenset[str]) -> list[Any]:
         return _in_query(parameter, document)
     name, where = str(parameter.get("name")).lower(), parameter.get("in")
     steers = {"header": _STEERING, "query": _METHOD_IN_QUERY}.get(str(where))
-    is_left_out = (where == "header" and name in ignored) or (steers and steers.fullmatch(name))
+    # Many servers take _ and - for the same in the name of a field.
+    same = name.replace("_", "-") if where == "header" else name
+    is_left_out = (where == "header" and name in ignored) or (steers and steers.fullmatch(same))
     return [] if is_left_out else [given]
 
 

@@ -276,7 +276,14 @@ def test_a_server_that_wants_credentials_it_does_not_get_is_told(device, elsewhe
 STEERING = {
     "header": [
         *("Host", "Forwarded", "X-Forwarded-Host", "X-Forwarded-Server", "X-Forwarded-Prefix", "X-Host"),
-        *("X-Original-URL", "X-Rewrite-Url", "X-HTTP-Method-Override", "X-HTTP-Method", "x-method-override"),
+        *(
+            "X-Original-URL",
+            "X-Rewrite-Url",
+            "X-HTTP-Method-Override",
+            "X-HTTP-Method",
+            "x-method-override",
+            "X_HTTP_Verb",
+        ),
         *("Content-Length", "Transfer-Encoding", "TE", "Connection", "Upgrade", "Expect", "Proxy-Authorization"),
     ],
     "query": ["_method", "x-http-method-override", "_HttpMethod", "httpMethod"],
