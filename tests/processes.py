@@ -4,13 +4,26 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
+# A process inherits the peak memory of the one that starts it, here of pytest. This small one stands between the two.
+_WEIGHED = """
+import resource, subprocess, sys
+code = subprocess.call(sys.argv[2:])
+peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss >> (20 if sys.platform == "darwin" else 10)
+open(sys.argv[1], "w").write(str(peak))
+sys.exit(code)
+"""
 
-def ended(*command: object, check: bool = False, **options: Any) -> subprocess.CompletedProcess[str]:
-    """Run a command to its end; return what it wrote, as text."""
+
+def ended(
+    *command: object, check: bool = False, peak_mb: Path | None = None, **options: Any
+) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end; return what it wrote, as text. Its peak memory goes into the file `peak_mb`."""
     given = {"capture_output": True, "text": True, "timeout": 240} | options
-    return subprocess.run([str(word) for word in command], check=check, **given)
+    weighed = (sys.executable, "-I", "-S", "-c", _WEIGHED, peak_mb) if peak_mb else ()
+    return subprocess.run([str(word) for word in (*weighed, *command)], check=check, **given)
 
 
 @contextmanager

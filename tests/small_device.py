@@ -146,10 +146,12 @@ class Outcome:
         return next(one for one in self.result["requirements"] if one["id"] == id_)
 
 
-def certified(target: object, out: Path, *more: object, effort: str = "quick", seed: int = 1) -> Outcome:
+def certified(
+    target: object, out: Path, *more: object, effort: str = "quick", seed: int = 1, peak_mb: Path | None = None
+) -> Outcome:
     """Certify a device by the command, in a process of its own, and assert that it printed no traceback."""
     command = (sys.executable, "-m", "roaas", "certify", target, "--effort", effort, "--seed", seed, "--out", out)
-    done = ended(*command, *more)
+    done = ended(*command, *more, peak_mb=peak_mb)
     text = done.stdout + done.stderr
     assert "Traceback" not in text, text
     path = out / "result.json"
