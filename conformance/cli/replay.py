@@ -269,13 +269,14 @@ def _contract_of(document: dict[str, Any], pack: str | None, folder: Path) -> Co
     Raises:
         click.UsageError: the pack named by the user cannot be used.
     """
+    from conformance.documents.unreadable_parts import without_unreadable  # noqa: PLC0415 - see replay()
     from conformance.engine.describing import FOLDER  # noqa: PLC0415 - see replay()
 
     described, named = folder / FOLDER, pack or str(document.get("pack", {}).get("name", DEFAULT_PACK))
     try:
         if pack is None and "api" in document:
             copy = click.get_current_context().with_resource(tempfile.TemporaryDirectory())
-            named = str(copy_as_data(described, Path(copy)))
+            named = str(copy_as_data(described, Path(copy), lambda found: without_unreadable(found)[0]))
         elif pack is None and not is_installed(named):
             return None
         contract = Contract.load(named)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -81,12 +81,13 @@ def write_described_pack(
     return folder
 
 
-def copy_as_data(pack: Path, folder: Path) -> Path:
+def copy_as_data(pack: Path, folder: Path, readable: Callable[[dict[str, Any]], dict[str, Any]]) -> Path:
     """Copy a described pack from a result, whose writer nobody knows, without anything that could be executed.
 
     Args:
         pack: the folder in the result.
         folder: where; it is there.
+        readable: returns a description without what a run leaves out, which whoever edited the file may have put in.
 
     Returns:
         The folder of the copy.
@@ -101,8 +102,10 @@ def copy_as_data(pack: Path, folder: Path) -> Path:
     lines += [f"\n[[class]]\nname = {basic_string(str(one['name']))}" for one in given["class"]]
     (folder / MANIFEST).write_text("\n".join(lines) + "\n", encoding="utf-8")
     for file in (path for path in map(pack.joinpath, _DATA_NAMES) if path.exists()):
-        text = json.dumps(read_json(read_octets(file)))
-        (folder / file.name).write_text(text, encoding="utf-8")
+        content = read_json(read_octets(file))
+        if file.name == DOCUMENT_NAME and isinstance(content, dict) and isinstance(content.get("paths"), dict):
+            content = readable(content)
+        (folder / file.name).write_text(json.dumps(content), encoding="utf-8")
     return folder
 
 

@@ -430,3 +430,31 @@ def test_a_link_in_a_registry_leads_nothing_out_of_it(well_made, tmp_path, name)
     check(run("registry build {}/result --keys {}/trusted --out {}/site", sent), 0)
     assert [path.name for path in outside.iterdir()] == [old.name]
     assert list((sent / "site" / name).iterdir())
+
+
+def _net(word, wide=4, long=40):
+    inner = {f"a{n}": {word: [{"$ref": f"#/components/schemas/a{n + 1}"}] * wide} for n in range(long)}
+    return inner | {f"a{long}": {"type": "integer"}}
+
+
+# Schemas that somebody puts into the description of a result, where no run leaves them.
+NETS = {
+    **{word: _net(word) for word in ("allOf", "anyOf", "oneOf")},
+    "a circle of allOf": {f"a{n}": {"allOf": [{"$ref": f"#/components/schemas/a{(n + 1) % 9}"}] * 9} for n in range(9)},
+    "a great value": {"a0": {"type": "string", "minLength": 10**9}},
+    "a great list": {"a0": {"type": "array", "minItems": 10**9, "items": {"type": "array", "minItems": 10**9}}},
+    "a great pattern": {"a0": {"type": "object", "properties": {"on": {"pattern": "(((a{999}){999}){999}){999}$"}}}},
+}
+
+
+@pytest.mark.parametrize("name", NETS)
+def test_a_schema_in_a_result_that_no_run_leaves_there(well_made, tmp_path, name):
+    sent = well_made.sent(tmp_path / "sent")
+    place = sent / "result" / "description" / "openapi.json"
+    document = json.loads(place.read_text(encoding="utf-8"))
+    content = document["paths"]["/state"]["get"]["responses"]["200"]["content"]["application/json"]
+    content["schema"] = {"$ref": "#/components/schemas/a0"}
+    document.setdefault("components", {})["schemas"] = NETS[name]
+    place.write_text(json.dumps(document), encoding="utf-8")
+    for command in ("replay {}/result description/body-schema", "replay {}/result --recorded"):
+        check(run(command, sent), 0, 1, 2, 4)
