@@ -18,8 +18,10 @@ from conformance.commandline.secrecy import SECRETS
 settings.register_profile("tests", deadline=None, derandomize=True)
 settings.load_profile("tests")
 
-# Who runs the tests in the background has Ctrl-C ignored, and so would all that they start and interrupt.
+# A shell's background jobs ignore these, and so would all processes that the tests start and end by them.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+if hasattr(signal, "SIGQUIT"):
+    signal.signal(signal.SIGQUIT, signal.SIG_DFL)
 
 # Folders whose tests start whole commands: few tests that take long. One that began last would run alone at the end.
 _OF_COMMANDS = {"ci", "first_verdict", "hostile", "loadtests", "motion", "selftest"}

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple, Protocol
 
 import click
 
+from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.terminal import inert
 
 
@@ -61,4 +62,6 @@ class ResultCommand(click.Command):
                 own = error.format_message() if isinstance(error, click.ClickException) else ""
                 said = own or inert(str(error)) or type(error).__name__
                 click.echo(f"the pages could not be written or signed: {said}. {result.file} is kept", err=True)
+                if result.notary is not None and result.exit_code == ExitCode.PASSED:
+                    ctx.exit(ExitCode.INCONCLUSIVE)  # a signature was asked for, and there is none
         ctx.exit(result.exit_code)

@@ -175,3 +175,13 @@ def test_what_a_command_does_not_expect_never_ends_with_1(raised, code, command,
 def test_output_that_nobody_takes_is_no_failure(words, streams):
     command = f"set -o pipefail; {sys.executable} -m roaas {' '.join(words)} {streams}"
     assert ended("bash", "-c", command).returncode == 0
+
+
+def test_a_run_that_cannot_be_signed_as_it_was_asked_to_does_not_pass(tmp_path: Path) -> None:
+    assert ended(sys.executable, "-m", "roaas", "keygen", tmp_path / "keys").returncode == 0
+    (tmp_path / "out/certificate.md/folder").mkdir(parents=True)
+    with small_device(_DESCRIPTION, {"/state": constant({})}) as url:
+        unsigned = ended(*_command(url, tmp_path / "out"))
+        signed = ended(*_command(url, tmp_path / "out", "--sign", tmp_path / "keys/signing-key.pem"))
+    assert unsigned.returncode == 0, unsigned.stderr
+    assert (signed.returncode, "could not be written or signed" in signed.stderr) == (4, True), signed.stderr

@@ -77,7 +77,7 @@ def test_the_robot_ends_with_its_simulation(domain_id):
     with running_robot(domain_id) as served:
         (child,) = children(served.process.pid)
         os.kill(child, signal.SIGKILL)
-        assert served.process.wait(60) == 1
+        assert served.process.wait(60) == 3
         said = served.process.stderr.read()
         assert "ended unexpectedly" in said
         (log,) = set(re.findall(r"log is (\S+)", said))
