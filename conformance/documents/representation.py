@@ -1,7 +1,7 @@
 """Read JSON, XML and YAML bodies by one schema into comparable JSON values."""
 
 import re
-from typing import Any
+from typing import Any, Final
 
 import yaml
 from lxml import etree
@@ -20,6 +20,8 @@ _NULLS = {"", "null", "~", "Null", "NULL"}
 _Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _ByItself: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _COMBINING = frozenset({"allOf", "oneOf", "anyOf"})
+# PyYAML's constructors let Python's own errors through, such as IndexError for `!!int ""`.
+_NO_YAML: Final = (yaml.YAMLError, ValueError, LookupError, TypeError, ArithmeticError, AttributeError)
 _NIL = "{http://www.w3.org/2001/XMLSchema-instance}nil"
 
 
@@ -75,7 +77,7 @@ def parse_yaml(body: bytes) -> Any:
         text = body.decode("utf-8")
         check_yaml(text)
         documents = list(yaml.load_all(text, Loader=_Loader))
-    except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
+    except _NO_YAML as error:
         raise UnreadableError(f"not YAML: {_short(error)}") from error
     while len(documents) > 1 and documents[-1] in (None, ""):
         documents.pop()
@@ -99,7 +101,7 @@ def by_itself(body: bytes) -> Any:
         text = body.decode("utf-8")
         check_yaml(text)
         return next(iter(yaml.load_all(text, Loader=_ByItself)), None)
-    except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
+    except _NO_YAML as error:
         raise UnreadableError(f"not YAML: {_short(error)}") from error
 
 
