@@ -8,7 +8,7 @@ from typing import Any
 
 from reports.formats.cases import MESSAGE, Case, Outcome, cases, worst_first
 from reports.formats.places import places_of
-from reports.pages.untrusted import excerpt
+from reports.pages.untrusted import on_a_line
 
 MOST = 10
 
@@ -27,7 +27,7 @@ def _command(result: Mapping[str, Any], case: Case) -> str:
     command = "error" if case.outcome in {Outcome.FAILED, Outcome.ERROR} else "warning"
     title = f"{case.name} ({case.outcome})"
     properties = f"file={_property(place.file)},line={place.line},title={_property(title)}"
-    return f"::{command} {properties}::{_data(excerpt(case.message, MESSAGE))}"
+    return f"::{command} {properties}::{_data(on_a_line(case.message, MESSAGE))}"
 
 
 def _data(text: str) -> str:
@@ -36,4 +36,4 @@ def _data(text: str) -> str:
 
 
 def _property(text: str) -> str:
-    return _data(excerpt(text, MESSAGE)).replace(":", "%3A").replace(",", "%2C")
+    return _data(on_a_line(text, MESSAGE)).replace(":", "%3A").replace(",", "%2C")

@@ -208,6 +208,10 @@ def test_a_robots_words_do_nothing(hostile):
         assert not re.search(r"(?<!\\)\[|(?<!{){(?!{)", one["message"]["text"])
     assert ctrf(hostile)["summary"]["tests"]
     assert gitlab(hostile)
+    for one in hostile["requirements"]:
+        for failure in one["failures"]:
+            failure["message"] = "a ##vso[task.complete]b ##[group]c"
+    assert not re.search(r"##(vso)?\[", written("annotations", hostile))
 
 
 def test_report_writes_the_formats_that_it_is_asked_for_and_no_other(tmp_path, result):
