@@ -1,5 +1,7 @@
 """Commands that tests run to their end."""
 
+import secrets
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -15,6 +17,22 @@ peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss >> (20 if sys.plat
 open(sys.argv[1], "w").write(str(peak))
 sys.exit(code)
 """
+
+
+# Below the ports that systems give to connections: one of these may take a port before a server listens on it.
+_PORTS = range(10_000, 32_000)
+
+
+def free_port() -> int:
+    """Return a TCP port that nothing listens on."""
+    for _ in _PORTS:
+        port = secrets.choice(_PORTS)
+        try:
+            with socket.create_server(("127.0.0.1", port)):
+                return port
+        except OSError:
+            continue
+    raise OSError("no port is free")
 
 
 def ended(

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import uvicorn
+from processes import free_port
 from starlette.applications import Starlette
 from starlette.responses import JSONResponse
 from starlette.routing import BaseRoute, Route
@@ -33,8 +34,7 @@ def serving_app(app: Any, **settings: Any) -> Iterator[str]:
 @contextmanager
 def behind_nginx(upstream: str, prefix: str, folder: Path, place: str = "") -> Iterator[str]:
     """Serve an upstream server below a path, or by another location block; yields the base URL without that path."""
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
+    port = free_port()
     names = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
     temporary = "".join(f"{name}_temp_path {folder}/{name};" for name in names)
     place = place or f"location {prefix}/ {{ proxy_pass {upstream}/; proxy_set_header Host $http_host; }}"

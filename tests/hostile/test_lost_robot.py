@@ -3,7 +3,6 @@
 import datetime as dt
 import json
 import os
-import socket
 import subprocess
 import sys
 import time
@@ -20,7 +19,7 @@ import pytest
 from aiohttp import web
 from lxml import etree
 from moving_winch import Winch
-from processes import ended
+from processes import ended, free_port
 from small_device import REFUSED, answers, certified, constant, described, error, reading, small_device
 from soap_devices import serving
 
@@ -78,8 +77,7 @@ FAULTS = (
 @contextmanager
 def cart(fault: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """Serve a cart; yields its base URL and its process."""
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
+    port = free_port()
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
     command = [sys.executable, str(Path(moving_cart.__file__)), str(port), fault]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:

@@ -4,7 +4,6 @@ import json
 import os
 import re
 import shlex
-import socket
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from processes import free_port
 
 from conformance.packs.table1.files import CONTRACT_DIR
 from reports.latency.page import latency_markdown
@@ -150,11 +150,10 @@ def wait_for():
     return wait
 
 
-@pytest.fixture
-def free_port():
+@pytest.fixture(name="free_port")
+def free_port_fixture():
     """A TCP port that nothing listens on."""
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return probe.getsockname()[1]
+    return free_port()
 
 
 @pytest.fixture(scope="session")

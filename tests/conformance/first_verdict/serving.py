@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).parents[2]))
+from processes import free_port
 from serving_apps import behind_nginx
 
 FOLDER = Path(__file__).with_name("stock_servers")
@@ -67,8 +68,7 @@ def serving(server: str, *more: str) -> Iterator[str]:
             with behind_nginx(upstream, "", Path(folder), place) as url:
                 yield url
         return
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
+    port = free_port()
     command = [word.format(port=port) for word in (*COMMANDS[server], *more)]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     with subprocess.Popen(command, cwd=FOLDER, start_new_session=True, **quiet) as process:

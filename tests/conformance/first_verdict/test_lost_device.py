@@ -3,7 +3,6 @@
 import os
 import shlex
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from processes import free_port
 from small_device import Outcome, certified
 
 _ARM = Path(__file__).with_name("arm_server.py")
@@ -20,8 +20,7 @@ _ARM = Path(__file__).with_name("arm_server.py")
 @contextmanager
 def arm(how: str, folder: Path) -> Iterator[tuple[str, str]]:
     """Serve an arm; yields its base URL and the command that restarts it."""
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
+    port = free_port()
     pid_file = folder / "pid"
     command = ["env", f"PYTHONPATH={_ARM.parents[2]}", sys.executable, str(_ARM), str(port), how, str(pid_file)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:

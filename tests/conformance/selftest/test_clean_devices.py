@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from processes import free_port
 
 from conformance.cli.selftest import selftest
 
@@ -18,17 +19,11 @@ _DEVICES = Path(__file__).parents[1] / "described_devices"
 _START_S = 60.0
 
 
-def _free_port() -> int:
-    with socket.socket() as sock:
-        sock.bind(("127.0.0.1", 0))
-        return int(sock.getsockname()[1])
-
-
 # Express comes by npm, which not every machine with Node.js has.
 @pytest.fixture(name="device", params=["rig.py", *(["feeder.js"] if shutil.which("npm") else [])])
 def device_fixture(request, tmp_path):
     """Start a clean device; yield the URL of its description."""
-    port, environment = _free_port(), dict(os.environ)
+    port, environment = free_port(), dict(os.environ)
     command = [sys.executable, str(_DEVICES / "rig.py"), "--port", str(port)]
     if request.param == "feeder.js":
         command = [shutil.which("node") or "node", str(_DEVICES / "feeder.js"), str(port)]
