@@ -27,7 +27,8 @@ def read_octets(path: Path, most: int = MOST) -> bytes:
         raise OSError(str(error)) from error
     if outside:
         raise OSError(f"it is a link to a file outside {path.parent}")
-    with open(os.open(path, _FLAGS), "rb") as file:  # noqa: PTH123 - of a descriptor
+    # An opener, as a descriptor of its own stays open where it is no file that can be read.
+    with open(path, "rb", opener=lambda name, _: os.open(name, _FLAGS)) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise OSError("it is no regular file")
         octets = file.read(most + 1)

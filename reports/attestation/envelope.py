@@ -49,14 +49,18 @@ class Opened(NamedTuple):
     signature: bytes
 
 
-def read_envelope(path: Path) -> bytes:
+def read_envelope(path: Path, root: Path | None = None) -> bytes:
     """Return the bytes of an envelope file, but at most 4 MiB + 1 so that `open_envelope` can refuse a larger file.
+
+    Args:
+        path: the file.
+        root: the folder that it must lie in, links followed; None: wherever it is.
 
     Raises:
         ResultMissingError: the file does not exist.
-        ResultUnreadableError: the file cannot be read, or is no regular file.
+        ResultUnreadableError: the file cannot be read, is no regular file, or is a link out of `root`.
     """
-    return read_octets(path, _MOST_BYTES + 1, cut=True)
+    return read_octets(path, _MOST_BYTES + 1, root, cut=True)
 
 
 def open_envelope(octets: bytes) -> Opened:

@@ -7,7 +7,7 @@ import click
 
 from reports.cli.options import CONTRACT, FILE, FOLDER, PATH, FrontDoor, policy_of
 from reports.pages.untrusted import on_a_line
-from reports.registry.entries import Certificate, Refused, find_envelopes, read_entries, read_keys
+from reports.registry.entries import Certificate, Refused, read_entries, read_keys
 from reports.registry.site import INDEX, write_site
 from reports.registry.standing import histories
 
@@ -43,21 +43,22 @@ def build(
     """Write a static site (SITE) from signed certificates: ENVELOPES are files or folders.
 
     Folders are searched for certificate.intoto.json at any depth. The site works without a network. Exit code: 0 every
-    envelope verifies; 1 the site is written, and some envelopes were refused; 2 wrong usage, or a file cannot be read.
+    envelope verifies; 1 the site is written, and some envelopes were refused; 2 no site is written.
     """
     now = dt.datetime.now(dt.UTC)
     wanted, known = policy_of(door, policy, pack)
-    trusted, private = read_keys(keys)
-    entries = read_entries(find_envelopes(envelopes), trusted)
+    trusted, unusable = read_keys(keys)
+    entries = read_entries(envelopes, trusted)
     found = histories((one for one in entries if isinstance(one, Certificate)), wanted, known, now)
     refused = [one for one in entries if isinstance(one, Refused)]
     write_site(out, found, refused, now)
-    for path in private:
-        click.echo(f"{path} is a private key. It was not used; keep it somewhere else.", err=True)
+    for said in unusable:
+        click.echo(on_a_line(said, 400), err=True)
     for one in refused:
         click.echo(f"refused: {on_a_line(one.detail, 400)}", err=True)
     counting = sum(history.current.stands for history in found)
-    click.echo(f"{counting} of {len(found)} robots with a certificate that counts, {len(refused)} refused")
+    have = "robot has" if len(found) == 1 else "robots have"
+    click.echo(f"{counting} of {len(found)} {have} a certificate that counts; {len(refused)} refused")
     click.echo(f"site: {out / INDEX}")
     if refused:
         raise SystemExit(EXIT_REFUSED)

@@ -4,7 +4,8 @@ Nothing from a refused envelope is shown. The site identifies its file by digest
 The person who builds the site sees the details.
 """
 
-from collections.abc import Iterable, Mapping
+import os
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,13 +16,7 @@ from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, read_enve
 from reports.attestation.keys import public_key
 from reports.attestation.signature import unseal
 from reports.attestation.statement import Run, Statement, sha256
-from reports.errors import (
-    EnvelopeRefusedError,
-    KeyUnusableError,
-    ReportError,
-    ResultMissingError,
-    ResultUnreadableError,
-)
+from reports.errors import EnvelopeRefusedError, KeyUnusableError, ReportError, ResultMissingError
 from reports.given_files import read_octets
 
 _PRIVATE = b"PRIVATE KEY-----"
@@ -60,7 +55,7 @@ class Refused:
     """An envelope that was refused, for example because no trusted key signed it.
 
     Attributes:
-        digest: SHA-256 of its file, in hexadecimal.
+        digest: SHA-256 of its file, in hexadecimal; empty if the file cannot be read.
         reason: for the site; it contains nothing from the envelope.
         detail: for the person who builds the site: the file's path, and what is wrong with the file.
     """
@@ -70,62 +65,67 @@ class Refused:
     detail: str
 
 
-def find_envelopes(places: Iterable[Path]) -> list[Path]:
-    """Return the given files, and the path of every certificate.intoto.json at any depth in the given folders.
+def read_keys(directory: Path) -> tuple[dict[str, SSlibKey], list[str]]:
+    """Return the public keys of a folder (*.pem) by fingerprint, and a sentence on each file that cannot be used.
 
     Raises:
-        ResultMissingError: a folder holds no certificate.
-        ResultUnreadableError: a certificate in a folder is a link that leads out of it.
-    """
-    found: dict[Path, None] = {}
-    for place in places:
-        # A folder from others may hold a pipe, or a device that never ends.
-        inside = sorted(filter(Path.is_file, place.rglob(ENVELOPE_NAME))) if place.is_dir() else [place]
-        if not inside:
-            raise ResultMissingError(f"{place}: it holds no {ENVELOPE_NAME}")
-        if place.is_dir() and (leads := [one for one in inside if not one.resolve().is_relative_to(place.resolve())]):
-            raise ResultUnreadableError(f"{leads[0]}: it is a link to a file outside {place}")
-        found |= dict.fromkeys(inside)
-    return list(found)
-
-
-def read_keys(directory: Path) -> tuple[dict[str, SSlibKey], list[Path]]:
-    """Return the public keys of a folder (*.pem) by fingerprint, and the paths of private keys, which are ignored.
-
-    Raises:
-        KeyUnusableError: the folder holds no public key, or a file is not an Ed25519 key.
+        KeyUnusableError: the folder holds no public key.
     """
     keys: dict[str, SSlibKey] = {}
-    private: list[Path] = []
+    unusable: list[str] = []
     for path in sorted(directory.glob("*.pem")):
         try:
             if _PRIVATE in read_octets(path, _MOST_KEY):
-                private.append(path)
+                unusable.append(f"{path} is a private key. It was not used; keep it somewhere else.")
                 continue
+            key = public_key(path)
         except ReportError as error:
-            raise KeyUnusableError(error.message) from error
-        key = public_key(path)
+            unusable.append(f"{error.message}. It was not used, so nothing that it signed is accepted.")
+            continue
         keys[key.keyid] = key
     if not keys:
-        raise KeyUnusableError(f"{directory}: it holds no public key (*.pem) of a signer whom you trust")
-    return keys, private
+        said = f"{directory}: it holds no public key (*.pem) of a signer whom you trust"
+        raise KeyUnusableError("; ".join([said, *unusable]))
+    return keys, unusable
 
 
-def read_entries(paths: Iterable[Path], keys: Mapping[str, SSlibKey]) -> list[Certificate | Refused]:
-    """Read envelope files and verify each by the trusted keys; identical files count once.
+def read_entries(places: Iterable[Path], keys: Mapping[str, SSlibKey]) -> list[Certificate | Refused]:
+    """Read the envelopes of files and folders and verify each by the trusted keys; identical files count once.
+
+    What others put there stops nothing: a file that cannot be read is refused as one that does not verify.
 
     Raises:
-        ResultMissingError: a file does not exist.
-        ResultUnreadableError: a file cannot be read.
+        ResultMissingError: a file or folder does not exist, or there is no certificate at all.
     """
+    paths: dict[Path, Path | None] = {}
+    found: list[Certificate | Refused] = []
+    for place in places:
+        if not os.path.lexists(place):
+            raise ResultMissingError(f"{place}: no such file")
+        root = place if place.is_dir() else None
+        inside = [place] if root is None else sorted(_named_like_envelopes(root))
+        paths |= dict.fromkeys(inside, root)
+        if not inside:
+            found.append(Refused("", "the folder has no certificate", f"{place}: it holds no {ENVELOPE_NAME}"))
+    if not paths:
+        raise ResultMissingError("; ".join(one.detail for one in found if isinstance(one, Refused)))
     files: dict[bytes, Path] = {}
-    for path in paths:
-        files.setdefault(read_envelope(path), path)
-    entries = {path: entry_of(octets, keys) for octets, path in files.items()}
-    return [
-        replace(one, detail=f"{path}: {one.detail}") if isinstance(one, Refused) else one
-        for path, one in entries.items()
-    ]
+    for path, root in paths.items():
+        try:
+            files.setdefault(read_envelope(path, root), path)
+        except ReportError as error:
+            found.append(Refused("", "the file cannot be read", error.message))
+    for octets, path in files.items():
+        entry = entry_of(octets, keys)
+        found.append(replace(entry, detail=f"{path}: {entry.detail}") if isinstance(entry, Refused) else entry)
+    return found
+
+
+def _named_like_envelopes(root: Path) -> Iterator[Path]:
+    """Yield each path in a folder that has a certificate's name; also dangling links, which `rglob` leaves out."""
+    for folder, folders, files in os.walk(root):
+        if ENVELOPE_NAME in (*folders, *files):
+            yield Path(folder) / ENVELOPE_NAME
 
 
 def entry_of(octets: bytes, keys: Mapping[str, SSlibKey]) -> Certificate | Refused:

@@ -4,6 +4,7 @@ import copy
 import datetime as dt
 import json
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -49,8 +50,16 @@ class Host:
         render(folder, Notary(self.folder / vendor / PRIVATE_NAME))
         return folder / "certificate.intoto.json"
 
-    def build(self, *options: str, door: type[Door] = Door) -> Result:
-        words = ["build", str(self.folder / "sent"), "--keys", str(self.folder / "keys"), "--out", str(self.site)]
+    def build(self, *options: str, more: Iterable[Path] = (), door: type[Door] = Door) -> Result:
+        words = [
+            "build",
+            str(self.folder / "sent"),
+            *map(str, more),
+            "--keys",
+            str(self.folder / "keys"),
+            "--out",
+            str(self.site),
+        ]
         return CliRunner().invoke(registry, [*words, *options], obj=door())
 
     def text(self) -> str:

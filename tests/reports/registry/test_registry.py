@@ -54,10 +54,7 @@ def greens(site):
 def test_a_robot_has_a_row_and_a_page(host):
     host.sign("one")
     done = host.build()
-    assert (done.exit_code, done.stdout.splitlines()[0]) == (
-        0,
-        "1 of 1 robots with a certificate that counts, 0 refused",
-    )
+    assert (done.exit_code, done.stdout.splitlines()[0]) == (0, "1 of 1 robot has a certificate that counts; 0 refused")
     assert index(host) == {"Courier 7": ("conformant", {"http": "good", "safety": "good", "describe": "quiet"})}
     row = page_of(host.site / "index.html").xpath("//tbody/tr")[0]
     text = row.text_content()
@@ -298,18 +295,56 @@ def test_what_cannot_be_read_is_told(host, keys, sent, named):
     assert not host.site.exists()
 
 
-def test_what_is_no_file_keeps_nobody_waiting(host):
+def large(path):
+    with path.open("wb") as file:
+        file.truncate(1 << 40)
+
+
+# What a vendor sends in place of a certificate: how it is made, beside the text of a good one.
+BAD_ENTRIES = {
+    "pipe": lambda path, _: os.mkfifo(path),
+    "folder": lambda path, _: path.mkdir(),
+    "device": lambda path, _: path.symlink_to("/dev/zero"),
+    "link to another's": lambda path, _: path.symlink_to("/etc/hostname"),
+    "dangling link": lambda path, _: path.symlink_to("nowhere"),
+    "link in a circle": lambda path, _: path.symlink_to(path.name),
+    "large": lambda path, _: large(path),
+    "empty": lambda path, _: path.touch(),
+    "no UTF-8": lambda path, _: path.write_bytes(b"\xff\xfe"),
+    "deep": lambda path, _: path.write_text("[" * 100_000),
+    "unsigned": lambda path, good: path.write_text(json.dumps(json.loads(good) | {"signatures": []})),
+    "name twice": lambda path, good: path.write_text(good.replace("{", '{"payloadType": "text/plain", ', 1)),
+}
+
+
+@pytest.mark.parametrize("given", ["in a folder", "by their names"])
+def test_bad_entries_are_told_and_left_out(host, given):
+    good = host.sign("one").read_text()
+    bad = [host.folder / ("sent" if given == "in a folder" else ".") / name / ENVELOPE_NAME for name in BAD_ENTRIES]
+    for path, make in zip(bad, BAD_ENTRIES.values(), strict=True):
+        path.parent.mkdir()
+        make(path, good)
+    (host.folder / "nothing").mkdir()
+    done = host.build(more=[host.folder / "nothing", *(bad if given == "by their names" else [])])
+    refused = [line for line in done.stderr.splitlines() if line.startswith("refused: ")]
+    assert (done.exit_code, len(refused)) == (1, len(bad) + 1), done.output
+    for path in (host.folder / "nothing", *bad):
+        assert [line for line in refused if line.startswith(f"refused: {path}: ")], path
+    assert done.stdout.startswith(f"1 of 1 robot has a certificate that counts; {len(refused)} refused")
+    assert list(index(host)) == ["Courier 7"]
+    assert str(host.folder) not in host.text()
+
+
+@pytest.mark.parametrize(
+    ("octets", "why"), [(b"", "not a public key"), (b"\xff" * 9, "not a public key"), (None, "Is a directory")]
+)
+def test_a_key_that_cannot_be_used_is_told_and_left_out(host, octets, why):
     host.sign("one")
-    for name in ("pipe", "folder", "device", "large"):
-        (host.folder / "sent" / name).mkdir()
-    os.mkfifo(host.folder / "sent" / "pipe" / ENVELOPE_NAME)
-    (host.folder / "sent" / "folder" / ENVELOPE_NAME).mkdir()
-    (host.folder / "sent" / "device" / ENVELOPE_NAME).symlink_to("/dev/zero")
-    with (host.folder / "sent" / "large" / ENVELOPE_NAME).open("wb") as large:
-        large.truncate(1 << 40)
+    bad = host.folder / "keys" / "a.pem"
+    bad.mkdir() if octets is None else bad.write_bytes(octets)
     done = host.build()
-    assert done.exit_code == 1
-    assert done.stdout.startswith("1 of 1 robots with a certificate that counts, 1 refused")
+    assert (done.exit_code, f"{bad}: {why}" in done.stderr) == (0, True), done.output
+    assert done.stdout.startswith("1 of 1 robot has")
 
 
 def test_a_private_key_among_the_keys_is_left_alone(host):
