@@ -33,17 +33,34 @@ class AnsweringConnection(asyncio.Protocol, ABC):
     """A connection to one port that writes responses; a subclass parses the requests.
 
     Attributes:
-        since: The event-loop time of the client's last step.
+        since: The time of the client's last step, by ``time.perf_counter``.
         allowed: Seconds that its next step may take; infinity while the robot works on a response.
         is_known: Whether a request of the client has passed the access check.
     """
 
+    __slots__ = (
+        "_ended",
+        "_has_begun",
+        "_held",
+        "_leaving",
+        "_port",
+        "_reading",
+        "_respond",
+        "_stalled",
+        "_task",
+        "_transport",
+        "_unread",
+        "_waiting",
+        "allowed",
+        "is_known",
+        "since",
+    )
+
     def __init__(self, port: Port) -> None:
         self._port = port
         self._respond = port.interface.respond
-        self._now = port.loop.time
         self._transport: asyncio.Transport
-        self.since = self._now()
+        self.since = perf_counter()
         self.allowed = NEVER
         self.is_known = False
         self._has_begun = False  # a request is being received
@@ -94,12 +111,12 @@ class AnsweringConnection(asyncio.Protocol, ABC):
 
     def _allow(self, seconds: float) -> None:
         """Give the client this time for its next step, from now on."""
-        self.since = self._now()
+        self.since = perf_counter()
         self.allowed = seconds
 
     def _allow_next(self) -> None:
         """Give the client time to begin its next request."""
-        self.since = self._now()
+        self.since = perf_counter()
         self.allowed = self._port.keep_alive if self.is_known else self._port.unknown_keep_alive
 
     # Responses, in the order of the requests

@@ -50,6 +50,23 @@ _CONTINUE: Final = b"HTTP/1.1 100 Continue\r\n\r\n"
 class HttpConnection(PacedConnection):
     """A connection to one port that parses requests and answers them."""
 
+    __slots__ = (
+        "_admit",
+        "_after_head",
+        "_arriving",
+        "_content",
+        "_fields",
+        "_handshake",
+        "_head_size",
+        "_in_head",
+        "_is_proxied",
+        "_is_refused",
+        "_is_stopped",
+        "_parser",
+        "_request",
+        "_target",
+    )
+
     def __init__(self, port: Port, handshake: Client | None = None) -> None:
         """Create a connection; ``handshake`` is the TLS handshake whose place in the port it takes."""
         super().__init__(port)
@@ -66,7 +83,6 @@ class HttpConnection(PacedConnection):
         self._content: bytes | bytearray = b""
         self._is_refused = False  # the error response is sent, and the rest of the body is dropped
         self._after_head = 0  # bytes in the segments after the one in which the head ended
-        self._received = 0  # bytes of content
         self._arriving = 0  # bytes kept for this request
         self._is_stopped = False  # the parser stops after this head
 
@@ -107,7 +123,7 @@ class HttpConnection(PacedConnection):
         else:
             if self._has_begun:
                 self._hold_arriving()
-                if self._after_head > FRAMING_LIMIT + FRAMING_PER_BYTE * self._received:
+                if self._after_head > FRAMING_LIMIT + FRAMING_PER_BYTE * (len(self._content) + self._dropped):
                     self._refuse(framing_too_large())
 
     def _ignore_upgrade(self, rest: bytes) -> None:
@@ -121,16 +137,13 @@ class HttpConnection(PacedConnection):
         headers = self._request.headers if self._request is not None else {}
         framing = [b"%b: %b\r\n" % (name, headers[name]) for name in FRAMING_FIELDS if name in headers]
         self._parser.feed_data(b"POST / HTTP/1.1\r\nhost: a\r\n%b\r\n" % b"".join(framing))
-        if rest:
-            self._take(rest)
+        self._take(rest)
 
     # Callbacks of the parser; an exception stops it
 
     def on_message_begin(self) -> None:
-        """Start the deadline for receiving the request that begins."""
+        """Note that a request is being received; its deadline starts when its first segment does not contain all."""
         self._has_begun = True
-        if not self._stalled:
-            self._allow(self._port.patience if self.is_known else self._port.unknown_patience)
 
     def on_url(self, url: bytes) -> None:
         """Store a part of the request target; raise the Problem 414 if the target is too long."""
@@ -182,7 +195,6 @@ class HttpConnection(PacedConnection):
 
     def on_body(self, body: bytes) -> None:
         """Store a part of the body, or drop it if the request has been refused."""
-        self._received += len(body)
         request = self._request
         if request is None or self._is_refused:
             self._dropped += len(body)
@@ -209,7 +221,7 @@ class HttpConnection(PacedConnection):
         request, refused = self._request, self._is_refused
         self._has_begun = self._is_refused = False
         self._in_head = True
-        self._head_size = self._after_head = self._received = 0
+        self._head_size = self._after_head = 0
         self._target = b""
         self._fields = []
         self._request = None
@@ -237,6 +249,7 @@ class HttpConnection(PacedConnection):
     def _refuse_one(self, request: Request, problem: Problem) -> None:
         """Answer a request with an error before its body is complete; the rest of the body will be dropped."""
         self._is_refused = True
+        self._dropped += len(self._content)
         self._content = b""
         self._queue(request, described(problem, request.headers.get(b"accept")))
 
@@ -262,6 +275,8 @@ class HttpConnection(PacedConnection):
 
     def _hold_arriving(self) -> None:
         """Count the memory of the incomplete request; refuse the request if its head is too large or memory is full."""
+        if not self._arriving and not self._stalled and not self._leaving:
+            self._allow(self._port.patience if self.is_known else self._port.unknown_patience)
         if self._in_head:
             if not self._head_size:  # the head began in the middle of a segment
                 self._head_size = len(self._target) + sum(len(name) + len(value) for name, value in self._fields)

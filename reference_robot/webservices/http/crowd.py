@@ -10,9 +10,9 @@ A connection that is in use keeps its place, unless its address has far more con
 """
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Hashable
-from ipaddress import IPv6Address, ip_address
+from ipaddress import IPv6Address
 from typing import Any, Final, Protocol
 
 NEVER: Final = math.inf
@@ -24,7 +24,7 @@ class Client(Protocol):
     """A connection as seen by its port.
 
     Attributes:
-        since: The event-loop time of the client's last step, such as connecting or the end of its last request.
+        since: The time of the client's last step, such as connecting or its last response, by ``time.perf_counter``.
         allowed: Seconds that its next step may take; infinity while the robot works on a response.
         is_known: Whether a request of the client has passed the access check.
     """
@@ -51,13 +51,12 @@ def address_of(peer: Any) -> Hashable:
 
     One host usually has all addresses of a /64 network. ``peer`` is the address that ``getpeername`` returned, or None.
     """
-    if not peer:
-        return None
-    address = ip_address(str(peer[0]).partition("%")[0])
-    if isinstance(address, IPv6Address):
-        # A dual-stack socket reports IPv4 clients as IPv4-mapped IPv6 addresses (RFC 4291 2.5.5.2).
-        return address.ipv4_mapped or int(address) >> 64
-    return address
+    host = str(peer[0]) if peer else ""
+    if ":" not in host:
+        return host
+    address = IPv6Address(host.partition("%")[0])
+    # A dual-stack socket reports IPv4 clients as IPv4-mapped IPv6 addresses (RFC 4291 2.5.5.2).
+    return str(address.ipv4_mapped or int(address) >> 64)
 
 
 class Crowd:
@@ -74,7 +73,7 @@ class Crowd:
         self._most_of_address = most_of_address
         self._is_guarded = is_guarded
         self._address_of: dict[Client, Hashable] = {}
-        self._counts: Counter[Hashable] = Counter()
+        self._counts: defaultdict[Hashable, int] = defaultdict(int)
 
     def __len__(self) -> int:
         return len(self._address_of)
@@ -86,8 +85,10 @@ class Crowd:
         """Return whether a new client of this address gets a place; if need be, others give way."""
         if self._counts[address] >= self._most_of_address:
             self._make_room(address, [one for one in self if self._address_of[one] == address], now)
-        elif len(self) >= self._most:
+        elif len(self._address_of) >= self._most:
             self._make_room(address, list(self), now)
+        else:
+            return True
         return self._counts[address] < self._most_of_address and len(self) < self._most
 
     def add(self, client: Client, address: Hashable) -> None:

@@ -21,6 +21,8 @@ _AT_ONCE: Final = 4  # postponed requests of one client that are parsed in its t
 class PacedConnection(AnsweringConnection):
     """A connection that takes turns with others; a subclass parses the requests."""
 
+    __slots__ = ("_dropped", "_postponed")
+
     def __init__(self, port: Port) -> None:
         super().__init__(port)
         self._postponed = b""

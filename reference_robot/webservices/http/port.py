@@ -110,7 +110,7 @@ class Port:
             peer: The address of its other end, from ``getpeername``.
         """
         address: Any = client if self.proxies.include(peer) else address_of(peer)
-        has_place = self._clients.has_place_for(address, self.loop.time())
+        has_place = self._clients.has_place_for(address, time.perf_counter())
         self._clients.add(client, address)
         self.is_empty.clear()
         return has_place
@@ -161,7 +161,7 @@ class Port:
         """Update the Date field and whether to poll, end connections whose time is over; called every half second."""
         self.date = _date()
         self._may_poll = not _is_crowded()
-        now = self.loop.time()
+        now = time.perf_counter()
         for client in self._clients:
             if client.since + client.allowed <= now:
                 client.expire()

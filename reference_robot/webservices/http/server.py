@@ -5,6 +5,7 @@ import contextlib
 import logging
 import socket
 import ssl
+from time import thread_time
 from typing import Any, Final
 
 from reference_robot.webservices.http.connection import HttpConnection
@@ -13,6 +14,7 @@ from reference_robot.webservices.http.tls import begin_handshake
 
 _LOGGER: Final = logging.getLogger(__name__)
 _AT_ONCE: Final = 64  # connections that are accepted before clients that have one get their turn
+_SHORT_TURN: Final = 2e-3  # seconds of processor time; one connection in each such turn accepts a full backlog in 2 s
 _PAUSE: Final = 0.1  # seconds after a failed accept
 _BACKLOG: Final = 1024  # connections that may wait to be accepted
 _TICK: Final = 0.5  # seconds
@@ -54,7 +56,8 @@ class _Accepting:
     """Accepts connections, many at a time.
 
     ``create_server`` accepts one connection in each turn of the event loop. New clients would wait behind the
-    connections of a client that opens many. So whenever it has accepted one, this class accepts those that wait, too.
+    connections of a client that opens many. So after a long turn, this class accepts all connections that wait. After a
+    short turn it does not look for more, because each look costs as much as a tenth of a request.
     """
 
     def __init__(self, port: Port, listener: socket.socket, context: ssl.SSLContext | None) -> None:
@@ -63,6 +66,7 @@ class _Accepting:
         self._context = context
         self._server: asyncio.Server | None = None
         self._tasks: set[asyncio.Task[Any]] = set()
+        self._accepted_at = 0.0  # processor time of this thread
 
     async def begin(self) -> None:
         """Accept connections from now on."""
@@ -84,7 +88,10 @@ class _Accepting:
             self._port.loop.add_reader(self._listener, self._accept)
 
     def _accepted(self) -> HttpConnection:
-        self._accept()
+        now = thread_time()
+        if now > self._accepted_at + _SHORT_TURN:
+            self._accept()
+        self._accepted_at = now
         return HttpConnection(self._port)
 
     def _accept(self) -> None:

@@ -5,6 +5,7 @@ import contextlib
 import socket
 import ssl
 from pathlib import Path
+from time import perf_counter
 from typing import Any, Final
 
 from conformance.commandline.secret_file import warn_if_shared
@@ -89,7 +90,7 @@ class _Handshake:
         self._port = port
         self._client = client
         self._task: asyncio.Task[None] | None = None
-        self.since = port.loop.time()
+        self.since = perf_counter()
         self.allowed = port.unknown_patience
 
     def begin(self, context: ssl.SSLContext) -> None:

@@ -8,6 +8,8 @@ import time
 import pytest
 from web_protocol import closed, request, runs, statuses, until
 
+from reference_robot.webservices.http.connection import HttpConnection
+
 
 @runs()
 async def test_what_waits_does_not_let_later_requests_overtake(robot):
@@ -155,3 +157,8 @@ async def test_the_event_loop_polls_after_requests_that_follow_at_once_and_only_
     robot.port.tick()
     later = time.perf_counter() + 0.1
     assert await processor_time(later, later) < 0.01, "polled on a crowded machine"
+
+
+@runs()
+async def test_the_attributes_of_a_connection_are_in_slots_which_saves_time_and_memory(robot):
+    assert not hasattr(HttpConnection(robot.port), "__dict__")

@@ -1,10 +1,11 @@
 """What one client, or all together, may use of the HTTP server: sizes, times, connections, memory."""
 
+import asyncio
 import ssl
 
 import pytest
 from web_certificate import pair
-from web_protocol import BIG, PATIENCE, closed, request, runs, statuses, until
+from web_protocol import BIG, PATIENCE, TIMEOUT, closed, request, runs, statuses, until
 
 from reference_robot.webservices.http.messages import BODY_LIMIT
 from reference_robot.webservices.http.tls import server_context
@@ -46,6 +47,30 @@ async def test_whatever_is_left_half_done_after_an_answer_runs_out_of_time(robot
         await reader.readuntil(b"\r\n\r\n")
         writer.write(between)
         assert statuses(await closed(reader)) == status
+
+
+UPGRADE = ("Connection: Upgrade", "Upgrade: h2c", "Content-Length: 900")
+SLOW = {
+    "a head": (b"GET /now?", [408]),
+    "content": (request("/now", "Content-Length: 900", method="PUT"), [408]),
+    "content after an offer to upgrade": (request("/now", *UPGRADE, method="PUT"), [408]),
+    "content that is refused": (request("/closed", "Content-Length: 900", method="PUT"), [401]),
+    "the next head in the same segment": (request() + b"GET /now?", [200, 408]),
+}
+
+
+@pytest.mark.parametrize("more", [b"", b"x"], ids=["silent", "slow"])
+@pytest.mark.parametrize(("first", "expected"), SLOW.values(), ids=SLOW)
+@runs(keep_alive=10 * TIMEOUT)
+async def test_the_time_for_a_request_begins_with_its_first_segment(robot, first, expected, more):
+    async with robot.talk(request()) as (reader, writer):
+        await reader.readuntil(b"\r\n\r\n")
+        writer.write(first)
+        ended = asyncio.create_task(closed(reader))
+        while not ended.done():
+            writer.write(more)
+            await asyncio.sleep(0.05)
+        assert statuses(await ended) == expected
 
 
 @runs()
