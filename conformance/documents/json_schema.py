@@ -174,6 +174,8 @@ def _lazy(uri: str) -> Any:
 def whole(schema: Schema) -> Schema:
     """Return a schema with the words that its lazy reference leads to; one without such a reference as it is."""
     reference = schema.get("$ref")
+    if reference is None:
+        return schema
     seen: set[str] = set()
     while isinstance(reference, str) and reference.startswith(_SCHEME) and reference not in seen:
         seen.add(reference)

@@ -220,6 +220,8 @@ def flat(schema: Schema, within: frozenset[str] = frozenset()) -> Schema:
         schema: the schema.
         within: references that are being merged; a schema that combines itself adds nothing to itself.
     """
+    if "$ref" not in schema and _COMBINING.isdisjoint(schema):
+        return schema
     reference = str(schema.get("$ref", ""))
     if reference and reference in within:
         return {}

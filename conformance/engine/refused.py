@@ -6,10 +6,12 @@ import re
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.statuses import REFUSALS
+from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.documents.resources import matching
 from conformance.documents.wsdl_pack import services_of
@@ -32,6 +34,19 @@ def is_refused(exchange: Exchange) -> bool:
     answer = exchange.response
     is_fault = answer.status >= _ERRORS and "xml" in answer.media_type and bool(_FAULT.search(answer.body))
     return answer.status in REFUSALS or is_fault
+
+
+def _carries_credentials(request: Request) -> bool:
+    return any(is_shown(text) for text in (*(value for _, value in request.headers), request.query))
+
+
+def _speaks_soap(contract: Contract) -> bool:
+    return bool(contract.publishers_path or contract.subscribers_path or services_of(contract))
+
+
+@lru_cache(maxsize=8)
+def _declares_security(contract: Contract) -> bool:
+    return any(operation.security for operation in operations_of(contract))
 
 
 @dataclass
@@ -69,9 +84,10 @@ class RefusalListener(Listener):
             NotPossibleError: the device has begun to refuse the credentials, which ends the running check.
         """
         request, answer = exchange.request, exchange.response
-        carries = any(is_shown(text) for text in (*(value for _, value in request.headers), request.query))
+        if self._looks or (self.has_credentials and not _carries_credentials(request)):
+            return
         demands = self._demands(request)
-        if self._looks or demands is None or (self.has_credentials and not carries):
+        if demands is None:
             return
         if not is_refused(exchange):
             is_accepted = answer.status < _ERRORS
@@ -93,8 +109,7 @@ class RefusalListener(Listener):
     def _demands(self, request: Request) -> bool | None:
         """Return whether a request is for what demands credentials; None if it shows nothing of that."""
         contract, rest = self.run.contract, self.rest()
-        speaks_soap = contract.publishers_path or contract.subscribers_path or services_of(contract)
-        if request.method == "POST" and "xml" in request.media_type and speaks_soap:
+        if request.method == "POST" and "xml" in request.media_type and _speaks_soap(contract):
             return True
         if rest is None or not request.url.startswith(rest.client.base_url):
             return None
@@ -102,8 +117,7 @@ class RefusalListener(Listener):
         operation = matching(contract, method, request.url[len(rest.client.base_url) :].partition("?")[0])
         if operation is None:
             return None
-        declared = any(item.security for item in operations_of(contract))
-        return not declared or (bool(operation.security) and all(operation.security))
+        return all(operation.security) if operation.security else not _declares_security(contract)
 
     def _is_refused_now(self) -> bool:
         """Send a request that the device has accepted before; return whether it is refused now."""

@@ -221,9 +221,9 @@ class HttpClient:
         fields = self._fields(method, tuple(headers), body, close=fresh)
         shown = tuple((name, value) for name, value in fields if name != "Connection")
         sent, target, query = list(fields), path, ""
-        authorized = authorized and self._authorized
+        credentials = self.connection.credentials
+        authorized = authorized and self._authorized and bool(credentials)
         if authorized:
-            credentials = self.connection.credentials
             target, query = credentials.target(path), credentials.target(path, shown=True)[len(path) :]
             sent = credentials.added(fields, method, self.prefix + target)
             shown = tuple(credentials.added(shown, shown=True))

@@ -87,7 +87,8 @@ class Request:
 
 def sendable(target: str) -> str:
     """Return a request target with everything percent-encoded that HTTP cannot carry, such as letters beyond ASCII."""
-    return quote(target, safe=_SENDABLE, errors="surrogateescape")
+    is_sendable = target.isascii() and target.isprintable() and " " not in target
+    return target if is_sendable else quote(target, safe=_SENDABLE, errors="surrogateescape")
 
 
 def media_type_of(content_type: str) -> str:

@@ -180,7 +180,7 @@ class Judge:
         evidence = self.evidence.get(requirement)
         if evidence is None:
             return holds
-        cases = sum(one.seen for one in operations) or 1
+        cases = (sum(one.seen for one in operations) if operations else 0) or 1
         evidence.cases += cases
         evidence.parts[part] = evidence.parts.get(part, 0) + cases
         evidence.checks.add(self.check_name)

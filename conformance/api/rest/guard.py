@@ -56,10 +56,12 @@ class Guard:
         if not (acts or self._is_stale) or (self._process is None and not acts):
             return
         with self._lock:
-            self._is_stale, started = True, time.monotonic()
             # A contract pack stops its device always in the same way.
-            is_dear = self._spent_s > _FREE_S + _SHARE * (started - self._began)
-            if is_dear or (self._is_alive and not self._api.run.contract.described):
+            if not self._api.run.contract.described and self._is_alive:
+                self._is_stale = False
+                return
+            self._is_stale, started = True, time.monotonic()
+            if self._spent_s > _FREE_S + _SHARE * (started - self._began):
                 return
             self._is_stale = acts
             stops = [_told_of(one) for one in self._drafts() if one.method not in SAFE_METHODS]
