@@ -10,6 +10,7 @@ from typing import Any
 import click
 import msgspec
 
+from conformance.commandline.device_options import advice
 from conformance.commandline.extras import lacking_soap
 from conformance.commandline.out_folder import FolderError, held
 from conformance.contract.pack import Contract
@@ -154,7 +155,9 @@ def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> 
             raise StatementError(f"{key.replace('_', '-')} {url!r} is no URL: it has to start with http:// or https://")
     if not where.interfaces:
         raise StatementError(
-            "no robot is named: give --rest, --publishers-wsdl or --subscribers-wsdl, or a STATEMENT with [endpoints]"
+            "no robot is named: give "
+            + advice("--rest, --publishers-wsdl or --subscribers-wsdl, or ")
+            + "a STATEMENT with [endpoints]"
         )
     _check_soap(where.interfaces)
     claims = declared.claims
@@ -204,4 +207,4 @@ def hold_folder(out: Path) -> None:
     try:
         click.get_current_context().with_resource(held(out))
     except FolderError as error:
-        raise click.UsageError(f"--out {out}: {error}") from error
+        raise click.UsageError(f"{advice('--out ')}{out}: {error}") from error

@@ -1,5 +1,6 @@
-"""The click options on a device with a description that several commands share: where, what may be called, who asks."""
+"""The click options on a device with a description that several commands share, and advice that names options."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -8,6 +9,7 @@ import click
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 _FILE = click.Path(exists=True, dir_okay=False)
+_OPTION = re.compile(r"--[a-z][a-z-]+")
 
 _DESCRIPTION = (
     click.option("--openapi", metavar="URL|FILE", help="The device's own OpenAPI or Swagger description: go by that."),
@@ -51,6 +53,17 @@ _CREDENTIALS = (
     click.option("--client-cert-file", type=_FILE, help="Client certificate (PEM) for HTTPS."),
     click.option("--client-key-file", type=_FILE, help="Its key, if it is not in the same file."),
 )
+
+
+def advice(*texts: str) -> str:
+    """Return the first of these texts that names no option that the running command lacks; empty if there is none.
+
+    Several commands read the same files and reach the same servers, with different options. Where no command runs, the
+    first text is returned.
+    """
+    running = click.get_current_context(silent=True)
+    known = {option for one in running.command.params for option in one.opts} if running else None
+    return next((text for text in texts if known is None or known.issuperset(_OPTION.findall(text))), "")
 
 
 def description_options(command: _Command) -> _Command:

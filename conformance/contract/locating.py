@@ -49,8 +49,8 @@ def folder_of(pack: Path | str) -> Path:
         return Path(pack)
     installed = sorted(entry.name for entry in entry_points(group=ENTRY_POINTS))
     raise ContractError(
-        f"{name} is neither a folder nor a contract pack; --contract takes a folder with openapi.yaml and/or *.wsdl "
-        f"in it, or one of {', '.join([*built_in_packs(), *installed])}"
+        f"{name} is neither a folder with openapi.yaml and/or *.wsdl in it, nor one of the contract packs "
+        f"{', '.join([*built_in_packs(), *installed])}"
     )
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote, urlsplit
 
+from conformance.commandline.device_options import advice
 from conformance.contract.document_text import parsed
 from conformance.documents.description_faults import unresolved
 from conformance.documents.json_schema import Schema, UnresolvedError
@@ -274,11 +275,8 @@ def _base_url(source: str, document: Schema, trust: Trust) -> tuple[str, tuple[s
     if known:
         return trust.place(known[0]).partition("?")[0].rstrip("/"), ()
     here = f"{urlsplit(source).scheme}://{urlsplit(source).netloc}{path_of(wholes[0])}".rstrip("/")
-    remark = (
-        f"The description names the server {wholes[0]}. Tested was {here}, from where it was read; --base-url changes "
-        "that."
-    )
-    return here, (remark,)
+    remark = f"The description names the server {wholes[0]}. Tested was {here}, from where it was read"
+    return here, (f"{remark}{advice('; --base-url changes that')}.",)
 
 
 def _with_defaults(server: Schema) -> str:

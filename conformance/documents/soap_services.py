@@ -13,6 +13,7 @@ from typing import Final
 
 from lxml import etree
 
+from conformance.commandline.device_options import advice
 from conformance.documents.addressing import addressing_action, is_http, wants_addressing
 from conformance.documents.wsdl_gaps import gaps
 from conformance.documents.wsdl_imports import Fetch, Locate, collect
@@ -127,7 +128,8 @@ def read_services(
     if address:
         ports = tuple(replace(port, url=address) for port in ports) or tuple(reader.bindings(address))
     if not ports:
-        raise WsdlError(f"{location} has no port over HTTP: name the address of the service with --base-url")
+        how = advice(" with --base-url", ", as in [api] base_url of a statement")
+        raise WsdlError(f"{location} has no port over HTTP: name the address of the service{how}")
     try:
         types = Types.compiled([*found.schemas, *reader.wrappers])
     except SchemaError as error:

@@ -4,13 +4,13 @@ from collections.abc import Iterable
 from typing import Final
 from urllib.parse import urlsplit
 
+from conformance.commandline.device_options import advice
 from conformance.documents.wsdl_imports import Collected
 from conformance.documents.xml_names import namespace
 from conformance.documents.xsd import Types
 
 # How libxml2 and xmlschema call content models that break the rule of unique particle attribution.
 _AMBIGUOUS: Final = ("determinist", "Unique Particle Attribution")
-_AS_ANY: Final = "What it declares counts as any content; give its folder by --schemas."
 
 
 def gaps(
@@ -29,14 +29,13 @@ def gaps(
     own = f"{location.partition('://')[0]}://{urlsplit(location).netloc}/" if "://" in location else ""
     gone = {place: why for place, why in found.missing.items() if own and place.startswith(own)}
     faults = [f"{place} could not be read: {reason}" for place, reason in gone.items()]
+    as_any = f"What it declares counts as any content{advice('; give its folder by --schemas')}."
     notes = [
-        f"{place} could not be read: {reason}. {_AS_ANY}"
-        for place, reason in found.missing.items()
-        if place not in gone
+        f"{place} could not be read: {reason}. {as_any}" for place, reason in found.missing.items() if place not in gone
     ]
     for space in found.lacking:
         if not found.imported[space] and any(one.space == space for one in types.unknown):
-            notes += [f"No location leads to a schema of {space}. {_AS_ANY}"]
+            notes += [f"No location leads to a schema of {space}. {as_any}"]
     if not found.missing:
         faults += [
             f"its schemas name the {one.kind} {one.tag}, which no document declares"

@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 
 from lxml import etree
 
+from conformance.commandline.device_options import advice
 from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import WSDL, XSD, clark
 from conformance.documents.xsd_assembly import SchemaDocument, resolved
@@ -91,7 +92,7 @@ def _root_of(wsdl: bytes) -> etree._Element:
     if not head:
         raise ValueError("an empty document")
     if head.startswith((b"{", b"[")):
-        raise ValueError("JSON: an OpenAPI description goes with --openapi")
+        raise ValueError("JSON" + advice(": an OpenAPI description goes with --openapi"))
     try:
         root = parse(wsdl, doctype=True)
         problem = f"the root element {root.tag} instead of wsdl:definitions"

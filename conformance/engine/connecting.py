@@ -10,6 +10,7 @@ from urllib.parse import parse_qsl
 
 import msgspec
 
+from conformance.commandline.device_options import advice
 from conformance.commandline.secrecy import SECRETS
 from conformance.commandline.secret_file import read_secret, warn_if_shared
 from conformance.documents.json_text import read_json
@@ -43,7 +44,7 @@ def connection_of(where: Endpoints) -> Connection:
             hosts=where.trust_hosts,
         )
     except ValueError as error:
-        raise StatementError(f"--trust-host: {error}") from error
+        raise StatementError(f"trusted host: {error}") from error
     found = Connection(
         timeout_s=where.timeout_s,
         ca_file=Path(where.ca_file) if where.ca_file else None,
@@ -80,7 +81,10 @@ def keyed(where: Endpoints, document: dict[str, Any]) -> Endpoints:
     }
     if len(wanted) != 1:
         named = f"wants {' and '.join(sorted(wanted))}" if wanted else "names no scheme of type apiKey"
-        raise StatementError(f"the description {named}: say where the API key goes, as in --api-key 'header X-Api-Key'")
+        raise StatementError(
+            f"the description {named}: say where the API key goes, as in "
+            + advice("--api-key 'header X-Api-Key'", '[endpoints] api_key = "header X-Api-Key"')
+        )
     return msgspec.structs.replace(where, api_key=wanted.pop())
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urljoin, urlsplit
 
+from conformance.commandline.device_options import advice
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.documents.description import Description, DescriptionError, is_url, read_description
@@ -133,9 +134,11 @@ def _check_server(source: str, base: str, endpoints: Endpoints, connection: Conn
     """
     secret = connection.credentials or connection.certificate or endpoints.auth or endpoints.username_token_file
     if not is_url(source) and (secret or endpoints.api_key_file) and not trusting(connection).trusts(base):
+        host = urlsplit(base).netloc.rpartition("@")[2]
+        how = advice(f", as by --base-url {base}, or allow it by --trust-host {host}", f", as by --base-url {base}")
         raise DescriptionError(
             f"{source} names the server {base}, and no description decides where credentials go: name the server "
-            f"yourself, as by --base-url {base}, or allow it by --trust-host {urlsplit(base).netloc.rpartition('@')[2]}"
+            f"yourself{how}"
         )
 
 
@@ -172,9 +175,8 @@ def described_contract(
     found = fetch_description(source, overlays, connection, base_url or endpoints.rest, allow_files=allow_files)
     base = base_url or endpoints.rest or found.base_url
     if not base:
-        raise DescriptionError(
-            f"{source} names no server: say where the API is with --base-url, as in --base-url http://robot:8000"
-        )
+        how = advice(" with --base-url, as in --base-url http://robot:8000", ", as in [api] base_url of a statement")
+        raise DescriptionError(f"{source} names no server: say where the API is{how}")
     if not (base_url or endpoints.rest):
         _check_server(source, base, endpoints, connection)
     document = without_credentials(found.document, connection.credentials.places)
@@ -194,8 +196,8 @@ def _server_of_ports(found: SoapDescription, source: str, trust: Trust) -> tuple
     if trust.trusts(url):
         return server_of(trust.place(url)), ""
     here = server_of(trust.place(source))
-    remark = f"The WSDL names the address {url}, on another server. Tested was {here}, from where the WSDL was read; "
-    return here, f"{remark}--base-url and --trust-host change that."
+    remark = f"The WSDL names the address {url}, on another server. Tested was {here}, from where the WSDL was read"
+    return here, f"{remark}{advice('; --base-url and --trust-host change that', '; --base-url changes that')}."
 
 
 def soap_contract(

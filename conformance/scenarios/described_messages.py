@@ -15,6 +15,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.messages import ordinary, simple_leaves, unknown_in, with_text
 from conformance.api.soap.username_token import block_of
+from conformance.commandline.device_options import advice
 from conformance.documents.addressing import addressing_blocks
 from conformance.documents.soap_services import SoapDescription, SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import services_of
@@ -134,7 +135,8 @@ class DescribedMessages:
                 if values:
                     node = with_text(node, path, str(values[turn % len(values)]))
             if lacking := unknown_in(declared, node):
-                fault = f"no document declares what {lacking} holds: give the folder of its schema by --schemas"
+                how = advice(": give the folder of its schema by --schemas")
+                fault = f"no document declares what {lacking} holds{how}"
                 continue
             fault = self.found.types.invalid(parse(node.written()))
             if not fault:

@@ -13,6 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
 
+from conformance.commandline.device_options import advice
 from conformance.contract.pack import Contract
 from conformance.mutation.self_test import GoodDevice, Start, self_test_of
 
@@ -123,7 +124,9 @@ def _own_domain(first: int) -> Iterator[int]:
                 continue
             yield domain
             return
-    raise RobotError(f"all ROS domains from {first} to {_DOMAINS - 1} are taken; --domain-id names another first one")
+    raise RobotError(
+        f"all ROS domains from {first} to {_DOMAINS - 1} are taken{advice('; --domain-id names another first one')}"
+    )
 
 
 @contextlib.contextmanager

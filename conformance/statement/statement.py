@@ -91,7 +91,7 @@ class Statement(msgspec.Struct, frozen=True):
         Raises:
             StatementError: this type of statement has no ROS domain.
         """
-        raise StatementError(f"--ros-domain-id {domain_id}: this contract has no ROS probe")
+        raise StatementError(f"ROS domain {domain_id}: this contract has no ROS probe")
 
     def claimed(self, contract: Contract) -> tuple[str, ...]:
         """Return the classes to judge: those claimed, or, without claims, those whose interfaces all have an address.

@@ -16,6 +16,7 @@ from typing import Final
 
 import httpx
 
+from conformance.commandline.device_options import advice
 from conformance.transport.client import Connection
 from conformance.transport.credentials import Credentials
 from conformance.transport.reach import ElsewhereError, Trust, UnreachableError
@@ -110,7 +111,10 @@ class Fetcher:
         reason = self._trust.refusal(url)
         if reason and self._connection.credentials:
             return f"; it got no credentials: {reason}"
-        return "; are credentials missing, as by --token-file or --basic-file?"
+        how = advice(
+            ", as by --token-file or --basic-file?", ", as by --token-file?", "? Save it to a file, and name that"
+        )
+        return f"; are credentials missing{how}"
 
 
 class _Guard(httpx.BaseTransport):

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Final, NamedTuple, Self
 from urllib.parse import urljoin, urlsplit, urlunsplit
 
+from conformance.commandline.device_options import advice
+
 #: The port of a scheme where a URL names none.
 PORTS: Final = {"http": 80, "https": 443}
 _BLANK: Final = re.compile(r"[\x00-\x20\x7f]")
@@ -119,7 +121,7 @@ class Trust:
         flag = f"[{wanted.host}]" if ":" in wanted.host else wanted.host
         alike = next((one.host for one, _ in known if {one.host, wanted.host} <= _HERE and one.host != wanted.host), "")
         names = f", as {alike} and {wanted.host} are different names" if alike else ""
-        return f"it is on another server{names}; --trust-host {flag}:{wanted.port} allows that"
+        return f"it is on another server{names}" + advice(f"; --trust-host {flag}:{wanted.port} allows that")
 
     def trusts(self, url: str) -> bool:
         """Return whether a URL is on a server to which credentials may go."""
@@ -209,7 +211,9 @@ class Folder:
                 raise ElsewhereError("it is neither a file nor a URL of a server")
             folder = Path(self.source).parent
             if not self.anywhere and not _is_inside(file, folder):
-                raise ElsewhereError(f"it is outside the description's folder {folder}; --allow-files allows that")
+                raise ElsewhereError(
+                    f"it is outside the description's folder {folder}" + advice("; --allow-files allows that")
+                )
         if file.exists() and not file.is_file():
             raise ValueError("it is no file")
         with file.open("rb") as opened:

@@ -27,7 +27,7 @@ def unseal(octets: bytes, key: Key) -> Statement:
     if opened.keyid != key.keyid:
         raise EnvelopeRefusedError(
             f"foreign key: it is signed by {opened.keyid[:64]!r}, but your key is {key.keyid}. "
-            "If the vendor has a new key, compare its fingerprint over a second channel, and give that key with --key"
+            "If the vendor has a new key, compare its fingerprint over a second channel, and use that key"
         )
     signature = Signature(opened.keyid, opened.signature.hex())
     try:

@@ -62,7 +62,7 @@ class Notary:
         if problems:
             raise ResultUnsignableError(
                 f"{path}: not signed. Only the complete and unchanged result of one run is. Found: "
-                f"{'; '.join(problems[:5])}. Certify again, with --sign KEY"
+                f"{'; '.join(problems[:5])}. Certify again, with `roaas certify --sign KEY`"
             )
 
     def envelope(self, path: Path, octets: bytes, result: Mapping[str, Any], pages: Mapping[str, str]) -> str:

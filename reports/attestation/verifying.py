@@ -85,7 +85,7 @@ def _result_in(directory: Path) -> Any:
     try:
         return strict_json(read_octets(path, root=directory))
     except ResultMissingError as error:
-        raise ResultMissingError(f"{path}: no such file. --result DIR is the folder that the vendor sent") from error
+        raise ResultMissingError(f"{path}: no such file. Name the folder that the vendor sent") from error
     except (ValueError, RecursionError):
         return None
 

@@ -139,7 +139,7 @@ def _same_load(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str,
     _same_cap(old, new, names)
     scenarios = [plan.get("scenario") for plan in (old, new)]
     if scenarios[0] != scenarios[1]:
-        raise ResultsIncompatibleError(f"{names[0]} and {names[1]} were measured with different scenarios (--scenario)")
+        raise ResultsIncompatibleError(f"{names[0]} and {names[1]} were measured with different scenarios")
     before, after = old.get("rate"), new.get("rate")
     if (before is None) != (after is None) or (
         before is not None and after is not None and abs(after - before) > _SAME_RATE * max(before, after)
