@@ -14,7 +14,9 @@ from functools import cached_property
 from queue import Empty, SimpleQueue
 from typing import Final
 
+import click
 import httpx
+from click.globals import push_context
 
 from conformance.commandline.device_options import advice
 from conformance.transport.client import Connection
@@ -66,7 +68,8 @@ class Fetcher:
         seconds = self._connection.timeout_s
         # httpx bounds each read and not their sum, which a server that sends single bytes makes endless.
         done: SimpleQueue[bytes | Exception] = SimpleQueue()
-        threading.Thread(target=lambda: done.put(self._outcome(url)), daemon=True).start()
+        running = click.get_current_context(silent=True)
+        threading.Thread(target=lambda: done.put(self._outcome(url, running)), daemon=True).start()
         try:
             found = done.get(timeout=seconds)
         except Empty:
@@ -80,7 +83,9 @@ class Fetcher:
             raise UnreachableError(f"{url}: {self._silent[server]}") from found
         raise found
 
-    def _outcome(self, url: str) -> bytes | Exception:
+    def _outcome(self, url: str, running: click.Context | None) -> bytes | Exception:
+        if running is not None:
+            push_context(running)  # whose options an error may name
         try:
             return self._content(url)
         except Exception as error:  # noqa: BLE001 - the caller's thread raises it
