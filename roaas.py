@@ -101,7 +101,6 @@ class _Rooms(click.Group):
         open_rooms()
         guard = import_module("conformance.commandline.guard")
         guard.make_streams_lenient()
-        import_module("conformance.commandline.secrecy").SECRETS.keep_userinfo(" ".join(sys.argv))
         try:
             return super().invoke(ctx)
         except click.ClickException as error:
@@ -130,6 +129,11 @@ def _exit_code(run: Callable[[], Any]) -> int:
     open_rooms()
     guard = import_module("conformance.commandline.guard")
     guard.make_streams_lenient()
+    import_module("conformance.commandline.secrecy").SECRETS.keep_userinfo(" ".join(sys.argv))
+    secret_file = import_module("conformance.commandline.secret_file")
+    if secret_file.names_user(sys.argv[1:]):
+        click.echo(f"Error: {secret_file.IN_URL}", err=True)
+        return _USAGE
     try:
         code = run()
     except click.ClickException as error:

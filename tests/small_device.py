@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import ssl
 import sys
 import threading
 from collections.abc import Awaitable, Callable, Iterator, Mapping
@@ -90,19 +91,22 @@ def application(description: Any, routes: Mapping[str, Mapping[str, Handle]]) ->
 
 
 @contextmanager
-def small_device(description: Any, routes: Mapping[str, Mapping[str, Handle]]) -> Iterator[str]:
+def small_device(
+    description: Any, routes: Mapping[str, Mapping[str, Handle]], tls: ssl.SSLContext | None = None
+) -> Iterator[str]:
     """Serve a device in a thread; yields its base URL.
 
     Args:
         description: the document that GET /openapi.json answers.
         routes: for each path as aiohttp writes it, the handler of each method.
+        tls: for HTTPS.
     """
     loop, started, ports = asyncio.new_event_loop(), threading.Event(), list[int]()
 
     async def start() -> web.AppRunner:
         runner = web.AppRunner(application(description, routes), access_log=None)
         await runner.setup()
-        await web.TCPSite(runner, "127.0.0.1", 0).start()
+        await web.TCPSite(runner, "127.0.0.1", 0, ssl_context=tls).start()
         ports.append(runner.addresses[0][1])
         return runner
 
@@ -116,7 +120,7 @@ def small_device(description: Any, routes: Mapping[str, Mapping[str, Handle]]) -
     thread = threading.Thread(target=run, daemon=True)
     thread.start()
     assert started.wait(10)
-    yield f"http://127.0.0.1:{ports[0]}"
+    yield f"{'https' if tls else 'http'}://127.0.0.1:{ports[0]}"
     loop.call_soon_threadsafe(loop.stop)
     thread.join(10)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,20 +11,21 @@ import click
 import msgspec
 
 from conformance.cli.summary import warning
+from conformance.commandline.device_options import client_certificate_options
 from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, ResultCommand
-from conformance.commandline.secret_file import read_secret
 from conformance.commandline.terminal import inert
 from conformance.contract.described import copy_as_data
 from conformance.contract.locating import ContractError, is_installed
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.engine.stored_result import MALFORMED, StoredResultError, not_well_made, read_result
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import Statement, StatementError, api_of, empty_statement, load_statement
 
 if TYPE_CHECKING:
-    from conformance.statement.statement import Statement
+    from conformance.transport.client import Connection
 
-_TIMEOUT_S = 10.0
 _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
 
 
@@ -50,8 +52,9 @@ _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
     "trusted",
     multiple=True,
     metavar="URL",
-    help="Address to which the token may be sent, as RESULT may name other servers; repeatable.",
+    help="Address to which the token or certificate may go, as RESULT may name other servers; repeatable.",
 )
+@client_certificate_options
 @click.option(
     "--ca-file", type=click.Path(exists=True, dir_okay=False), help="Certificate authorities (PEM) to trust for HTTPS."
 )
@@ -74,6 +77,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
     trusted: tuple[str, ...],
     ca_file: str | None,
     timeout_s: float | None,
+    **certificate: str | None,
 ) -> CommandResult:
     """Send the requests of findings again, in order, and report whether each failure occurs again.
 
@@ -87,7 +91,6 @@ def replay(  # noqa: C901 - one branch for each way to judge
     # Imported here, so that --help stays quick.
     from conformance.engine.permission import moves  # noqa: PLC0415
     from conformance.engine.replay import Outcome, findings, replay_and_stop  # noqa: PLC0415
-    from conformance.transport.client import Connection  # noqa: PLC0415
 
     end_like_ctrl_c()
     end_with_parent()
@@ -96,8 +99,9 @@ def replay(  # noqa: C901 - one branch for each way to judge
         document = read_result(result / "result.json" if result.is_dir() else result)
     except StoredResultError as error:
         raise click.UsageError(str(error)) from error
-    token = read_secret(token_file) if token_file else None
-    connection = Connection(timeout_s=timeout_s or _TIMEOUT_S, ca_file=Path(ca_file) if ca_file else None, token=token)
+    options = {"token_file": token_file, "ca_file": ca_file, "timeout_s": timeout_s, **certificate}
+    given = {name: value for name, value in options.items() if value is not None}
+    connection = _connection(given)
     try:
         if recorded:
             return _judge_recorded(document, folder, statement_file, pack, requirement)
@@ -105,10 +109,8 @@ def replay(  # noqa: C901 - one branch for each way to judge
         if not chosen:
             raise click.UsageError(f"{result} has no finding" + (f" of {requirement}" if requirement else ""))
         if statement_file:
-            given = {"token_file": token_file, "ca_file": ca_file, "timeout_s": timeout_s}
-            requirements = {id_ for id_, _ in chosen}
-            contract = None if _names_description(statement_file) and not pack else _contract_of(document, pack, folder)
-            return _judge_again(document, contract, statement_file, given, requirements, allow_motion=allow_motion)
+            place, requirements = (folder, pack), {id_ for id_, _ in chosen}
+            return _judge_again(document, place, statement_file, given, requirements, allow_motion=allow_motion)
         # The contract at hand judges what was judged by it.
         contract = _contract_of(document, pack, folder)
         rest = document["target"].get("rest") if contract else None
@@ -117,7 +119,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
         chosen = [one for one, may in zip(chosen, sure, strict=True) if may]
         if not chosen:
             raise click.UsageError("these requests may move the robot: add --allow-motion, or name one that only reads")
-        if token:
+        if connection.token or connection.certificate:
             _check_addresses([failure for _, failure in chosen], trusted)
         replayed, unstopped = replay_and_stop(chosen, document, connection, contract)
     except MALFORMED as error:
@@ -139,9 +141,23 @@ def replay(  # noqa: C901 - one branch for each way to judge
     return CommandResult(ExitCode.PASSED if outcomes == {Outcome.GONE} and not unstopped else ExitCode.INCONCLUSIVE)
 
 
+def _connection(given: dict[str, Any]) -> Connection:
+    """Return a connection by the options; to which servers its credentials go, _check_addresses() decides.
+
+    Raises:
+        click.UsageError: a credential cannot be used.
+    """
+    from conformance.engine.connecting import connection_of  # noqa: PLC0415 - see replay()
+
+    try:
+        return replace(connection_of(Endpoints(**given)), trust=None)
+    except (StatementError, OSError, UnicodeDecodeError) as error:
+        raise click.UsageError(str(error)) from error
+
+
 def _judge_again(
     document: dict[str, Any],
-    contract: Contract | None,
+    place: tuple[Path, str | None],
     statement_file: Path,
     given: dict[str, Any],
     requirements: set[str],
@@ -150,20 +166,21 @@ def _judge_again(
 ) -> CommandResult:
     from conformance.documents.description import DescriptionError  # noqa: PLC0415
     from conformance.engine.replay import judged_by_checks  # noqa: PLC0415
-    from conformance.statement.statement import StatementError, load_statement  # noqa: PLC0415
     from conformance.transport.reach import UnreachableError  # noqa: PLC0415
 
+    folder, pack = place
     try:
-        if contract is None and _names_description(statement_file):
+        api = api_of(statement_file)
+        is_described = bool(api.openapi or api.wsdl)
+        contract = _contract_of(document, pack, folder) if pack or not is_described else None
+        if contract is None and is_described:
             statement, contract = _described(statement_file, given)
         elif contract is None:
             raise click.UsageError("the result is by a contract that is not at hand: name its pack with --contract")
         else:
             statement = load_statement(statement_file, contract)
-        options = {name: value for name, value in given.items() if value is not None}
-        statement = msgspec.structs.replace(
-            statement, endpoints=msgspec.structs.replace(statement.endpoints, **options)
-        )
+        where = msgspec.structs.replace(statement.endpoints, **given)
+        statement = msgspec.structs.replace(statement, endpoints=where)
         judged = judged_by_checks(
             contract,
             statement,
@@ -186,17 +203,6 @@ def _judge_again(
         return CommandResult(ExitCode.FAILED)
     gone = verdicts == {"pass"} and "stop_undelivered" not in judged
     return CommandResult(ExitCode.PASSED if gone else ExitCode.INCONCLUSIVE)
-
-
-def _names_description(statement_file: Path) -> bool:
-    """Return whether a statement's [api] says where the device's own description is."""
-    from conformance.statement.statement import StatementError, api_of  # noqa: PLC0415 - see replay()
-
-    try:
-        api = api_of(statement_file)
-    except StatementError as error:
-        raise click.UsageError(str(error)) from error
-    return bool(api.openapi or api.wsdl)
 
 
 def _described(statement_file: Path, given: dict[str, Any]) -> tuple[Statement, Contract]:
@@ -222,7 +228,6 @@ def _judge_recorded(
     from conformance.engine.recorded import judge_recorded  # noqa: PLC0415 - see replay()
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
     from conformance.scenarios.stored import TracesError  # noqa: PLC0415
-    from conformance.statement.statement import StatementError, empty_statement, load_statement  # noqa: PLC0415
     from conformance.verdict.run import Run  # noqa: PLC0415
 
     contract = _contract_of(document, pack, folder)
@@ -245,7 +250,7 @@ def _judge_recorded(
 
 
 def _check_addresses(failures: list[dict[str, Any]], trusted: tuple[str, ...]) -> None:
-    """Check that the token is sent only to origins that the user trusts.
+    """Check that token and certificate are sent only to origins that the user trusts.
 
     Raises:
         click.UsageError: it would be sent elsewhere.
@@ -256,7 +261,7 @@ def _check_addresses(failures: list[dict[str, Any]], trusted: tuple[str, ...]) -
     others = sorted({address for failure in failures for address in strangers(failure, trusted)})
     if others:
         raise click.UsageError(
-            f"the result has requests for {', '.join(map(inert, others))}: where the token may go there, add "
+            f"the result has requests for {', '.join(map(inert, others))}: where your credentials may go there, add "
             + " ".join(f"--token-for {inert(address)}" for address in others)
         )
 

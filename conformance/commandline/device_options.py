@@ -50,8 +50,11 @@ _CREDENTIALS = (
     ),
     click.option("--api-key-file", type=_FILE, help="File with the API key."),
     click.option("--headers-file", type=_FILE, help="File with headers to send, 'Name: value' in each line."),
+)
+_CLIENT_CERTIFICATE = (
     click.option("--client-cert-file", type=_FILE, help="Client certificate (PEM) for HTTPS."),
     click.option("--client-key-file", type=_FILE, help="Its key, if it is not in the same file."),
+    click.option("--client-key-passphrase-file", type=_FILE, help="File with the passphrase of that key."),
 )
 
 
@@ -73,7 +76,12 @@ def description_options(command: _Command) -> _Command:
 
 def credential_options(command: _Command) -> _Command:
     """Add the options on credentials other than the bearer token."""
-    return _with(command, _CREDENTIALS)
+    return _with(command, (*_CREDENTIALS, *_CLIENT_CERTIFICATE))
+
+
+def client_certificate_options(command: _Command) -> _Command:
+    """Add the options on a client certificate."""
+    return _with(command, _CLIENT_CERTIFICATE)
 
 
 def _with(command: _Command, options: tuple[Callable[[_Command], _Command], ...]) -> _Command:

@@ -1,18 +1,38 @@
-"""Read files with secrets, and warn of those that other users of the machine can read.
+"""Read secrets from files, warn of those that other users of the machine can read, and refuse secrets in URLs.
 
 A module of its own, because the suite, the load tests and the robot read such files.
 """
 
 import os
+import re
 import shlex
 import stat
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import click
 
 _TOLD: Final = set[str]()
+# A URL with a user, as a word or as the value of an option. A password may have a slash in it, which no port has.
+_USERINFO: Final = re.compile(
+    r"(?:-[\w-]+=)?\s*[A-Za-z][A-Za-z0-9+.-]*:[/\\]{2}(?:[^/?#\s]*|[^/?#\s:\[]*:(?!\d+(?:[/?#]|\Z))[^\s]*)@", re.ASCII
+)
+#: Why a URL with a user is refused; it does not repeat the URL.
+IN_URL: Final = (
+    "a URL has a user or a password in it, which every user of the machine can see in the list of processes, and "
+    "which is not sent: leave it out, and name a file with user:password by --basic-file or --digest-file"
+)
+
+
+def names_user(value: Any) -> bool:
+    """Return whether a text, or one in lists and tables, is a URL with a user or a password (RFC 3986 3.2.1)."""
+    if isinstance(value, str):
+        return _USERINFO.match(value) is not None
+    if isinstance(value, dict):
+        return names_user(list(value.values()))
+    return isinstance(value, Iterable) and any(map(names_user, value))
 
 
 def read_secret(path: str | Path) -> str:

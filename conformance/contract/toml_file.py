@@ -17,6 +17,7 @@ import msgspec
 from msgspec import Meta, inspect
 
 from conformance.commandline.secrecy import SECRETS
+from conformance.commandline.secret_file import IN_URL, names_user
 
 _Shape = TypeVar("_Shape")
 
@@ -53,11 +54,14 @@ def read_tables(path: Path, error: type[TomlFileError] = TomlFileError) -> dict[
     try:
         text = path.read_text(encoding="utf-8")
         SECRETS.keep_userinfo(text)
-        return tomllib.loads(text)
+        tables = tomllib.loads(text)
     except OSError as problem:
         raise error(f"{path} cannot be read: {problem.strerror or problem}") from problem
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as problem:
         raise error(f"{path} is no TOML: {problem}") from problem
+    if names_user(tables):
+        raise error(f"{path}: {IN_URL}, or by basic_file or digest_file in [endpoints]")
+    return tables
 
 
 def fit(table: dict[str, Any], shape: type[_Shape], where: str, error: type[TomlFileError] = TomlFileError) -> _Shape:

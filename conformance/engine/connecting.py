@@ -1,6 +1,7 @@
 """Make the settings of a connection from a statement: deadline, TLS, credentials, and a login where there is one."""
 
 import re
+import ssl
 from collections import deque
 from dataclasses import replace
 from functools import partial
@@ -20,6 +21,7 @@ from conformance.transport.client import Connection, HttpClient
 from conformance.transport.credentials import Credential, Credentials, Kind
 from conformance.transport.exchange import NoAnswerError
 from conformance.transport.reach import Trust
+from conformance.transport.tls import CertificateError, ClientCertificate
 
 # Places in which a description may want an API key (OpenAPI 3.1, Security Scheme Object).
 _PLACES: Final = frozenset({Kind.HEADER, Kind.QUERY, Kind.COOKIE})
@@ -141,11 +143,22 @@ def _keep_parts(content: bytes) -> None:
             SECRETS.keep(value, "$ROAAS_LOGIN")
 
 
-def _certificate(where: Endpoints) -> tuple[Path, Path | None] | None:
+def _certificate(where: Endpoints) -> ClientCertificate | None:
+    """Return the client certificate.
+
+    Raises:
+        StatementError: it cannot be used.
+    """
     if where.client_cert_file is None:
         return None
     warn_if_shared(where.client_key_file or where.client_cert_file)
-    return Path(where.client_cert_file), Path(where.client_key_file) if where.client_key_file else None
+    found = ClientCertificate(where.client_cert_file, where.client_key_file, where.client_key_passphrase_file)
+    try:
+        # Now, before the first request, and once for all: whether it can be used.
+        found.load_into(ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT))
+    except CertificateError as error:
+        raise StatementError(str(error)) from None
+    return found
 
 
 def _credentials(where: Endpoints) -> Credentials:

@@ -5,6 +5,7 @@ It imports the suite only if there is a check to run.
 
 import pytest
 
+from conformance.commandline.secret_file import IN_URL, names_user
 from conformance.contract.pack import Contract
 from conformance.engine.checks_plugin import ChecksPlugin
 from conformance.engine.robot_under_test import RobotUnderTest
@@ -27,6 +28,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Register the checks for the robot that the options name."""
+    if names_user(config.invocation_params.args):
+        raise pytest.UsageError(IN_URL)
 
     def connect() -> RobotUnderTest:
         from conformance.engine.pytest_run import robot_from_options  # noqa: PLC0415 - see the module's docstring

@@ -45,6 +45,7 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         headers_file: file with fixed headers, ``Name: value`` in each line; their values are secrets.
         client_cert_file: client certificate for TLS (PEM).
         client_key_file: its key, if it is not in the same file.
+        client_key_passphrase_file: file with the passphrase of that key, if it is encrypted.
         trust_hosts: further servers, ``HOST`` or ``HOST:PORT``, to which a description may lead, with the credentials.
         request_rate: maximum requests per second, at least 1.
         timeout_s: deadline of one request, s.
@@ -66,6 +67,7 @@ class Endpoints(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     headers_file: Text | None = None
     client_cert_file: Text | None = None
     client_key_file: Text | None = None
+    client_key_passphrase_file: Text | None = None
     trust_hosts: tuple[Text, ...] = ()
     request_rate: Annotated[float, Meta(ge=1, le=100_000)] | None = None
     timeout_s: Positive = 10.0

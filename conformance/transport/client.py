@@ -17,8 +17,8 @@ from urllib.parse import urlsplit
 
 import h11
 
-from conformance.commandline.secrecy import SECRETS
-from conformance.transport.connections import ClosedError, Connections, NoConnectionError, tls_context
+from conformance.commandline.secret_file import IN_URL, names_user
+from conformance.transport.connections import ClosedError, Connections, NoConnectionError
 from conformance.transport.credentials import Credential, Credentials, bearer
 from conformance.transport.deadline import Deadline
 from conformance.transport.exchange import (
@@ -37,6 +37,7 @@ from conformance.transport.exchange import (
 )
 from conformance.transport.pace import Pace, time_to_arrive
 from conformance.transport.reach import Trust
+from conformance.transport.tls import ClientCertificate, tls_context
 
 Headers = tuple[tuple[str, str], ...]
 # Called with method and URL; returns an empty text if the request may be sent, else why not.
@@ -71,7 +72,7 @@ class Connection:
         token: bearer token, or None; it is one of the credentials.
         credentials: what every request carries.
         log_in: logs in, and returns the credential that this gives, the last of all; None: the run has no login.
-        certificate: client certificate and key (PEM) for TLS, or None; the key may be in the certificate's file.
+        certificate: client certificate for TLS, or None.
         trust: the servers to which the credentials may go; None: to each that a client is made for.
         patience_s: how long the run may yet wait for a device that puts requests off, s.
         request_rate: maximum requests per second, or None.
@@ -106,7 +107,7 @@ class Connection:
     permit: Permit = lambda _method, _url: ""
     credentials: Credentials = field(default_factory=Credentials)
     log_in: Callable[[], Credential] | None = None
-    certificate: tuple[Path, Path | None] | None = None
+    certificate: ClientCertificate | None = None
     trust: Trust | None = None
     patience_s: float = 120.0
     _next_slot: float = 0.0
@@ -165,7 +166,8 @@ class HttpClient:
     """
 
     def __init__(self, base_url: str, connection: Connection) -> None:
-        SECRETS.keep_userinfo(base_url)
+        if names_user(base_url):
+            raise ValueError(IN_URL)
         self.base_url = base_url.rstrip("/")
         self.connection = connection
         parts = urlsplit(self.base_url)

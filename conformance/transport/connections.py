@@ -9,7 +9,6 @@ import select
 import socket
 import ssl
 import time
-from pathlib import Path
 from typing import Final
 
 import h11
@@ -46,23 +45,6 @@ class NoConnectionError(OSError):
 
 class ClosedError(Exception):
     """Raised when the server closes the connection before the response is complete."""
-
-
-def tls_context(ca_file: Path | None, certificate: tuple[Path, Path | None] | None = None) -> ssl.SSLContext:
-    """Return a TLS context that trusts the authorities in ``ca_file``, or the system's if it is None.
-
-    Args:
-        ca_file: the authorities (PEM).
-        certificate: client certificate and its key (PEM), or None.
-
-    Raises:
-        OSError: a file cannot be read, or (ssl.SSLError) holds no certificate or key.
-    """
-    context = ssl.create_default_context(cafile=str(ca_file) if ca_file else None)
-    context.set_alpn_protocols(["http/1.1"])
-    if certificate is not None:
-        context.load_cert_chain(*certificate)
-    return context
 
 
 def open_link(host: str, port: int, tls: ssl.SSLContext | None, within_s: float) -> socket.socket:

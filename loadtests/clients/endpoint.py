@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Self
 from urllib.parse import urlsplit
 
+from conformance.commandline.secret_file import IN_URL, names_user
+
 DEFAULT_PORTS = {"http": 80, "https": 443}
 _FORBIDDEN = re.compile(r"[\x00-\x20\x7f]")  # RFC 3986 section 2: neither space nor control characters
 
@@ -42,6 +44,8 @@ class Endpoint:
         Raises:
             EndpointError: another scheme, no host, a port out of range, or user information in it.
         """
+        if names_user(url):
+            raise EndpointError(IN_URL)
         try:
             parts = urlsplit(url.strip())
             port = parts.port
@@ -52,8 +56,6 @@ class Endpoint:
             raise EndpointError(f"{url!r} does not begin with {wanted}")
         if not parts.hostname:
             raise EndpointError(f"{url!r} names no host")
-        if parts.username is not None or parts.password is not None:
-            raise EndpointError(f"the URL of {parts.hostname} contains a password: use a --token-file instead")
         if _FORBIDDEN.search(parts.netloc + parts.path):
             raise EndpointError(f"{url!r} contains a space or a control character")
         return cls(

@@ -8,6 +8,7 @@ from typing import Any, Self
 from conformance.commandline.secrecy import SECRETS
 from conformance.packs.table1.statement import Ros
 from conformance.transport.credentials import Credential, Credentials, Kind
+from conformance.transport.tls import ClientCertificate
 from conformance.transport.username_token import UsernameToken
 from loadtests.clients.described import VARIABLE, Described
 from loadtests.clients.endpoint import Endpoint, tls_context
@@ -42,7 +43,7 @@ class Robot:
         delivery_topic: where deliveries are published on that graph.
         described: the operations to measure, of a device that is called by its own description.
         credentials: what the requests of these operations carry.
-        certificate: client certificate and its key for TLS, as files.
+        certificate: client certificate for TLS, as names of files.
         username_token: the user whose token each message of a described SOAP operation carries.
         trust_hosts: further servers to which a WSDL may lead.
     """
@@ -59,7 +60,7 @@ class Robot:
     delivery_topic: str = Ros().delivery_topic
     described: tuple[Described, ...] = ()
     credentials: tuple[Credential, ...] = ()
-    certificate: tuple[str, str | None] | None = None
+    certificate: ClientCertificate | None = None
     username_token: UsernameToken | None = None
     trust_hosts: tuple[str, ...] = ()
 
@@ -93,7 +94,7 @@ class Robot:
         """Return a new TLS context for this robot."""
         context = tls_context(Path(self.ca_file) if self.ca_file else None)
         if self.certificate is not None:
-            context.load_cert_chain(*self.certificate)
+            self.certificate.load_into(context)
         return context
 
     @cached_property

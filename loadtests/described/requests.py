@@ -36,7 +36,6 @@ def robot_of(device: Device, operations: Collection[Operation]) -> Robot:
 def robot_at(device: Device, described: tuple[Described, ...]) -> Robot:
     """Return the robot with operations, by the device's address and credentials."""
     where, connection = device.statement.endpoints, device.api.client.connection
-    certificate = connection.certificate
     return Robot(
         rest=where.rest if device.interface == "rest" else None,
         publishers=None,
@@ -46,7 +45,7 @@ def robot_at(device: Device, described: tuple[Described, ...]) -> Robot:
         described=described,
         credentials=connection.credentials.items,
         username_token=device.messages.token if device.messages is not None else None,
-        certificate=None if certificate is None else (str(certificate[0]), str(certificate[1] or "") or None),
+        certificate=connection.certificate,
     )
 
 

@@ -2,7 +2,6 @@
 
 import gzip
 import json
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -22,7 +21,7 @@ from conformance.scenarios.stored import TRACES_NAME
 _TOKEN = "tok3n/of+this&run-93jd82hd"  # noqa: S105 - of no device
 _QUERY, _MORE, _COOKIE = "k3y-in query&hdr", "h3ad er-value\"1'", "c00kie-0f-mine"
 _BASIC, _DIGEST, _WSSE = "pa55 wörd/43", "d1gest pass&wörd", "wsse-pa55 word"
-_LOGIN, _GIVEN, _IN_URL = "l0gin pass/word", "g1ven-by-the-device-8842", "in-url-pa55"
+_LOGIN, _GIVEN = "l0gin pass/word", "g1ven-by-the-device-8842"
 _SESSION = "5e55ion-0f-th1s-run"
 
 
@@ -139,16 +138,3 @@ def test_what_is_too_short_to_mask_is_said(tmp_path, kept, device):
     assert [note.partition(":")[0] for note in told] == [
         "The secret behind $ROAAS_TOKEN is a short word or number, as other texts have it"
     ]
-
-
-@pytest.mark.parametrize("where", ["option", "statement"])
-def test_a_password_in_a_url_is_in_no_file_and_no_message(tmp_path, where):
-    with socket.socket() as bound:
-        bound.bind(("127.0.0.1", 0))  # nobody listens there
-        url = f"http://operator:{_IN_URL}@127.0.0.1:{bound.getsockname()[1]}/"
-        (tmp_path / "robot.toml").write_text(f'[endpoints]\nrest = "{url}"\n', encoding="utf-8")
-        named = ["--rest", url] if where == "option" else [tmp_path / "robot.toml"]
-        done = ended(sys.executable, "-m", "roaas", "certify", *named, "--out", tmp_path / "out")
-    assert done.returncode == 3, done.stdout + done.stderr
-    assert "$ROAAS_URL_PASSWORD" in (tmp_path / "out" / "result.json").read_text(encoding="utf-8")
-    assert leaks(tmp_path / "out", [_IN_URL], done.stdout, done.stderr) == []

@@ -141,8 +141,7 @@ class Guard:
 def _told_of(draft: Draft) -> dict[str, Any]:
     """Return a request as the process reads it."""
     connection = draft.client.connection
-    certificate, key = connection.certificate or (None, None)
-    files = [one and str(one.absolute()) for one in (connection.ca_file, certificate, key)]
+    files = [one and str(Path(one).absolute()) for one in (connection.ca_file, *(connection.certificate or ()))]
     return {
         "host": draft.client.host.encode("idna").decode("ascii"),
         "port": draft.client.port,

@@ -109,16 +109,18 @@ def _stop(told: dict[str, Any], contexts: Contexts) -> None:
 
 
 def _context(files: str | None) -> SSLContext | None:
-    """Return a TLS context of certificate authorities, client certificate and key; None: the device speaks no TLS."""
+    """Return a TLS context of the files of authorities and a client certificate; None: the device speaks no TLS."""
     if files is None:
         return None
     import ssl  # noqa: PLC0415 - it takes longer than everything else here
 
-    authorities, certificate, key = json.loads(files)
+    authorities, *certificate = json.loads(files)
     context = ssl.create_default_context(cafile=authorities)
     context.set_alpn_protocols(["http/1.1"])
     if certificate:
-        context.load_cert_chain(certificate, key)
+        name, key, passphrase = certificate
+        with open(passphrase or os.devnull, encoding="utf-8") as file:  # noqa: PTH123 - pathlib takes long to import
+            context.load_cert_chain(name, key, file.read().strip())
     return context
 
 
