@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from conformance.commandline.atomic_write import write_atomically
+from conformance.commandline.terminal import inert
 from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import basic_string
@@ -93,7 +94,8 @@ def _endpoints(robot: RobotUnderTest) -> list[str]:
         ("publishers_endpoint", Interface.PUBLISHERS, where.publishers_endpoint),
         ("subscribers_endpoint", Interface.SUBSCRIBERS, where.subscribers_endpoint),
     ):
-        remark = f"  # did not answer: {robot.run.unreachable[interface]}" if interface in robot.run.unreachable else ""
+        why = inert(robot.run.unreachable.get(interface, ""))
+        remark = f"  # did not answer: {why}" if why else ""
         lines.append(f"{key} = {_quoted(value)}{remark}" if value else f'# {key} = ""')
     return lines
 
