@@ -13,12 +13,12 @@ from loadtests.described.pairs import Choice
 from loadtests.described.scenario import callable_robot, scenario_of
 from loadtests.described.stopping import Stopping
 from loadtests.described.streams import streams_to_hear
+from loadtests.schedule.plan import step_operation
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.errors import SettingsError
 from loadtests.settings.settings import Selection, Settings
 from loadtests.settings.settle import settle
 from loadtests.settings.target import Target
-from loadtests.statistics.steps import step_operation
 
 _PAPERS_ONLY = (
     "publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint", "rosbridge", "end_to_end",

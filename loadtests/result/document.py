@@ -19,7 +19,7 @@ from loadtests.result.outcome import Outcome, RunAborted
 from loadtests.result.plan_words import plan_words
 from loadtests.result.processes import process_figures
 from loadtests.schedule.arrivals import arrivals_due
-from loadtests.schedule.plan import Plan
+from loadtests.schedule.plan import Plan, step_operation
 from loadtests.settings.settings import Settings
 from loadtests.statistics import (
     end_to_end,
@@ -251,7 +251,7 @@ def _early_errors(findings: Findings) -> list[dict[str, Any]]:
 def _knee(outcome: Outcome, plan: Plan) -> list[dict[str, Any]]:
     if not outcome.steps:
         return []
-    operation = plan.operations[steps.step_operation(plan.operations)]
+    operation = plan.operations[step_operation(plan.operations)]
     settings = outcome.settings
     criterion = steps.Criterion.of(settings.thresholds, operation, settings.slo.get(operation))
     return steps.knee(outcome.steps, plan.interfaces, criterion)

@@ -272,3 +272,9 @@ SERIES = [
     for interface in (*INTERFACES, BOTH)
     for client in CLIENTS
 ]
+
+
+def step_operation(operations: tuple[str, ...]) -> int:
+    """Return the operation of the steps: a read where there is one, because their rates are unusually high."""
+    reads = [number for number, name in enumerate(operations) if name not in MOVES]
+    return reads[0] if reads else 0

@@ -9,11 +9,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from loadtests.statistics.figures import plain_quantiles, rounded, rounded_interval
 from loadtests.statistics.histogram import SHARES, Histogram
-from loadtests.statistics.intervals import order_interval_ms
+from loadtests.statistics.intervals import binomial_quantile, order_interval_ms
 
 _BASE = "rest"
 
@@ -69,8 +68,9 @@ def _over(times: Journey, base: Journey) -> dict[str, Any]:
     ratios = [one / other for one, other in zip(*taken, strict=False) if other and min(one, other) < math.inf]
     if not ratios:
         return {"ratio": None, "ci95": None}
-    interval = stats.quantile_test(ratios, p=0.5).confidence_interval(0.95)
-    bounds = float(interval.low), float(interval.high)  # NaN where they are too few
+    low, high = binomial_quantile(0.025, len(ratios), 0.5) - 1, binomial_quantile(0.975, len(ratios), 0.5)
+    ranked = [math.nan, *sorted(ratios), math.nan]  # NaN where they are too few
+    bounds = ranked[low + 1], ranked[high + 1]
     median = float(np.median(ratios))
     return {
         "ratio": rounded(median) if math.isfinite(median) else None,

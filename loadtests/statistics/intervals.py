@@ -1,6 +1,6 @@
 """Confidence intervals of medians, p99s and other quantiles, and of their ratios and differences.
 
-They come from scipy's bootstrap over rounds (module `rounds`), or over repeats and the rounds within them (Davison and
+They come from a bootstrap over rounds (module `rounds`), or over repeats and the rounds within them (Davison and
 Hinkley 1997, section 3.8) where the run has enough repeats. Percentile intervals of few rounds are too narrow: they are
 taken at the level that makes them as wide as Student's t (Hesterberg 2015). They are widened by the correlation that is
 left between rounds, and by what the repeats differ beyond each run's own scatter (Birge 1932). How often they are right
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from loadtests.statistics.between_runs import LEAST_REPEATS, Interval, widened_difference, widened_ratio
 from loadtests.statistics.histogram import SHARES, Floats, Histogram, Ints
@@ -83,8 +83,8 @@ class Replicates:
 
 def expanded_percentiles(replicates: Floats, degrees: int) -> Floats:
     """Return the quantiles of the replicates between which 95 % lie by Student's t with these degrees of freedom."""
-    reach = stats.t.ppf(1 - _TAIL, degrees) * math.sqrt((degrees + 1) / degrees)
-    tail = float(stats.norm.cdf(-reach))
+    reach = special.stdtrit(degrees, 1 - _TAIL) * math.sqrt((degrees + 1) / degrees)
+    tail = float(special.ndtr(-reach))
     found: Floats = np.quantile(replicates, [tail, 1 - tail])
     return found
 
@@ -100,24 +100,13 @@ def resample(units: Sequence[Unit], name: str, seed: int, stream: int = 0) -> Re
     nested = repeats >= LEAST_REPEATS
     outer = repeats if nested else sample.size
 
-    def figures(chosen: Ints, axis: int = -1) -> Floats:
-        """Return the figures of resamples, given by the numbers of the chosen items, shape (resamples, outer)."""
-        del axis
-        times = _times(np.atleast_2d(chosen), outer)
-        return sample.statistic_ms(_within(times, sample.repeats, rng) if nested else times, name)
-
-    found = stats.bootstrap(
-        (np.arange(outer),),
-        figures,
-        n_resamples=RESAMPLES,
-        batch=_AT_ONCE,
-        vectorized=True,
-        method="percentile",
-        rng=rng,
-    )
+    found = []
+    for _ in range(RESAMPLES // _AT_ONCE):
+        times = _times(rng.integers(0, outer, (_AT_ONCE, outer)), outer)
+        found.append(sample.statistic_ms(_within(times, sample.repeats, rng) if nested else times, name))
     whole = sample.statistic_ms(np.ones((1, sample.size)), name)[:, 0]
     widening = rounds.widening * (1.0 if nested else birge_ratio(rounds))
-    return Replicates(whole, found.bootstrap_distribution, rounds, outer - 1, widening)
+    return Replicates(whole, np.concatenate(found, axis=-1), rounds, outer - 1, widening)
 
 
 def _times(chosen: Ints, number: int) -> Floats:
@@ -192,9 +181,18 @@ def order_interval_ms(histogram: Histogram, quantile: float) -> Interval | None:
     samples = histogram.total
     if samples < samples_for_interval(quantile):
         return None
-    low, high = stats.binom.ppf(_TAIL, samples, quantile) - 1, stats.binom.ppf(1 - _TAIL, samples, quantile) + 1
-    bounds = [histogram.quantile_ms(min(max(rank / samples, 0.0), 1.0)) for rank in (float(low), float(high))]
+    low = binomial_quantile(_TAIL, samples, quantile) - 1
+    high = binomial_quantile(1 - _TAIL, samples, quantile) + 1
+    bounds = [histogram.quantile_ms(min(max(rank / samples, 0.0), 1.0)) for rank in (low, high)]
     return (bounds[0] or 0.0), (bounds[1] or 0.0)
+
+
+def binomial_quantile(share: float, trials: int, chance: float) -> int:
+    """Return the least number of successes whose cumulative probability reaches a share."""
+    found: int = max(0, math.floor(special.bdtrik(share, trials, chance)) - 1)
+    while special.bdtr(found, trials, chance) < share:
+        found += 1
+    return found
 
 
 @dataclass(frozen=True)

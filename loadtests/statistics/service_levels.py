@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import msgspec
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from conformance.statement.load import ServiceLevel
 from loadtests.schedule.plan import SeriesName
@@ -134,8 +134,8 @@ def share_interval(counts: Iterable[tuple[int, int]]) -> Interval | None:
         return None
     spread = _dispersion(table)
     found, total = found / spread, total / spread
-    low = float(stats.beta.ppf(_TAIL, found, total - found + 1)) if found else 0.0
-    high = float(stats.beta.ppf(1 - _TAIL, found + 1, total - found)) if found < total else 1.0
+    low = float(special.betaincinv(found, total - found + 1, _TAIL)) if found else 0.0
+    high = float(special.betaincinv(found + 1, total - found, 1 - _TAIL)) if found < total else 1.0
     return low, high
 
 

@@ -9,7 +9,7 @@ import msgspec
 from conformance.packs.table1.thresholds import Threshold
 from conformance.statement.load import ServiceLevel
 from loadtests.schedule.arrivals import arrivals_due
-from loadtests.schedule.plan import MOVES, Plan
+from loadtests.schedule.plan import Plan
 from loadtests.statistics.figures import rounded
 from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.measured import Measured, counted
@@ -153,9 +153,3 @@ def knee(results: Iterable[Step], interfaces: tuple[str, ...], criterion: Criter
             }
         )
     return found
-
-
-def step_operation(operations: tuple[str, ...]) -> int:
-    """Return the operation of the steps: a read where there is one, because their rates are unusually high."""
-    reads = [number for number, name in enumerate(operations) if name not in MOVES]
-    return reads[0] if reads else 0

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
-from scipy import stats
+from scipy import special
 
 from conformance.packs.table1.thresholds import Threshold
 from loadtests.statistics.figures import plain_quantiles
@@ -48,5 +48,5 @@ def _surely_above(histogram: Histogram, threshold: Threshold) -> bool:
     """
     bins, counts = histogram.arrays()
     below = int(counts[edges_us(bins)[0] < threshold.below_ms * 1e3].sum())
-    chance = float(stats.binom.cdf(below, histogram.total, SHARES[threshold.quantile]))
+    chance = float(special.bdtr(below, histogram.total, SHARES[threshold.quantile]))
     return histogram.total > 0 and chance < _SMALL_CHANCE

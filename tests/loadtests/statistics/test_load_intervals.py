@@ -12,6 +12,7 @@ from loadtests.statistics.figures import quantiles, series
 from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.intervals import (
     Replicates,
+    binomial_quantile,
     compare,
     figure_interval_ms,
     order_interval_ms,
@@ -160,3 +161,12 @@ def test_an_interval_without_end_has_bounds_that_can_be_reckoned_with():
     assert 0 < low < 1 < high < math.inf
     assert judge_ratio(1.0, (low, high), (low, high)).verdict == "none"
     assert judge_ratio(0.5, (low, high), (0.9, 1.1)).verdict == "none"
+
+
+@pytest.mark.parametrize("chance", [0.01, 0.5, 0.9, 0.999])
+@pytest.mark.parametrize("trials", [1, 2, 7, 60, 900])
+def test_a_binomial_quantile_is_the_first_number_whose_cumulative_probability_reaches_the_share(trials, chance):
+    single = [math.comb(trials, k) * chance**k * (1 - chance) ** (trials - k) for k in range(trials + 1)]
+    for share in (0.025, 0.4, 0.975):
+        found = binomial_quantile(share, trials, chance)
+        assert math.fsum(single[:found]) < share <= math.fsum(single[: found + 1])

@@ -2,15 +2,16 @@
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from loadtests.statistics.service_levels import BROKEN, KEPT, NOT_KNOWN, _outcome, share_interval
 
 
 def test_without_bursts_the_interval_is_that_of_clopper_and_pearson():
     low, high = share_interval([(1, 100), (2, 100), (0, 100)])
-    exact = stats.binomtest(3, 300).proportion_ci(method="exact")
-    assert (low, high) == (pytest.approx(exact.low), pytest.approx(exact.high))
+    assert (low, high) == (
+        pytest.approx(0.0020670072350923),
+        pytest.approx(0.0289445112556927),
+    )  # scipy.stats.binomtest
     assert share_interval([(0, 0)]) is None
     assert share_interval([(0, 3700)])[1] < 0.001 < share_interval([(0, 3600)])[1]
     assert share_interval([(50, 50)])[0] == pytest.approx(0.025 ** (1 / 50))
