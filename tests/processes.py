@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import warm_commands
+
 # A process inherits the peak memory of the one that starts it, here of pytest. This small one stands between the two.
 _WEIGHED = """
 import resource, subprocess, sys
@@ -36,11 +38,21 @@ def free_port() -> int:
 
 
 def ended(
-    *command: object, check: bool = False, peak_mb: Path | None = None, **options: Any
+    *command: object, check: bool = False, peak_mb: Path | None = None, fresh: bool = False, **options: Any
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command to its end; return what it wrote, as text. Its peak memory goes into the file `peak_mb`."""
+    """Run a command to its end; return what it wrote, as text.
+
+    Args:
+        command: its words. `python -m roaas` runs in a process that has imported other people's packages before.
+        check: raise an error if the exit code is not 0.
+        peak_mb: the file for its peak memory.
+        fresh: start Python anew for `python -m roaas` as well.
+        options: of `subprocess.run`.
+    """
     given = {"capture_output": True, "text": True, "timeout": 240} | options
     weighed = (sys.executable, "-I", "-S", "-c", _WEIGHED, peak_mb) if peak_mb else ()
+    if command[:3] == (sys.executable, "-m", "roaas") and not (fresh or peak_mb or "preexec_fn" in options):
+        command = (*warm_commands.beginning(str(command[3])), *command[3:])
     return subprocess.run([str(word) for word in (*weighed, *command)], check=check, **given)
 
 

@@ -133,7 +133,7 @@ def test_a_command_in_a_process_of_its_own(well_made, tmp_path):
     (sent / "result" / "result.json").unlink()
     a_pipe(sent / "result" / "result.json")
     for command in ("replay", "report"):
-        done = ended(Path(sys.executable).with_name("roaas"), command, sent / "result", cwd=tmp_path, timeout=100)
+        done = ended(sys.executable, "-m", "roaas", command, sent / "result", cwd=tmp_path, timeout=100)
         assert (done.returncode, done.stdout) == (2, "")
         assert done.stderr.splitlines()[-1].endswith("no regular file")
 

@@ -59,7 +59,7 @@ def test_no_command_imports_a_module_of_the_working_directory(place, command):
 
 def test_neither_does_the_command_as_a_module(place):
     folder, _, marker = place
-    done = ended(sys.executable, "-m", "roaas", "explain", "http/date", cwd=folder)
+    done = ended(sys.executable, "-m", "roaas", "explain", "http/date", cwd=folder, fresh=True)
     assert (done.returncode, marker.exists()) == (0, False), done.stderr
 
 
