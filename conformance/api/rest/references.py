@@ -48,6 +48,14 @@ _NO_REFERENCES: Final = frozenset(
         "void",
     ]
 )
+# Formats of texts that JSON Schema and OpenAPI define, so that a client can write them.
+_DEFINED: Final = frozenset(
+    {
+        "date-time", "date", "time", "duration", "email", "idn-email", "hostname", "idn-hostname", "ipv4", "ipv6",
+        "uri", "uri-reference", "iri", "iri-reference", "uri-template", "json-pointer", "relative-json-pointer",
+        "regex", "byte", "binary", "password",
+    }
+)  # fmt: skip
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _FORM: Final = "application/x-www-form-urlencoded"
 _DEPTH: Final = 6
@@ -76,7 +84,11 @@ def thing_of(name: str) -> str:
 
 
 def refers(name: str, schema: Schema, collections: frozenset[str]) -> bool:
-    """Return whether a parameter or member refers to something that the device has to know."""
+    """Return whether only the device knows the values of a parameter or member: references, and texts of its own form.
+
+    A format that no standard defines for texts is such a form, as ``int64`` and ``semver`` are. So is ``uuid``, which
+    identifies something.
+    """
     kinds = kinds_of(schema) or {"string"}
     given = flat(schema)
     if not kinds & {"string", "integer", "array"} or "enum" in given or "const" in given:
@@ -84,7 +96,17 @@ def refers(name: str, schema: Schema, collections: frozenset[str]) -> bool:
     plain = plain_name(name)
     last = (_WORD.findall(name) or [""])[-1].lower()
     ends = last.endswith(_ENDS) and last not in _NO_REFERENCES
-    return ends or plain in _WHOLE or given.get("format") == "uuid" or thing_of(name) in collections
+    items = flat(given["items"]) if isinstance(given.get("items"), dict) else given
+    own = "format" in items and "string" in kinds_of(items) and is_free_text(items)
+    return ends or own or plain in _WHOLE or thing_of(name) in collections
+
+
+def is_free_text(schema: Schema) -> bool:
+    """Return whether a value may be a text of which the description does not say how to write it."""
+    given = flat(schema)
+    if given.keys() & {"enum", "const"} or "string" not in (kinds_of(given) or {"string"}):
+        return False
+    return given["format"] not in _DEFINED if isinstance(given.get("format"), str) else "pattern" not in given
 
 
 def values_in(operation: Operation, request: GeneratedRequest) -> Iterator[tuple[str, Schema, str]]:

@@ -15,7 +15,7 @@ _DEPTH = 6
 # equal share of both for its own members, as schemas that refer to each other in many ways have no end.
 _OPTIONAL = 1_000
 _REQUIRED = 20_000
-#: A value of each format that JSON Schema and OpenAPI name.
+#: A text of each format that JSON Schema, OpenAPI and its registry name.
 FORMATS: Mapping[str, str] = {
     "uuid": "3fa85f64-5717-4562-b3fc-2c963f66afa6",
     "date-time": "2026-01-31T12:00:00Z",
@@ -29,6 +29,8 @@ FORMATS: Mapping[str, str] = {
     "ipv4": "127.0.0.1",
     "ipv6": "::1",
     "byte": "AA==",
+    # Numbers as texts: JSON's own have no more digits than a double.
+    **dict.fromkeys(("int32", "int64", "uint32", "uint64", "float", "double", "decimal"), "1"),
 }
 
 

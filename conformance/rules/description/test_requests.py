@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
+from conformance.api.rest.references import is_free_text
 from conformance.api.rest.statuses import HELD
 from conformance.api.rest.validity import INVALID, VALID
 from conformance.api.rest.variations import Kind
@@ -134,8 +136,9 @@ def defaults(trace: Survey) -> Iterable[Outcome]:
 
 
 @rule("description/valid-accepted", on=(survey, generated_requests))
-def valid_accepted(trace: Survey) -> Iterable[Outcome]:
+def valid_accepted(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether requests that the description allows are accepted."""
+    trace = replace(trace, probes=tuple(_named(trace, run)))
     yield from _accepted(trace, (Kind.OPTIONAL, Kind.BOUND), "a request that the description allows accepted")
     # An operation that never accepts anything may need a state; which status it has then, another rule judges.
     works = {one.operation for one in trace.probes if one.ok}
@@ -150,6 +153,23 @@ def valid_accepted(trace: Survey) -> Iterable[Outcome]:
     valid = [one for one in generated if one.validity == VALID and not one.invents]
     yield from held_back(one for one in trace.probes if one.kind is Kind.GENERATED and one.validity == VALID)
     yield from told_once(valid, "a request that the description allows accepted", fault)
+
+
+def _named(trace: Survey, run: Run) -> Iterator[Probe]:
+    """Yield the probes but those whose path has a free text that the device accepted nowhere: such as a wrong id."""
+    free = {
+        item.label
+        for item in operations_of(run.contract)
+        if any(is_free_text(one.schema) for one in item.parameter("path"))
+    }
+    # The generation sends other methods as well, such as OPTIONS.
+    own = [one for one in trace.probes if one.operation.startswith(f"{one.attempt.request.method} ")]
+    known = {_path_of(one) for one in own if one.ok}
+    yield from (one for one in own if one.operation not in free or _path_of(one) in known)
+
+
+def _path_of(probe: Probe) -> str:
+    return probe.attempt.request.target.partition("?")[0]
 
 
 def _accepted(trace: Survey, kinds: tuple[Kind, ...], expected: str, *, anyway: bool = False) -> Iterator[Outcome]:

@@ -1,6 +1,7 @@
 """Ids, cursors and names of other resources are the device's: a refusal of an invented one is no fault."""
 
 import json
+import re
 
 import pytest
 from aiohttp import web
@@ -8,6 +9,18 @@ from small_device import REFUSED, answers, certified, constant, described, error
 
 _TEXT = {"type": "string"}
 _ID = {"name": "id", "in": "path", "required": True, "schema": _TEXT}
+_KEY = {"name": "key", "in": "path", "required": True, "schema": _TEXT}
+# Formats of texts that the description only names, and what the device takes.
+_FORMS = {
+    "grams": ("int64", "-?[0-9]{1,18}"),
+    "version": ("semver", r"[0-9]+\.[0-9]+\.[0-9]+"),
+    "colour": ("color", "#.{6}"),
+    "price": ("decimal", r"-?[0-9]{1,3}(\.[0-9]{1,2})?"),
+}
+# Django REST framework writes it so, and takes neither "" nor "-".
+_LOAD = {name: {**_TEXT, "format": form} for name, (form, _) in _FORMS.items()}
+_LOAD["price"]["pattern"] = r"^-?\d{0,3}(?:\.\d{0,2})?$"
+_OBJECT = "65f0c1e2a7b3d4e5f6a7b8c9"
 _VALVES = [{"id": "v-17", "open": True}, {"id": "v-18", "open": False}]
 
 
@@ -29,6 +42,12 @@ _PATHS = {
     "/openings": _taking({"valve": _TEXT, "share": {"type": "integer", "minimum": 0}}, ["valve"]),
     "/events": reading({"type": "object"}, parameters=_query("cursor", required=False)),
     "/frames": {**reading({"type": "array"}), **_taking({"name": _TEXT, "parent_id": _TEXT}, ["name"])},
+    "/loads": _taking(_LOAD, ["grams", "price"]),
+    "/loads/latest": reading(
+        {"type": "object"}, parameters=[{"name": "above", "in": "query", "schema": {**_TEXT, "format": "int64"}}]
+    ),
+    "/objects": reading({"type": "array"}),
+    "/objects/{key}": reading({"type": "object"}, parameters=[_KEY]),
     "/scan": {
         "get": {"parameters": _query("session_id"), "responses": {"200": answers({"type": "object"}), "400": REFUSED}}
     },
@@ -69,6 +88,26 @@ async def _scan(request):
     return error(400, "no session") if session is None else error(404, f"no session {session}")
 
 
+async def _load(request):
+    given = await _object(request, "grams")
+    forms = {name: form for name, (_, form) in _FORMS.items() if name in (given or ())}
+    if given is None or "price" not in given or not all(isinstance(given[name], str) for name in forms):
+        return error(400, "not a valid load")
+    right = all(re.fullmatch(form, given[name], re.ASCII) for name, form in forms.items())
+    return web.json_response({}, status=201) if right else error(400, "not of the format")
+
+
+async def _latest(request):
+    given = request.query.getall("above", ["0"])
+    right = len(given) == 1 and re.fullmatch(_FORMS["grams"][1], given[0], re.ASCII)
+    return web.json_response({}) if right else error(400, "not of the format")
+
+
+async def _object_of(request):
+    right = request.match_info["key"] == "65f0c1e2a7b3d4e5f6a7b8c9"
+    return web.json_response({}) if right else error(400, "no key of an object")
+
+
 def _device():
     frames = {}
 
@@ -91,6 +130,10 @@ def _device():
         "/openings": {"POST": _opening},
         "/events": {"GET": _events},
         "/frames": {"GET": all_frames, "POST": frame},
+        "/loads": {"POST": _load},
+        "/loads/latest": {"GET": _latest},
+        "/objects": constant([{"key": _OBJECT}]),
+        "/objects/{key}": {"GET": _object_of},
         "/scan": {"GET": _scan},
     }
 
@@ -101,6 +144,7 @@ def test_what_the_device_named_is_used_and_what_is_invented_may_be_refused(tmp_p
         seen = certified(f"{url}/openapi.json", tmp_path / "out", "--call", "*", effort=effort)
     assert seen.blamed == {}
     counts = {one["operation"]: one["statuses"] for one in seen.result["api"]["operations"]}
+    assert counts["POST /loads"].get("201")
     assert counts["POST /openings"].get("201")
     assert counts["POST /frames"].get("201")
 
