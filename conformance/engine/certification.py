@@ -22,8 +22,10 @@ from conformance.engine.interruption import remembered
 from conformance.engine.planning import conftests, pytest_options
 from conformance.engine.progress import Progress
 from conformance.engine.resending import look_again, mask
-from conformance.engine.result import RESULT_NAME, left_out, result_document, write_result
+from conformance.engine.result import RESULT_NAME, left_out, result_document, rfc3339, write_result
 from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.engine.suite import suite_version
+from conformance.history.writing import HistoryWriter
 from conformance.scenarios.scenario import Recordings
 from conformance.scenarios.stored import write_traces
 from conformance.transport.client import Connection
@@ -89,9 +91,9 @@ def certify(
     run, started = robot.run, Started()
     remarks, recordings, reached = list(notes), Recordings(), True
     with remembered(run) as interruption:
-        # A result is there from the first request on, whatever ends the process.
         with suppress(OSError):  # told in the end
             write_result(_unfinished(robot, started, command, notes), out)
+        robot.keep_history(HistoryWriter(out, suite_version(), rfc3339(started.at)))
         try:
             run.limit.begin()
             robot.connect(progress)
@@ -110,6 +112,7 @@ def certify(
         finally:
             interruption.only_record()
             robot.leave_at_rest()
+            remarks += robot.end_history()
         return _concluded(robot, out, remarks, recordings, baseline, started, command, reached=reached)
 
 
@@ -271,6 +274,7 @@ def _judge(robot: RobotUnderTest, teller: Progress, remarks: list[str], recordin
         run.limit.end()
         if not (run.interrupted or run.aborted):
             robot.is_at_rest = False
+            robot.begin_span("repetitions")
             look_again(run, robot.connection, robot.rest)
             robot.is_at_rest = True
             robot.finish()

@@ -137,7 +137,7 @@ class ChecksPlugin:
         if not is_check(item):
             return
         run = self._robot().run
-        run.judge.begin(item.nodeid.rsplit("/", 1)[-1])
+        self._robot().begin(item.nodeid.rsplit("/", 1)[-1])
         if run.interrupted:
             # The exception was swallowed where nobody could see it.
             raise KeyboardInterrupt

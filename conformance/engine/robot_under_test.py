@@ -29,6 +29,7 @@ from conformance.documents.openapi import operations_of
 from conformance.engine.lost_device import LostDevice
 from conformance.engine.refused import RefusalListener
 from conformance.engine.resending import Recorder
+from conformance.history.writing import HISTORY_NAME, HistoryWriter
 from conformance.statement.motion_map import MotionMap
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import OF_GATEWAY, Exchange, NoAnswer, NoAnswerError, Request
@@ -68,6 +69,7 @@ class RobotUnderTest:
     refusals: RefusalListener = field(init=False)
     is_at_rest: bool = True
     _guard: Guard | None = None
+    _history: HistoryWriter | None = None
     _services: SoapServices | None = None
     _progress: TextIO | None = None
 
@@ -214,12 +216,34 @@ class RobotUnderTest:
         """Stop the device after the checks, unless that is done; the stop is tried for a bounded time. Never raises."""
         self.run.limit.end()
         if not self.is_at_rest:
-            self.run.judge.begin("")  # what is sent from here on belongs to no check
+            self.begin("")  # what is sent from here on belongs to no check
             self.stop()
             self.is_at_rest = True
         if self._guard is not None:
             # It goes on trying where the stop could not be delivered.
             self._guard.release(stopped=not self.run.stop_undelivered)
+
+    def keep_history(self, history: HistoryWriter) -> None:
+        """Write down from now on what is sent and what comes back."""
+        self._history = self.connection.recorder = history
+
+    def begin(self, check_name: str) -> None:
+        """Begin a check, or, with an empty name, what belongs to none."""
+        self.run.judge.begin(check_name)
+        self.begin_span(check_name)
+
+    def begin_span(self, name: str) -> None:
+        """Say in the history what the suite does from now on."""
+        if self._history is not None:
+            self._history.begin(name)
+
+    def end_history(self) -> tuple[str, ...]:
+        """Close the history; return what has to be said of it."""
+        if self._history is None:
+            return ()
+        self._history.close()
+        problem = self._history.problem
+        return (f"{HISTORY_NAME} does not have every request: {problem}.",) if problem else ()
 
     def has(self, name: Interface) -> bool:
         """Return whether an interface has an address."""

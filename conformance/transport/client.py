@@ -3,6 +3,7 @@
 Over 300 lines because the client is one class, and the settings that it follows are read together with it.
 """
 
+import itertools
 import math
 import ssl
 import time
@@ -18,7 +19,7 @@ from urllib.parse import urlsplit
 import h11
 
 from conformance.commandline.secret_file import IN_URL, names_user
-from conformance.transport.connections import ClosedError, Connections, NoConnectionError
+from conformance.transport.connections import ClosedError, Connections, HttpConnection, NoConnectionError
 from conformance.transport.credentials import Credential, Credentials, bearer
 from conformance.transport.deadline import Deadline
 from conformance.transport.exchange import (
@@ -36,6 +37,7 @@ from conformance.transport.exchange import (
     sendable,
 )
 from conformance.transport.pace import Pace, time_to_arrive
+from conformance.transport.passage import Passage, Recorder
 from conformance.transport.reach import Trust
 from conformance.transport.tls import ClientCertificate, tls_context
 
@@ -88,6 +90,8 @@ class Connection:
         before_sending: is called before each message, after the wait for ``request_rate``.
         permit: is called with method and absolute URL before each request; returns an empty text if the request may be
             sent, else why not. By default everything may be sent.
+        recorder: records each attempt to send a request, by whatever client, thread or socket.
+        number: returns the number of a new connection.
     """
 
     timeout_s: float = 10.0
@@ -110,6 +114,8 @@ class Connection:
     certificate: ClientCertificate | None = None
     trust: Trust | None = None
     patience_s: float = 120.0
+    recorder: Recorder = field(default_factory=Recorder)
+    number: Callable[[], int] = field(default_factory=lambda: itertools.count(1).__next__)
     _next_slot: float = 0.0
 
     def __post_init__(self) -> None:
@@ -179,7 +185,9 @@ class HttpClient:
         self._hangs: defaultdict[str, list[float]] = defaultdict(list)
         self._authorized = connection.may_authorize(self.base_url)
         self.tls = connection.tls(authorized=self._authorized) if parts.scheme == "https" else None
-        self._connections = Connections(self.host.encode("idna").decode("ascii"), self.port, self.tls)
+        self._connections = Connections(
+            self.host.encode("idna").decode("ascii"), self.port, self.tls, connection.number
+        )
 
     def close(self) -> None:
         """Close all open connections."""
@@ -242,10 +250,10 @@ class HttpClient:
         deadline = timeout_s or self.connection.timeout_s
         started = time.monotonic()
         try:
-            response = self._exchange(method, target, sent, body, deadline, fresh=fresh)
+            response = self._exchange(request, target, sent, deadline, fresh=fresh)
             if authorized and response.status == _CHALLENGE and credentials.learn(response.headers):
                 sent = credentials.added(fields, method, self.prefix + target)
-                response = self._exchange(method, target, sent, body, deadline, fresh=fresh)
+                response = self._exchange(request, target, sent, deadline, fresh=fresh)
             self.connection.note(method)
         except _SilenceError as none:
             self.connection.note(method)
@@ -309,8 +317,9 @@ class HttpClient:
         return tuple(pair for pair in fields if pair != ("Accept", ""))
 
     def _exchange(
-        self, method: str, path: str, fields: list[tuple[str, str]], body: bytes, seconds: float, *, fresh: bool
+        self, shown: Request, path: str, fields: list[tuple[str, str]], seconds: float, *, fresh: bool
     ) -> Response:
+        method, body = shown.method, shown.body
         target = (self.prefix + path).encode("utf-8", "surrogateescape") or b"/"
         headers = [(name.encode("latin-1"), value.encode("utf-8")) for name, value in fields]
         try:
@@ -324,9 +333,10 @@ class HttpClient:
             keep = not fresh and attempt == 1
             connection = self._connections.take() if keep else self._connections.new()
             try:
-                return connection.exchange(request, body, deadline, endless=self.connection.endless)
+                response = connection.exchange(request, body, deadline, endless=self.connection.endless)
             except Exception as error:
                 none = _no_answer(error, seconds + time_to_arrive(len(body)))
+                self._record(shown, connection, attempt, seconds, none)
                 if attempt > 1 and none.kind is NoAnswer.REFUSED:
                     raise _SilenceError(_CRASHED, NoAnswer.CLOSED) from error
                 if none.kind is not NoAnswer.CLOSED:
@@ -339,9 +349,21 @@ class HttpClient:
                 if attempt > 1:
                     none = _SilenceError(f"{none}, {attempt} of {attempt} times{before}", none.kind)
                 raise none from error
+            else:
+                self._record(shown, connection, attempt, seconds, response)
+                return response
             finally:
                 self._connections.give_back(connection, keep=keep)
         raise AssertionError("unreachable: the last attempt returns or raises")
+
+    def _record(
+        self, shown: Request, on: HttpConnection, attempt: int, within_s: float, came: "Response | _SilenceError"
+    ) -> None:
+        ended_s = came.received_s if isinstance(came, Response) else time.monotonic()
+        what = (came,) if isinstance(came, Response) else (None, str(came), came.kind)
+        self.connection.recorder.record(
+            Passage(shown, on.number, on.place, attempt, on.sent_s, on.first_s, ended_s, within_s, *what)
+        )
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 They send target, headers and their order exactly as given. h11 parses responses strictly, so it also checks their
 framing. Why no common HTTP client is used: docs/design.md.
+
+Over 300 lines because a connection, the pool that keeps it and what tells its end from a fault belong together.
 """
 
 import math
@@ -9,6 +11,7 @@ import select
 import socket
 import ssl
 import time
+from collections.abc import Callable
 from typing import Final
 
 import h11
@@ -67,14 +70,23 @@ def open_link(host: str, port: int, tls: ssl.SSLContext | None, within_s: float)
 class HttpConnection:
     """One connection, opened by the first request on it.
 
+    Args:
+        host, port, tls: the server.
+        number: the connection's number in the run.
+
     Attributes:
+        number: as above.
+        place: how many requests were sent on it.
+        sent_s: when the last request was begun, s on the monotonic clock.
+        first_s: when the first octet after it came; 0: none has come.
         is_open: whether it is open.
         is_idle: whether the last response is complete and another request may follow.
         last_status: status of the last response; 0 before the first.
     """
 
-    def __init__(self, host: str, port: int, tls: ssl.SSLContext | None) -> None:
+    def __init__(self, host: str, port: int, tls: ssl.SSLContext | None, number: int = 0) -> None:
         self._server = host, port, tls
+        self.number, self.place, self.sent_s, self.first_s = number, 0, 0.0, 0.0
         self._link: socket.socket | None = None
         self._state = h11.Connection(h11.CLIENT, max_incomplete_event_size=_MAX_HEAD)
         self._idle_since = 0.0
@@ -100,6 +112,7 @@ class HttpConnection:
             OSError: the connection broke.
         """
         started, self.is_idle, self._begun, self._octets = time.perf_counter(), False, False, 0
+        self.place, self.sent_s, self.first_s = self.place + 1, time.monotonic(), 0.0
         if self._link is None:
             self._link = open_link(*self._server, deadline.to_send_s())
         self._send(self._link, request, content, deadline)
@@ -206,7 +219,8 @@ class HttpConnection:
             except ConnectionError:
                 self._was_reset = not self._begun
                 raise
-            self._begun = self._begun or bool(octets)
+            if octets and not self._begun:
+                self._begun, self.first_s = True, time.monotonic()
             if not octets and self._state.their_state is h11.SEND_RESPONSE:
                 self._was_reset = not self._begun and _is_reset(link)
                 raise ClosedError
@@ -249,15 +263,15 @@ def _is_readable(link: socket.socket) -> bool:
 
 
 class Connections:
-    """A pool of connections to one server."""
+    """A pool of connections to one server, numbered by ``number``."""
 
-    def __init__(self, host: str, port: int, tls: ssl.SSLContext | None) -> None:
-        self._server = host, port, tls
+    def __init__(self, host: str, port: int, tls: ssl.SSLContext | None, number: Callable[[], int]) -> None:
+        self._server, self._number = (host, port, tls), number
         self._idle: list[HttpConnection] = []
 
     def new(self) -> HttpConnection:
         """Return a new connection that is not in the pool."""
-        return HttpConnection(*self._server)
+        return HttpConnection(*self._server, self._number())
 
     def take(self) -> HttpConnection:
         """Take an idle connection out of the pool if the server has not closed it; otherwise return a new one."""

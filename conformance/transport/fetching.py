@@ -9,7 +9,7 @@ import ssl
 import threading
 import time
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from queue import Empty, SimpleQueue
 from typing import Final
@@ -21,6 +21,8 @@ from click.globals import push_context
 from conformance.commandline.device_options import advice
 from conformance.transport.client import Connection
 from conformance.transport.credentials import Credentials
+from conformance.transport.exchange import Request, Response
+from conformance.transport.passage import Passage
 from conformance.transport.reach import ElsewhereError, Trust, UnreachableError
 
 _REDIRECTS: Final = 4
@@ -100,14 +102,40 @@ class Fetcher:
             timeout=self._connection.timeout_s,
             headers={"Accept": _ACCEPT, "Accept-Encoding": "identity", "User-Agent": "roaas"},
         )
-        with client.stream("GET", self._guard.place(url)[0]) as response:
-            if response.status_code != httpx.codes.OK:
-                raise ValueError(f"the server responded {response.status_code}{self._hint(url, response.status_code)}")
-            octets = _decoded(response)
+        began = time.monotonic()
+        try:
+            with client.stream("GET", self._guard.place(url)[0]) as response:
+                if response.status_code != httpx.codes.OK:
+                    self._record(began, [*response.history, response])
+                    said = self._hint(url, response.status_code)
+                    raise ValueError(f"the server responded {response.status_code}{said}")
+                octets = _decoded(response)
+        except httpx.TransportError as error:
+            self._record(began, [], Request("GET", url), _worded(error, self._connection.timeout_s))
+            raise
+        self._record(began, [*response.history, response], octets=octets)
         self._octets += len(octets)
         if self._octets > _MOST_IN_ALL:
             raise ValueError(f"the documents have more than {_MOST_IN_ALL:,} bytes in all")
         return octets
+
+    def _record(
+        self,
+        began: float,
+        came: Sequence[httpx.Response],
+        request: Request | None = None,
+        problem: str = "",
+        octets: bytes = b"",
+    ) -> None:
+        """Record the responses on the way to a document, with its content as unpacked, or why there was none."""
+        within_s, ended = self._connection.timeout_s, time.monotonic()
+        for one in came:
+            sent = Request(one.request.method, str(one.request.url), tuple(one.request.headers.multi_items()))
+            fields = tuple(pair for pair in one.headers.multi_items() if pair[0] != "content-encoding")
+            response = Response(one.status_code, fields, octets if one is came[-1] else b"", 1000 * (ended - began))
+            self._connection.recorder.record(Passage(sent, 0, 0, 1, began, 0.0, ended, within_s, response))
+        if request is not None:
+            self._connection.recorder.record(Passage(request, 0, 0, 1, began, 0.0, ended, within_s, None, problem))
 
     def _hint(self, url: str, status: int) -> str:
         """Return which option sends the credentials that a server asks for."""

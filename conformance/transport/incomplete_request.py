@@ -3,10 +3,12 @@
 import contextlib
 import socket
 import struct
+import time
 from typing import Final, Self
 
 from conformance.transport.client import Headers, HttpClient
 from conformance.transport.exchange import NoAnswer, NoAnswerError, Request, Sending, Unanswered, sendable
+from conformance.transport.passage import Passage
 
 # l_onoff 1, l_linger 0: close() sends RST instead of FIN.
 _RESET: Final = struct.pack("ii", 1, 0)
@@ -54,6 +56,7 @@ class PartialRequest:
             octets = octets[:head_only]
         self.request = Request(method, client.url(path), (), b"", f"{shown}\r\n\r\n".encode()[: len(octets)] + body)
         client.connection.take_slot((method, self.request.url))
+        self._connection, self._number, self._sent_s = client.connection, client.connection.number(), time.monotonic()
         try:
             self._socket = socket.create_connection((client.host, client.port), client.connection.timeout_s)
             if client.scheme == "https":
@@ -62,6 +65,7 @@ class PartialRequest:
             client.connection.recent.append(Sending(self.request, None))
         except OSError as error:
             unanswered = Unanswered(self.request, f"no connection: {error}", NoAnswer.REFUSED)
+            self._record(unanswered.problem, NoAnswer.REFUSED)
             raise NoAnswerError(unanswered) from error
 
     def __enter__(self) -> Self:
@@ -77,3 +81,12 @@ class PartialRequest:
                 self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
         with contextlib.suppress(OSError):
             self._socket.close()
+        if self._sent_s:
+            self._record("the suite reset the connection" if reset else "the suite closed the connection")
+            self._sent_s = 0.0
+
+    def _record(self, problem: str, kind: NoAnswer | None = None) -> None:
+        now = time.monotonic()
+        self._connection.recorder.record(
+            Passage(self.request, self._number, 1, 1, self._sent_s, 0.0, now, 0.0, None, problem, kind, whole=False)
+        )

@@ -30,6 +30,7 @@ from conformance.transport.exchange import (
     sendable,
 )
 from conformance.transport.pace import time_for
+from conformance.transport.passage import Passage
 
 # What a recipient may forgive in a header section, and a server must not send (RFC 9112 2.2, 5.2).
 _FORGIVEN = re.compile(rb"(?<!\r)\n|\r(?!\n)|\n[ \t]")
@@ -43,6 +44,10 @@ _MOST_INTERIM = 100
 _SHORT = 64 * 1024
 # The least that a connection is waited for, s.
 _TO_CONNECT_S = 0.05
+_SILENCES = {
+    NoAnswer.CLOSED: "the server closed the connection without a response",
+    NoAnswer.TIMEOUT: "no response within the deadline",
+}
 
 
 class FramingError(Exception):
@@ -122,15 +127,25 @@ def talk(
         NoAnswerError: the connection cannot be opened.
         NotPermittedError: one of the requests in the bytes may not be sent in this run.
     """
-    deadline = time.monotonic() + (timeout_s or client.connection.timeout_s) + time_for(len(octets))
+    within_s = (timeout_s or client.connection.timeout_s) + time_for(len(octets))
+    deadline = time.monotonic() + within_s
     request = shown(client, octets)
     client.connection.take_slot(*((method, _url(client, target)) for method, target in requests_in(octets)))
-    started = time.perf_counter()
+    started, sent_s, first_s = time.perf_counter(), time.monotonic(), 0.0
+    number = client.connection.number()
+
+    def record(response: bytes | None, problem: str = "", kind: NoAnswer | None = None, *, whole: bool = True) -> None:
+        ended_s = time.monotonic()
+        client.connection.recorder.record(
+            Passage(request, number, 1, 1, sent_s, first_s, ended_s, within_s, response, problem, kind, whole)
+        )
+
     try:
         left = max(_TO_CONNECT_S, deadline - time.monotonic())
         link = open_link(client.host, client.port, client.tls, left)
     except OSError as error:
         client.connection.recent.append(Sending(request, NoAnswer.REFUSED))
+        record(None, f"no connection: {error}", NoAnswer.REFUSED, whole=False)
         raise NoAnswerError(Unanswered(request, f"no connection: {error}", NoAnswer.REFUSED)) from error
     received = bytearray()
     closed = False
@@ -148,6 +163,7 @@ def talk(
             if not piece:
                 closed = True
                 break
+            first_s = first_s or time.monotonic()
             received += piece
             deadline += time_for(len(piece))
             # A long answer is looked at when no more of it is there to be read, as each look takes time.
@@ -156,6 +172,7 @@ def talk(
                 break
     client.connection.note(request.method)
     silence = NoAnswer.CLOSED if closed else NoAnswer.TIMEOUT
+    record(bytes(received), "" if received else _SILENCES[silence], None if received else silence, whole=sent_all)
     client.connection.recent.append(Sending(request, None if received else silence))
     return RawAnswer(bytes(received), closed, sent_all, (time.perf_counter() - started) * 1000, early)
 
@@ -298,8 +315,8 @@ def read_one(client: HttpClient, octets: bytes, came: RawAnswer, method: str) ->
     request = shown(client, octets)
     if not came.octets:
         if came.closed:
-            return Unanswered(request, "the server closed the connection without a response", NoAnswer.CLOSED), b""
-        return Unanswered(request, "no response within the deadline", NoAnswer.TIMEOUT), b""
+            return Unanswered(request, _SILENCES[NoAnswer.CLOSED], NoAnswer.CLOSED), b""
+        return Unanswered(request, _SILENCES[NoAnswer.TIMEOUT], NoAnswer.TIMEOUT), b""
     try:
         response, rest = parse(came.octets, method, closed=came.closed, elapsed_ms=came.elapsed_ms)
     except FramingError as error:

@@ -12,7 +12,8 @@ from reports.attestation.outcomes import named
 from reports.attestation.statement import CONTRACT_SUBJECT, STATEMENT_SUBJECT, Statement
 from reports.errors import ResultUnreadableError, ResultUnsignableError
 
-TRACES = "traces.json.gz"
+RECORDED = ("traces.json.gz", "history.jsonl.gz")
+"""Files that a run records beside its result, each of which may be missing."""
 DESCRIPTION = "description"
 """Folder of a result with the description that a device was judged by."""
 _MOST_FILES = 2000
@@ -44,7 +45,7 @@ def digests_in(directory: Path, *, described: bool) -> dict[str, str]:
         ResultUnsignableError: one of them is a link or no regular file, which cannot be signed.
         ResultUnreadableError: a file cannot be read.
     """
-    names = [TRACES] if os.path.lexists(directory / TRACES) else []
+    names = [name for name in RECORDED if os.path.lexists(directory / name)]
     names += (f"{DESCRIPTION}/{name}" for name in _names_in(directory / DESCRIPTION) if described)
     found = {}
     for name in names:

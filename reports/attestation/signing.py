@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 
 from reports.attestation.envelope import strict_json
-from reports.attestation.files import DESCRIPTION, TRACES, digests_in
+from reports.attestation.files import DESCRIPTION, RECORDED, digests_in
 from reports.attestation.keys import signer_of
 from reports.attestation.outcomes import Entry, contradictions, departures, named
 from reports.attestation.policy import Known
@@ -98,7 +98,7 @@ def _replaced(directory: Path, result: Mapping[str, Any]) -> list[str]:
         for name, digest in ((result.get("digests") or {}).get("contract") or {}).items()
     }
     there = digests_in(directory, described="api" in result)
-    other = [name for name, digest in there.items() if name != TRACES and judged.get(name) != digest]
+    other = [name for name, digest in there.items() if name not in RECORDED and judged.get(name) != digest]
     return [f"the device was not judged by these files: {named(other)}"] if other else []
 
 

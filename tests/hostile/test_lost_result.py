@@ -118,7 +118,8 @@ def test_links_in_the_folder_are_replaced_and_not_followed(tmp_path):
     out, outside = tmp_path / "out", tmp_path / "outside"
     out.mkdir()
     (outside / "folder").mkdir(parents=True)
-    names = ("result.json", "certificate.html", "certificate.md", "junit.xml", "traces.json.gz", LOCK_NAME)
+    pages = ("certificate.html", "certificate.md", "junit.xml")
+    names = ("result.json", *pages, "traces.json.gz", "history.jsonl.gz", LOCK_NAME)
     for name in names:
         (outside / name).write_text("precious", encoding="utf-8")
         (out / name).symlink_to(outside / name)

@@ -33,9 +33,9 @@ def clock(api: RestInterface) -> Clock:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def probe(run: Run) -> Iterator[RosProbe]:
+def probe(run: Run, connection: Connection) -> Iterator[RosProbe]:
     """The ROS probe, started before it is needed where a domain is given."""
-    started = RosProbe(said_of(run).ros)
+    started = RosProbe(said_of(run).ros, connection.recorder)
     started.start()
     yield started
     started.close()

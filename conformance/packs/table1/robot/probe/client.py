@@ -8,10 +8,14 @@ from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.robot import Velocity
 from conformance.packs.table1.ros_process import ProbeError, RosProcess
 from conformance.packs.table1.statement import Ros
+from conformance.transport.passage import EyeState, Recorder
 
 #: How long the robot's messages are waited for, s. DDS sends a lost sample again after its writer's next heartbeat, and
 #: Fast DDS has one every 3 s: on Wi-Fi a message may come so late.
 ARRIVES_S: Final = 5.0
+
+# What the probe hears.
+_EYES: Final = ("deliveries", "velocities")
 
 __all__ = ["ARRIVES_S", "Probe", "ProbeError", "RosProbe"]
 
@@ -22,6 +26,8 @@ class Probe(RosProcess):
     Args:
         ros: the statement's part on the robot's ROS side.
 
+        recorder: records what is heard, and when it was.
+
     Attributes:
         heard_at: time up to which all messages caused by the run's requests have arrived, s of the monotonic clock.
 
@@ -31,20 +37,27 @@ class Probe(RosProcess):
 
     heard_at = -math.inf
 
-    def __init__(self, ros: Ros) -> None:
+    def __init__(self, ros: Ros, recorder: Recorder) -> None:
+        self._recorder = recorder
         topics = ("--delivery-topic", ros.delivery_topic, "--cmd-vel-topic", ros.cmd_vel_topic)
         super().__init__("conformance.packs.table1.robot.probe", *topics, domain_id=ros.domain_id)
 
     def deliveries(self) -> list[Delivery]:
         """Return the DeliveryRequestMsg messages received since the last call, in order."""
-        return [
-            Delivery(int(code), *(float.fromhex(value) for value in values))
-            for code, *values in self.ask("deliveries")["deliveries"]
-        ]
+        return [Delivery(int(code), *values) for code, *values in self._heard("deliveries")]
 
     def velocities(self) -> list[Velocity]:
         """Return the velocity commands received since the last call, in order."""
-        return [Velocity(*map(float.fromhex, values)) for values in self.ask("velocities")["velocities"]]
+        return [Velocity(*values) for values in self._heard("velocities")]
+
+    def _heard(self, what: str) -> list[list[float]]:
+        """Return and record the messages of one kind since the last call."""
+        heard = []
+        for message in self.ask(what)[what]:
+            at_s, *values = (float.fromhex(one) if isinstance(one, str) else one for one in message)
+            self._recorder.saw(what, at_s, values)
+            heard.append(values)
+        return heard
 
     def topics(self) -> dict[str, list[str]]:
         """Return the types of each published topic, by the topic's full name."""
@@ -57,10 +70,11 @@ class RosProbe:
 
     Args:
         ros: the statement's part on the robot's ROS side; the domain may be missing.
+        recorder: records what is heard.
     """
 
-    def __init__(self, ros: Ros) -> None:
-        self._ros = ros
+    def __init__(self, ros: Ros, recorder: Recorder) -> None:
+        self._ros, self._recorder = ros, recorder
         self._probe: Probe | None = None
         self._problem: ProbeError | None = None
         self._sees_robot = False
@@ -70,7 +84,7 @@ class RosProbe:
         if self._ros.domain_id is None or self._probe is not None or self._problem is not None:
             return
         try:
-            self._probe = Probe(self._ros)
+            self._probe = Probe(self._ros, self._recorder)
         except ProbeError as error:
             self._problem = error
 
@@ -92,9 +106,23 @@ class RosProbe:
                 self._problem = error
                 raise
             self._sees_robot = True
+            for eye in _EYES:
+                self._recorder.eye(eye, EyeState.OPENED)
         return self._probe
 
     def close(self) -> None:
-        """End the process without waiting for it."""
+        """End the process without waiting for it, when all that it has heard is recorded."""
         if self._probe is not None:
+            if self._sees_robot:
+                self._listen_once_more(self._probe)
             threading.Thread(target=self._probe.close, name="probe's end").start()
+
+    def _listen_once_more(self, probe: Probe) -> None:
+        state = EyeState.CLOSED
+        try:
+            probe.deliveries()
+            probe.velocities()
+        except ProbeError:
+            state = EyeState.LOST
+        for eye in _EYES:
+            self._recorder.eye(eye, state)

@@ -62,11 +62,11 @@ class ProbeNode:
         return found
 
     def deliveries(self) -> dict[str, Any]:
-        """Return the messages received on the delivery topic since the last call."""
+        """Return the messages received on the delivery topic since the last call, each after the time it came."""
         return {"deliveries": _emptied(self._deliveries)}
 
     def velocities(self) -> dict[str, Any]:
-        """Return the messages received on the velocity topic since the last call."""
+        """Return the messages received on the velocity topic since the last call, each after the time it came."""
         return {"velocities": _emptied(self._velocities)}
 
     def graph(self) -> dict[str, Any]:
@@ -104,15 +104,14 @@ class ProbeNode:
 
     def _delivery_came(self, message: Any) -> None:
         values = [float(getattr(message, name)).hex() for name in COORDINATES]
-        self._deliveries.append([message.message_code, *values])
+        self._deliveries.append([time.monotonic().hex(), message.message_code, *values])
 
     def _stamped_came(self, message: Any) -> None:
         self._velocity_came(message.twist)
 
     def _velocity_came(self, twist: Any) -> None:
-        self._velocities.append(
-            [float(getattr(part, axis)).hex() for part in (twist.linear, twist.angular) for axis in "xyz"]
-        )
+        values = [float(getattr(part, axis)).hex() for part in (twist.linear, twist.angular) for axis in "xyz"]
+        self._velocities.append([time.monotonic().hex(), *values])
 
     def _spin(self) -> None:
         try:

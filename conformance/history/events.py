@@ -1,0 +1,213 @@
+"""The events of a history, as they are written: one JSON object each, told apart by ``event``.
+
+All times are seconds since the run began, by its monotonic clock. What a later version adds has a default, so that
+older histories are still read: what they lack was not seen.
+"""
+
+import hashlib
+from typing import Final, Self
+
+import msgspec
+
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Response, Unanswered
+from conformance.transport.passage import EyeState, Passage
+
+#: The version of what is written.
+VERSION: Final = 1
+# Octets of a body that are kept; of a longer one, only its hash and length.
+_MOST_KEPT: Final = 1 << 20
+
+
+class Octets(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A body, or the bytes on a socket: as text if they are UTF-8, else in base64, else by their hash.
+
+    Attributes:
+        text: the octets as UTF-8.
+        base64: the octets where they are not UTF-8.
+        sha256: their hash in hexadecimal digits, if they are more than 1 MiB.
+        length: how many they are, if only the hash is kept.
+    """
+
+    text: str = ""
+    base64: bytes = b""
+    sha256: str = ""
+    length: int = 0
+
+    @classmethod
+    def of(cls, octets: bytes) -> Self:
+        """Return how octets are written."""
+        if len(octets) > _MOST_KEPT:
+            return cls(sha256=hashlib.sha256(octets).hexdigest(), length=len(octets))
+        try:
+            return cls(text=octets.decode())
+        except UnicodeDecodeError:
+            return cls(base64=octets)
+
+    @property
+    def kept(self) -> bytes | None:
+        """The octets, or None if only their hash is kept."""
+        return None if self.sha256 else self.base64 or self.text.encode()
+
+
+class Came(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A response: status, version and header fields as received, and the body after transfer decoding.
+
+    Attributes:
+        status, version, headers, body: of the response.
+        cut: why the body was not read to its end, or empty.
+    """
+
+    status: int
+    headers: tuple[tuple[str, str], ...] = ()
+    body: Octets = Octets()
+    version: str = "HTTP/1.1"
+    cut: str = ""
+
+
+class Sent(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", tag="sent"):
+    """One attempt to send a request over a connection, and what came back.
+
+    Attributes:
+        id: number of the event, from 1, in the order of completion.
+        span: what the suite was doing, as in Span.
+        client: the client that sent it, as the suite's threads are called.
+        connection, place, attempt: as in Passage.
+        sent_s, first_s, ended_s: when sending began, the first octet came (0: none did), and the last one.
+        within_s: the deadline; 0: no response was waited for.
+        method, url, query, headers, body: of the request, with variables in place of credentials.
+        raw: the bytes on the socket, if they were written by hand.
+        whole: whether all of the request was sent.
+        came: the response; None: there was none, or it was not parsed.
+        octets: what a raw socket received, as it came.
+        problem, kind: what happened instead of a response.
+    """
+
+    id: int
+    span: str
+    client: str
+    connection: int
+    place: int
+    sent_s: float
+    ended_s: float
+    method: str
+    url: str
+    first_s: float = 0.0
+    within_s: float = 0.0
+    attempt: int = 1
+    query: str = ""
+    headers: tuple[tuple[str, str], ...] = ()
+    body: Octets = Octets()
+    raw: Octets | None = None
+    whole: bool = True
+    came: Came | None = None
+    octets: Octets | None = None
+    problem: str = ""
+    kind: NoAnswer | None = None
+
+    @classmethod
+    def of(cls, passage: Passage, number: int, span: str, client: str, began_s: float) -> Self:
+        """Return the event of a passage."""
+        request, response = passage.request, passage.response
+
+        def since(moment_s: float) -> float:
+            return round(moment_s - began_s, 6) if moment_s else 0.0
+
+        return cls(
+            number,
+            span,
+            client,
+            passage.connection,
+            passage.place,
+            since(passage.sent_s),
+            since(passage.ended_s),
+            request.method,
+            request.url,
+            since(passage.first_s),
+            passage.within_s,
+            passage.attempt,
+            request.query,
+            request.headers,
+            Octets.of(request.body),
+            None if request.raw is None else Octets.of(request.raw),
+            passage.whole,
+            _came(response) if isinstance(response, Response) else None,
+            Octets.of(response) if isinstance(response, bytes) else None,
+            passage.problem,
+            passage.kind,
+        )
+
+    @property
+    def request(self) -> Request | None:
+        """The request, or None if its body was too long to be kept."""
+        body, raw = self.body.kept, self.raw.kept if self.raw else None
+        if body is None or (self.raw and raw is None):
+            return None
+        return Request(self.method, self.url, self.headers, body, raw, self.query)
+
+    @property
+    def outcome(self) -> Attempt | None:
+        """Request and response as checks have them; None if the history does not have them whole."""
+        request, came = self.request, self.came
+        if request is None or self.octets is not None:
+            return None
+        if came is None:
+            return Unanswered(request, self.problem, self.kind or NoAnswer.CLOSED)
+        body = came.body.kept
+        if body is None:
+            return None
+        elapsed_ms = 1000 * (self.ended_s - self.sent_s)
+        return Exchange(
+            request, Response(came.status, came.headers, body, elapsed_ms, came.version, self.ended_s, came.cut)
+        )
+
+
+def _came(response: Response) -> Came:
+    return Came(response.status, response.headers, Octets.of(response.body), response.http_version, response.cut)
+
+
+class Began(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", tag="began"):
+    """The first event: of which version the history is, which suite wrote it, and when the run began (RFC 3339)."""
+
+    version: int
+    suite: str
+    started: str
+
+
+class Span(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", tag="span"):
+    """From here on, the suite did this: the name of a check, or empty between checks."""
+
+    at_s: float
+    name: str
+
+
+class Seen(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", tag="seen"):
+    """What an eye saw beside the requests, such as a message on a ROS topic, dated where it was seen."""
+
+    at_s: float
+    eye: str
+    values: tuple[float | int | str, ...]
+
+
+class Eye(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", tag="eye"):
+    """From here on, an eye sees, or does no longer: that something is missing counts only while it sees."""
+
+    at_s: float
+    eye: str
+    state: EyeState
+
+
+class Ended(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", tag="ended"):
+    """The last event of a history that is whole.
+
+    Attributes:
+        at_s: when it was written.
+        events: how many exchanges it has.
+        problem: why not all of them are in it, or empty.
+    """
+
+    at_s: float
+    events: int
+    problem: str = ""
+
+
+Event = Began | Sent | Span | Seen | Eye | Ended

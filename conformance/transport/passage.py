@@ -1,0 +1,65 @@
+"""What a run records as it happens: each request that passes over a connection, and what an eye sees beside it.
+
+Every client calls the recorder of its connection settings, which copies of these settings share: those of concurrent
+clients, of the stop at the end, and of raw sockets. So nothing that is sent is hidden from the history.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from conformance.transport.exchange import NoAnswer, Request, Response
+
+
+@dataclass(frozen=True, slots=True)
+class Passage:
+    """One attempt to send a request over a connection, and what came back.
+
+    Attributes:
+        request: the request, with variables in place of credentials.
+        connection: the connection's number in the run, from 1; 0 where a library keeps the connections.
+        place: the request's place on it, from 1.
+        attempt: 1, or 2 where the first connection had been closed by the server.
+        sent_s: when sending began, s on the monotonic clock.
+        first_s: when the first octet came back; 0: none came.
+        ended_s: when the last octet came, or was waited for no longer.
+        within_s: the deadline for a response of usual size, s after sending; 0: none was waited for.
+        response: what came back: a response, the octets of a raw socket as they came, or None.
+        problem: what happened instead of a response, in words, or empty.
+        kind: the same as an enum value.
+        whole: whether all of the request was sent.
+    """
+
+    request: Request
+    connection: int
+    place: int
+    attempt: int
+    sent_s: float
+    first_s: float
+    ended_s: float
+    within_s: float
+    response: Response | bytes | None
+    problem: str = ""
+    kind: NoAnswer | None = None
+    whole: bool = True
+
+
+class EyeState(StrEnum):
+    """Whether something that looks at a device beside the requests sees it."""
+
+    OPENED = "opened"
+    LOST = "lost"
+    CLOSED = "closed"
+
+
+class Recorder:
+    """Base class of what records a run. Does nothing. Any thread may call its methods, which return at once."""
+
+    def record(self, passage: Passage) -> None:
+        """Record an attempt to send a request."""
+
+    def saw(self, eye: str, at_s: float, values: Sequence[float | int | str]) -> None:
+        """Record what an eye saw, and when, by its own reading of the machine's monotonic clock, s."""
+
+    def eye(self, eye: str, state: EyeState) -> None:
+        """Record that an eye sees from now on, or does no longer."""
