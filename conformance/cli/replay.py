@@ -19,9 +19,10 @@ from conformance.commandline.terminal import inert
 from conformance.contract.described import copy_as_data
 from conformance.contract.locating import ContractError, is_installed
 from conformance.contract.pack import DEFAULT_PACK, Contract
-from conformance.engine.stored_result import MALFORMED, StoredResultError, not_well_made, read_result
+from conformance.engine.stored_result import MALFORMED, StoredResultError, findings, not_well_made, read_result
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Statement, StatementError, api_of, empty_statement, load_statement
+from conformance.verdict.finding import counted
 
 if TYPE_CHECKING:
     from conformance.transport.client import Connection
@@ -90,7 +91,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
     """
     # Imported here, so that --help stays quick.
     from conformance.engine.permission import moves  # noqa: PLC0415
-    from conformance.engine.replay import Outcome, findings, replay_and_stop  # noqa: PLC0415
+    from conformance.engine.replay import Outcome, replay_and_stop  # noqa: PLC0415
 
     end_like_ctrl_c()
     end_with_parent()
@@ -129,7 +130,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
         now = f"now {one.came}" if one.came else ""
         if one.sent:
             judged = f" (judged {one.told_by})" if one.told_by else ""
-            now += f", after {one.sent} request{'' if one.sent == 1 else 's'}{judged}"
+            now += f", after {counted(one.sent, 'request')}{judged}"
         told = ". ".join(filter(None, (one.why, now, f"In the run: {one.message}")))
         click.echo(f"{one.outcome}: {inert(one.requirement)}: {inert(told)}")
     if acting:
@@ -197,7 +198,7 @@ def _judge_again(
     click.secho(warning(judged), fg="red", nl=False)
     for item in judged["requirements"]:
         word = _WORDS.get(item["verdict"], "not judged")
-        click.echo(f"{word}: {item['id']}: {inert(item['reason']) or 'passed'} ({_counted(item['cases'])})")
+        click.echo(f"{word}: {item['id']}: {inert(item['reason']) or 'passed'} ({counted(item['cases'], 'case')})")
     verdicts = {item["verdict"] for item in judged["requirements"]}
     if verdicts & {"fail", "warn"}:
         return CommandResult(ExitCode.FAILED)
@@ -243,7 +244,7 @@ def _judge_recorded(
     chosen = [one for one in judged if wanted in {None, one.requirement}]
     for one in chosen:
         word = f"fails: {inert('; '.join(one.failures))}" if one.failures else "passes"
-        click.echo(f"{one.requirement} {word} ({_counted(one.cases)})")
+        click.echo(f"{one.requirement} {word} ({counted(one.cases, 'case')})")
     if not chosen:
         raise click.UsageError(f"no recorded trace shows {requirement or 'any requirement'}")
     return CommandResult(ExitCode.FAILED if any(one.failures for one in chosen) else ExitCode.PASSED)
@@ -292,7 +293,3 @@ def _contract_of(document: dict[str, Any], pack: str | None, folder: Path) -> Co
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return contract if document["suite"]["contract"] == contract.label else None
-
-
-def _counted(cases: int) -> str:
-    return f"{cases} case{'' if cases == 1 else 's'}"

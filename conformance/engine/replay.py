@@ -1,8 +1,10 @@
 """Check whether a finding still occurs: send its requests again, or run the checks of its requirement again."""
 
+import itertools
+import math
 import tempfile
 import time
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from enum import StrEnum
@@ -17,7 +19,6 @@ from conformance.api.rest.observers import Observer
 from conformance.api.rest.stops import UNDELIVERED, stop_device
 from conformance.commandline.endings import undisturbed
 from conformance.contract.described import MOTION
-from conformance.contract.generic import generic_ledger
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.engine.by_description import SECURITY, fails_by_description
@@ -36,6 +37,9 @@ from conformance.verdict.run import Run
 
 # A pause between two requests is kept, as what is judged may be what comes after it; never longer than this, s.
 _LONGEST_PAUSE_S = 10.0
+# A replay sends requests for at most this time; as much longer as these take, with the recorded pauses, each; and never
+# for longer than the last, s.
+_LEAST_S, _EACH_S, _MOST_S = 60.0, 2.0, 1800.0
 _BY_JUDGEMENT = "as in the run"
 _BY_STATUS = "by the status"
 _BY_SILENCE = "by the missing response"
@@ -78,28 +82,13 @@ class Replayed:
     why: str = ""
 
 
-def findings(result: Mapping[str, Any], chosen: str | None) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield (requirement id, finding) for all findings of a result.
-
-    Args:
-        result: the result.
-        chosen: only those of this requirement (by any id that it had), or the one with this number; None: all.
-    """
-    known = generic_ledger().get(chosen or "")
-    names = {chosen, *(known.aliases if known else ())}
-    for item in (*result["requirements"], *result.get("web_server", {}).get("requirements", ())):
-        whole = chosen is None or not names.isdisjoint({item["id"], *item.get("aliases", ())})
-        for failure in item["failures"]:
-            if whole or chosen == str(failure.get("number")):
-                yield item["id"], failure
-
-
 def replay(
     id_: str,
     failure: Mapping[str, Any],
     connection: Connection,
     rest: str | None = None,
     contract: Contract | None = None,
+    until: float = math.inf,
 ) -> Replayed:
     """Send one finding's requests again.
 
@@ -112,6 +101,7 @@ def replay(
         connection: settings for the robot's clients.
         rest: base URL of the robot's REST interface, or None.
         contract: whose observers and description judge, or None.
+        until: when no further request is sent, by time.monotonic().
 
     Raises:
         ValueError, KeyError, TypeError: the result is malformed.
@@ -124,7 +114,10 @@ def replay(
     began = time.monotonic()
     for item, request in zip(sequence, requests, strict=True):
         due = began + float(item["at_s"])
-        time.sleep(min(max(0.0, due - time.monotonic()), _LONGEST_PAUSE_S))
+        time.sleep(max(0.0, min(_LONGEST_PAUSE_S, *(moment - time.monotonic() for moment in (due, until)))))
+        if time.monotonic() >= until:
+            why = f"the time of the replay was over before {len(requests) - len(came)} of {len(requests)} requests"
+            return Replayed(id_, message, Outcome.UNKNOWN, why=why)
         attempt = send_again(request, connection)
         if isinstance(attempt, Unanswered) and attempt.kind is NoAnswer.REFUSED:
             return Replayed(id_, message, Outcome.UNKNOWN, attempt.problem)
@@ -136,7 +129,7 @@ def replay(
 
 
 def replay_and_stop(
-    chosen: Iterable[tuple[str, Mapping[str, Any]]],
+    chosen: Collection[tuple[str, Mapping[str, Any]]],
     result: Mapping[str, Any],
     connection: Connection,
     contract: Contract | None,
@@ -158,17 +151,28 @@ def replay_and_stop(
         ValueError, KeyError, TypeError: the result is malformed.
     """
     rest, found, unstopped = result["target"].get("rest"), [], ""
+    until = time.monotonic() + longest_s(chosen)
     stop: _Stop | None = None
     try:
         for id_, failure in chosen:
             if stop is None and moves(failure, contract, rest or "") and not (rest and strangers(failure, [rest])):
                 stop = _Stop(result, connection, rest, contract)
-            found.append(replay(id_, failure, connection, rest if contract else None, contract))
+            found.append(replay(id_, failure, connection, rest if contract else None, contract, until))
     finally:
         if stop is not None:
             with undisturbed():
                 unstopped = stop.send()
     return found, unstopped
+
+
+def longest_s(chosen: Iterable[tuple[str, Mapping[str, Any]]]) -> float:
+    """Return for how long the requests of findings are sent at most, with the recorded pauses, s."""
+    usual_s = 0.0
+    for _, failure in chosen:
+        at_s = [float(item["at_s"]) for item in failure.get("sequence") or ()]
+        pauses = (later - earlier for earlier, later in itertools.pairwise(at_s))
+        usual_s += _EACH_S * len(at_s) + sum(min(max(0.0, pause), _LONGEST_PAUSE_S) for pause in pauses)
+    return min(_LEAST_S + usual_s, _MOST_S)
 
 
 class _Stop:

@@ -1,5 +1,6 @@
 """Read a result.json that may come from anybody, with the types that a replay relies on."""
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -7,6 +8,7 @@ import msgspec
 
 from conformance.commandline.given_files import read_json, read_octets
 from conformance.commandline.terminal import inert
+from conformance.contract.generic import generic_ledger
 
 _FORMAT: Final = "roaas-result/1"
 _SHOWN: Final = 300
@@ -91,3 +93,19 @@ def not_well_made(path: Path, error: Exception) -> StoredResultError:
     """Return the error for a result whose content raised another one."""
     said = inert(f"{type(error).__name__}: {error}")[:_SHOWN]
     return StoredResultError(f"{path} is no well-made {_FORMAT}: {said}")
+
+
+def findings(result: Mapping[str, Any], chosen: str | None) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield (requirement id, finding) for all findings of a result.
+
+    Args:
+        result: the result.
+        chosen: only those of this requirement (by any id that it had), or the one with this number; None: all.
+    """
+    known = generic_ledger().get(chosen or "")
+    names = {chosen, *(known.aliases if known else ())}
+    for item in (*result["requirements"], *result.get("web_server", {}).get("requirements", ())):
+        whole = chosen is None or not names.isdisjoint({item["id"], *item.get("aliases", ())})
+        for failure in item["failures"]:
+            if whole or chosen == str(failure.get("number")):
+                yield item["id"], failure

@@ -2,6 +2,8 @@
 
 import base64
 import json
+import threading
+import time
 import zlib
 
 import pytest
@@ -10,7 +12,9 @@ from toy_server import Handler, server_of
 
 from conformance.contract.pack import Contract
 from conformance.engine.permission import moves
+from conformance.engine.replay import Outcome, longest_s, replay
 from conformance.engine.resending import read_request, written
+from conformance.transport.client import Connection
 from conformance.transport.exchange import Request
 from conformance.verdict.finding import Sent
 from roaas import main
@@ -205,3 +209,36 @@ def test_a_request_is_read_as_it_was_written(body):
     request = Request("PUT", "http://r2/", (("A", "b"),), body, b"RAW" if not body else None)
     (item,) = written([Sent(3.0, request)])
     assert (item["at_s"], read_request(item)) == (0.0, request)
+
+
+class _Silent(Handler):
+    """Never answers."""
+
+    def answer(self):
+        self.server.asked.append(self.path)
+        self.server.over.wait()
+
+
+@pytest.mark.parametrize("at_s", [0.0, 1e9, 1e308, -1e9])
+def test_a_replay_ends_when_its_time_is_over(at_s):
+    over = threading.Event()
+    with server_of(_Silent, asked=[], over=over) as device:
+        sequence = [item | {"at_s": at_s} for item in written([Sent(0.0, Request("GET", device.url, (), b""))] * 500)]
+        failure = {"message": "status 500", "response": {"status": 500}, "sequence": sequence}
+        began = time.monotonic()
+        came = replay("http/x", failure, Connection(timeout_s=0.05), until=began + 1)
+        over.set()
+    assert (came.outcome, came.why.startswith("the time of the replay was over before ")) == (Outcome.UNKNOWN, True)
+    assert len(device.asked) < 500
+    assert time.monotonic() - began < 20
+
+
+def test_the_time_of_a_replay_grows_with_its_requests_and_has_an_end():
+    """A result of somebody else may have any number of requests, and any pause between them."""
+    few, many, endless = (
+        [("http/x", {"sequence": [{"at_s": pause * place} for place in range(count)]})]
+        for count, pause in ((1, 0.0), (100, 3.0), (1_000_000, 1e9))
+    )
+    assert longest_s(few) == 62
+    assert longest_s(many) == 60 + 200 + 297
+    assert longest_s(endless) == 1800
