@@ -11,6 +11,7 @@ from typing import Final
 
 from conformance.documents.openapi import Operation
 from conformance.statement.motion_map import shape_of
+from conformance.verdict.finding import counted
 
 # Words in a path or operationId that say that a call may do harm, whatever its method.
 _HARMFUL: Final = frozenset(
@@ -130,9 +131,8 @@ def told(rules: CallRules, operations: Sequence[Operation], mapped: Collection[s
     called = [label for reason, labels in by_reason.items() if reason.may for label in labels]
     changing = by_reason.get(Reason.ALLOWED, []) + by_reason.get(Reason.MAPPED, [])
     kept = len(operations) - len(called)
-    lines = [
-        f"Calls {len(called)} of {len(operations)} operations ({len(changing)} change state); {kept} are not called."
-    ]
+    all_ = counted(len(operations), "operation")
+    lines = [f"Calls {len(called)} of {all_}; state is changed by {len(changing)}; not called: {kept}."]
     for reason in Reason:
         labels = by_reason.get(reason, [])
         if labels and reason is not Reason.SAFE:

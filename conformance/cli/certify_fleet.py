@@ -19,6 +19,7 @@ from conformance.contract.pack import Contract
 from conformance.fleet.fleet_file import TIME_LIMIT_S, FleetError, load_fleet, refuse_same_identity
 from conformance.fleet.member_run import MemberResult, Outcome
 from conformance.verdict.effort import DEEP_MINUTES
+from conformance.verdict.finding import counted
 
 PARALLEL = 4
 # Options that hold for each robot of a fleet; what else there is belongs to one robot, and into the file.
@@ -120,7 +121,7 @@ def _print_summary(results: list[MemberResult]) -> None:
         told = f"may be trusted with {trusted}" if trusted else f"may be trusted with nothing{_because(result)}"
         click.echo(f"  {result.member.name:<{width}}  {result.outcome:<14}  {inert(told)}")
     count = sum(result.outcome is Outcome.CONFORMANT for result in results)
-    click.echo(f"\n{count} of {len(results)} robots conformant")
+    click.echo(f"\n{count} of {counted(len(results), 'robot')} conformant")
 
 
 def _because(result: MemberResult) -> str:

@@ -14,6 +14,7 @@ from conformance.contract.classes import Level
 from conformance.contract.ledger import Requirement
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
+from conformance.verdict.finding import counted
 
 #: ``--contract``, as the parameter ``pack``.
 contract_option = click.option(
@@ -60,7 +61,7 @@ def list_(pack: str, class_: str | None, level: str | None, *, as_json: bool) ->
         return
     for item in found:
         click.echo(f"{item.id}\n    {item.level}: {item.text} [{item.origin}: {item.source}]")
-    click.echo(f"{len(found)} requirements of contract {contract.label}", err=True)
+    click.echo(f"{counted(len(found), 'requirement')} of contract {contract.label}", err=True)
 
 
 def _as_json(requirement: Requirement) -> dict[str, Any]:
@@ -85,7 +86,7 @@ def export(directory: Path, pack: str, *, force: bool) -> None:
             shutil.copyfile(path, directory / path.name)
     except OSError as error:
         raise click.UsageError(f"the contract cannot be written to {directory}: {error}") from error
-    click.echo(f"wrote {len(contract.files)} files of contract {contract.label} to {directory}")
+    click.echo(f"wrote {counted(len(contract.files), 'file')} of contract {contract.label} to {directory}")
 
 
 @contract.command()
@@ -139,4 +140,4 @@ def ways(pack: str, domain_id: int, seed: int, effort: str) -> None:
         sys.exit(ExitCode.UNREACHABLE)
     path = contract.directory / FILE
     path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    click.echo(f"wrote {path}: {len(found)} requirements")
+    click.echo(f"wrote {path}: {counted(len(found), 'requirement')}")

@@ -76,7 +76,7 @@ def print_summary(outcome: Certification) -> None:
     accepted = f", accepted by the baseline until {document['accepted_until']}" if "accepted_until" in document else ""
     click.echo(
         f"\n{document['verdict_line']}{accepted}: {told}; "
-        f"{document['requests']} requests in {document['duration_s']:.1f} s, seed {document['seed']}"
+        f"{counted(document['requests'], 'request')} in {document['duration_s']:.1f} s, seed {document['seed']}"
     )
 
 
@@ -91,7 +91,7 @@ def _print_unjudged(document: Mapping[str, Any]) -> None:
     faults: Sequence[Mapping[str, Any]] = document.get("suite_errors", ())
     if faults:
         count = len({id_ for fault in faults for id_ in fault["requirements"]})
-        click.echo(f"\n{count} requirements could not be judged because of an error in the suite:")
+        click.echo(f"\n{counted(count, 'requirement')} could not be judged because of an error in the suite:")
     for fault in faults:
         click.echo(f"  {inert(fault['text'])}")
     if "left_out" in document:
@@ -103,9 +103,12 @@ def _print_unshown(rows: list[dict[str, Any]]) -> None:
     unshown = [row for row in rows if row["requests"] and not any(code.startswith("2") for code in row["statuses"])]
     if not unshown:
         return
-    click.echo(f"\n{counted(len(unshown), 'operation')} never answered 2xx, so little of them was judged:")
+    pronoun = "it" if len(unshown) == 1 else "them"
+    click.echo(f"\n{counted(len(unshown), 'operation')} never answered 2xx, so little of {pronoun} was judged:")
     for row in unshown:
-        statuses = ", ".join(f"{count} times {code}" for code, count in row["statuses"].items()) or "no response"
+        statuses = (
+            ", ".join(f"{counted(count, 'time')} {code}" for code, count in row["statuses"].items()) or "no response"
+        )
         need = f"; needs {row['needs']}" if "needs" in row else ""
         click.echo(f"  {inert(row['operation'])}: {statuses}{need}")
     names = sorted({name for row in unshown for name in row.get("values", ())})

@@ -11,6 +11,7 @@ from conformance.contract.pack import Contract
 from conformance.engine.checks_plugin import ChecksPlugin, is_check
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.plan import Step, told
+from conformance.verdict.finding import counted
 
 _SUITE = Path(__file__).parents[1]
 _UNUSED = ("terminal", "cacheprovider", "logging", "junitxml", "unraisableexception", "threadexception")
@@ -66,6 +67,7 @@ def plan_of(robot: RobotUnderTest) -> list[str]:
     seen: list[Step] = [plugin.step_of(item) for item in collected(robot, plugin)]
     scenarios = {step.scenario.name for step in seen if step.scenario}
     moving = sum(step.moves for step in seen)
-    first = f"{len(seen)} checks, {len(scenarios)} scenarios; {moving} checks may move the device."
+    counts = counted(len(seen), "check"), counted(len(scenarios), "scenario"), counted(moving, "check")
+    first = "{}, {}; {} may move the device.".format(*counts)
     motion = "" if robot.run.allow_motion else " They are skipped without --allow-motion."
     return [first + motion, *filter(None, [robot.estimate(measured=False)]), *told(seen)]

@@ -12,6 +12,7 @@ import pytest
 from conformance.contract.classes import Level
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.stage import STAGES
+from conformance.verdict.finding import counted
 
 if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
@@ -81,8 +82,8 @@ class Progress:
         run = self._robot.run
         # What a robot may do and does not is no failing of its.
         findings = sum(run.contract.ledger[id_].level is not Level.MAY for id_ in run.judge.refuted())
-        found = f", {findings} requirement{'s' if findings != 1 else ''} not met" if findings else ""
-        return f"{self._robot.connection.sent} requests{found}"
+        found = f", {counted(findings, 'requirement')} not met" if findings else ""
+        return f"{counted(self._robot.connection.sent, 'request')}{found}"
 
     def _write(self, text: str) -> None:
         if self._out is None:

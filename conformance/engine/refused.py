@@ -18,7 +18,7 @@ from conformance.documents.wsdl_pack import services_of
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.credentials import is_shown
 from conformance.transport.exchange import Exchange, Listener, NoAnswerError, Request
-from conformance.verdict.finding import Finding
+from conformance.verdict.finding import Finding, counted
 from conformance.verdict.run import Run
 
 # What a SOAP fault says of the same (WS-Security 12, ONVIF Core 5.11.2.2).
@@ -161,8 +161,8 @@ class RefusalListener(Listener):
         challenge = f" (WWW-Authenticate: {self.challenge})" if self.challenge else ""
         if self.expired:
             return (
-                f"The device accepted the credentials of {self.accepted} requests and then answered {statuses}"
-                f"{challenge}: what came after was not judged. Give credentials that last as long as the run."
+                f"The device accepted the credentials of {counted(self.accepted, 'request')} and then answered "
+                f"{statuses}{challenge}: what came after was not judged. Give credentials that last as long as the run."
             )
         whole = "" if not self.open else " for what demands credentials"
         advice = (
@@ -172,4 +172,5 @@ class RefusalListener(Listener):
             " --headers-file for any other header, such as a lease."
         )
         count = self.refused.total()
-        return f"All {count} requests{whole} were answered {statuses}{challenge}: nothing was judged. {advice}"
+        said = f"The only request{whole} was" if count == 1 else f"All {count} requests{whole} were"
+        return f"{said} answered {statuses}{challenge}: nothing was judged. {advice}"

@@ -9,6 +9,7 @@ import msgspec
 
 from conformance.contract.ledger import Requirement
 from conformance.contract.toml_file import Text, TomlFileError, read_toml
+from conformance.verdict.finding import counted
 from conformance.verdict.verdicts import Value, Verdict
 
 _KNOWN = Path(__file__).with_name("web_servers.toml")
@@ -58,9 +59,9 @@ def web_server(verdicts: Sequence[Verdict], server: str) -> dict[str, Any]:
 def _sentences(failed: Collection[Requirement], judged: int, tricked: list[str], server: str) -> Iterator[str]:
     name = f"{server[:_SERVER_SHOWN]} by its Server field" if server else "which sends no Server field"
     if not failed:
-        yield f"Its web server, {name}, meets each of the {judged} rules judged."
+        yield f"Its web server, {name}, meets each of the {counted(judged, 'rule')} judged."
         return
-    count = f"{len(failed)} of {judged} rules"
+    count = f"{len(failed)} of {counted(judged, 'rule')}"
     named = ", ".join(f"{one.id} ({one.level}, {one.source})" for one in failed)
     yield f"Its web server, {name}, does not meet {count}: {named}."
     if tricked:

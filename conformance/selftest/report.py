@@ -12,6 +12,7 @@ from conformance.selftest.generated import api_report
 from conformance.selftest.generated import report as by_rule
 from conformance.selftest.generated.judging import KILLED, NOT_REACHED, GeneratedResult
 from conformance.selftest.mutant_run import MutantResult
+from conformance.verdict.finding import counted
 
 
 @dataclass
@@ -175,7 +176,7 @@ class Report:
             requirements = {id_ for result in self.tried for id_ in result.mutant.catches if id_ not in result.survived}
             lines.append(
                 f"{tried - missed} of {tried} mutants killed ({100 * (tried - missed) / tried:.1f} %), "
-                f"by {len(requirements)} requirements"
+                f"by {counted(len(requirements), 'requirement')}"
             )
         not_tried = [result for result in self.mutant_results if result.not_tried]
         if not_tried:
@@ -208,6 +209,6 @@ class Report:
             ours |= {result.mutant.name for result in self.generated_results if result.outcome == KILLED}
             lines.append(
                 f"Of {len(other.results)} mutants of REST, {other.tool} killed {len(other.killed)}, this suite "
-                f"{len(ours & other.tried)}; of the good device it reports {len(other.good)} findings"
+                f"{len(ours & other.tried)}; of the good device it reports {counted(len(other.good), 'finding')}"
             )
         return "\n".join([*lines, *self.notes])

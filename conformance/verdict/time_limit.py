@@ -130,7 +130,9 @@ class TimeLimit:
         """
         uncalled, shortened = self.uncalled, self.fewer
         said = [
-            f"{len(uncalled)} of {operations} operations were not called: {_listed(uncalled)}" if uncalled else "",
+            f"{len(uncalled)} of {counted(operations, 'operation')} not called: {_listed(uncalled)}"
+            if uncalled
+            else "",
             f"{counted(len(shortened), 'operation')} got fewer requests: {_listed(shortened)}" if shortened else "",
             f"{counted(len(unjudged), 'requirement')} not judged: {_listed(unjudged)}" if unjudged else "",
         ]

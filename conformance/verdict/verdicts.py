@@ -12,7 +12,7 @@ from types import MappingProxyType
 from conformance.contract.classes import Level, Prerequisite
 from conformance.contract.ledger import Requirement
 from conformance.verdict.evidence import Evidence
-from conformance.verdict.finding import Finding
+from conformance.verdict.finding import Finding, counted
 
 # Why there is no verdict on what a robot does by itself, or does not.
 NOT_SEEN = "it was not seen in this run, so it is not judged"
@@ -161,7 +161,7 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
         return ClassValue.NOT_CLAIMED, ""
     failed = [item for item in verdicts if item.value is Value.FAIL]
     if failed:
-        told = f"{len(failed)} of {len(verdicts)} requirements failed, first {failed[0].requirement.id}"
+        told = f"{len(failed)} of {counted(len(verdicts), 'requirement')} failed, first {failed[0].requirement.id}"
         return ClassValue.FAIL, told
     unjudged = [
         item
@@ -171,7 +171,8 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
     ]
     if unjudged:
         first = unjudged[0]
-        told = f"{len(unjudged)} of {len(verdicts)} requirements could not be judged, first {first.requirement.id}"
+        all_ = counted(len(verdicts), "requirement")
+        told = f"{len(unjudged)} of {all_} could not be judged, first {first.requirement.id}"
         return ClassValue.INCONCLUSIVE, f"{told}: {first.reason}"
     if not any(item.evidence.cases for item in verdicts):
         return ClassValue.INCONCLUSIVE, "nothing was executed"

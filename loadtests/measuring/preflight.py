@@ -50,8 +50,10 @@ class Findings:
         statuses = {failure.refused for failure in self.failures.values()}
         if self.sizes or not statuses or 0 in statuses:
             return ""
+        count = len(self.failures)
+        said = f"The only request to {whose} was" if count == 1 else f"All {count} requests to {whose} were"
         return (
-            f"All {len(self.failures)} requests to {whose} were answered {' or '.join(map(str, sorted(statuses)))}: "
+            f"{said} answered {' or '.join(map(str, sorted(statuses)))}: "
             "nothing was measured. Check that the credentials are given, are right and have not expired."
         )
 

@@ -122,7 +122,8 @@ def _guarded(run: Callable[[Heard], None], one: Heard) -> None:
     began = time.monotonic()
     try:
         run(one)
-        one.error = f"the robot ended it after {len(one.moments_ns)} messages"
+        count = len(one.moments_ns)
+        one.error = f"the robot ended it after {count} message{'' if count == 1 else 's'}"
     except (CallError, OSError, httptools.HttpParserError) as error:
         one.error = str(error) or type(error).__name__
     finally:

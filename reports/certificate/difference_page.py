@@ -12,8 +12,12 @@ _TONES = {Kind.NEW_FAILURE: "bad", Kind.LOST: "warning", Kind.FIXED: "good"}
 
 
 def headline(found: Difference) -> str:
-    """Return a summary of the changes in one sentence, such as "1 regression: 1 new failures, 2 fixed."."""
-    counts = [f"{len(changes)} {kind}" for kind, changes in found.groups.items() if kind in _TONES]
+    """Return a summary of the changes in one sentence, such as "1 regression: 1 new failure, 2 fixed."."""
+    counts = [
+        f"{len(changes)} {kind.removesuffix('s') if len(changes) == 1 else kind}"
+        for kind, changes in found.groups.items()
+        if kind in _TONES
+    ]
     still = f"{found.still_failing} still failing" if found.still_failing else ""
     summary = ", ".join([*counts, *filter(None, [still])]) or "no requirement changed its verdict"
     number = len(found.regressions)

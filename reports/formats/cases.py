@@ -13,6 +13,7 @@ from enum import StrEnum
 from typing import Any
 
 from reports.findings import Finding, findings
+from reports.pages.page import counted
 from reports.pages.untrusted import beginning
 
 STOP = "stop"
@@ -159,7 +160,7 @@ def _outcome(requirement: Mapping[str, Any], found: Sequence[Finding]) -> tuple[
 def _headline(found: Sequence[Finding]) -> str:
     if not found:
         return ""
-    more = f" (and {len(found) - 1} more findings)" if len(found) > 1 else ""
+    more = f" (and {counted(len(found) - 1, 'more finding')})" if len(found) > 1 else ""
     return f"{found[0].text}{more}"
 
 
@@ -178,7 +179,7 @@ def _in_full(found: Sequence[Finding]) -> Iterator[str]:
         yield text
         shown, octets = place, octets + len(text.encode("utf-8", "surrogatepass"))
     if len(found) > shown:
-        yield f"{len(found) - shown} more findings are in result.json."
+        yield f"In result.json: {counted(len(found) - shown, 'more finding')}."
 
 
 def _response(response: Mapping[str, Any] | None) -> Iterator[str]:

@@ -10,7 +10,7 @@ from reports.latency.figures.spans import means
 from reports.latency.figures.timeline import Stall, stalls
 from reports.latency.numbers import interval, ms, rate, share
 from reports.latency.of_series import cold, repeated, work
-from reports.pages.page import opened
+from reports.pages.page import counted, opened
 
 _MANY_FAR = 0.01
 PAPER = {"rest_ms": 1.5, "soap_ms": 2.5, "ratio": 1.67}
@@ -129,7 +129,7 @@ def _stalled(result: Mapping[str, Any]) -> Iterator[str]:
     what = "no request was answered" if longest.longest_ms is None else f"a request took {ms(longest.longest_ms)} ms"
     which = "" if len(moments) == 1 else "; the longest"
     yield (
-        f"{_count(len(moments), 'stall')}{which} in seconds {longest.start_s:.0f} to {longest.end_s:.0f} of the run: "
+        f"{counted(len(moments), 'stall')}{which} in seconds {longest.start_s:.0f} to {longest.end_s:.0f} of the run: "
         f"{what} ({operation}, {interface.upper()}, {client})."
     )
 
@@ -199,18 +199,14 @@ def _failed(result: Mapping[str, Any], series: AllSeries) -> Iterator[str]:
             yield "No request failed."
         return
     answered = sum(one.data["count"] for one in series.values())
-    counted = (
+    told = (
         "each counts with at least the time until it was given up"
         if all("counted" in one.data for one in series.values())
         else "the times do not include them"
     )
-    yield f"{_count(errors, 'request')} of {errors + answered:,} failed; {counted}."
+    yield f"{counted(errors, 'request')} of {errors + answered:,} failed; {told}."
 
 
 def _noted(result: Mapping[str, Any]) -> Iterator[str]:
     """Yield the notes stored in the result as sentences, with a capital letter and a period."""
     yield from (f"{opened(note.rstrip('.'))}." for note in result.get("notes", []) if note)
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number:,} {noun}{'' if number == 1 else 's'}"

@@ -99,6 +99,7 @@ def _environment(*, html: bool) -> Environment:
         code_span=code_span,
         coded=coded,
         code_block=code_block,
+        counted=counted,
         excerpt=excerpt,
         grouped=grouped,
         opened=opened,
@@ -125,6 +126,11 @@ def _finalize(value: Any) -> Any:
 def opened(text: str) -> str:
     """Return the text with its first letter in upper case."""
     return text[:1].upper() + text[1:]
+
+
+def counted(number: int, noun: str, ending: str = "s") -> str:
+    """Return a number with its noun: 1 request, 2,000 requests."""
+    return f"{number:,} {noun}{'' if number == 1 else ending}"
 
 
 def grouped(number: float) -> str:

@@ -129,7 +129,7 @@ def test_a_device_that_refuses_the_token_is_not_measured(device, load, tmp_path)
     url = device("--auth", "bearer")
     run = load(f"--openapi {url}/openapi.json", SHORT, f"--operation 'GET /state' --token-file {tmp_path / 'token'}")
     assert run.code == 4, run.out + run.err
-    assert "All 1 requests to the robot were answered 401: nothing was measured" in run.err
+    assert "The only request to the robot was answered 401: nothing was measured" in run.err
 
 
 def test_https_with_its_own_authority_and_a_login(started, load, certificate, tmp_path):

@@ -56,7 +56,7 @@ def test_decisions(operation, rules, reason):
 
 def test_a_run_says_what_it_calls_and_why():
     lines = told(CallRules(("/move/*", "/gone"), ("/state/*",)), [_GOTO, _READ, Operation("", "PUT", "/a")])
-    assert lines[0] == "Calls 1 of 3 operations (1 change state); 2 are not called."
+    assert lines[0] == "Calls 1 of 3 operations; state is changed by 1; not called: 2."
     assert [line.split(":")[-1].strip() for line in lines[1:]] == ["POST /move/goto", "PUT /a", "GET /state/{id}"]
     assert CallRules(("/move/*", "/gone")).unused([_GOTO]) == ["/gone"]
 
@@ -64,7 +64,7 @@ def test_a_run_says_what_it_calls_and_why():
 def test_what_the_motion_map_sends_is_called():
     moves = Operation("", "PUT", "/goal/{east}")
     lines = told(CallRules((), ("/never",)), [moves, Operation("", "PUT", "/never")], ["PUT /goal/{x}", "PUT /never"])
-    assert lines[0] == "Calls 1 of 2 operations (1 change state); 1 are not called."
+    assert lines[0] == "Calls 1 of 2 operations; state is changed by 1; not called: 1."
     assert lines[1] == "  Calls 1, because the motion map names it: PUT /goal/{east}"
 
 

@@ -43,7 +43,7 @@ def test_operations_that_were_not_called_are_named(tmp_path: Path) -> None:
         done = certified(url, tmp_path, "--minutes", _MINUTES)
     left = done.result["left_out"]
     assert 0 < len(left["operations"]) < 200
-    assert f"--minutes {_MINUTES}: {len(left['operations'])} of 200 operations were not called: GET /value" in done.text
+    assert f"--minutes {_MINUTES}: {len(left['operations'])} of 200 operations not called: GET /value" in done.text
     assert done.exit_code == 4
     assert done.blamed == {}
 

@@ -244,7 +244,7 @@ def test_firmwares_are_compared_by_the_rules_of_diff(host):
     (robot,) = (host.site / "robots").glob("*.html")
     (section,) = page_of(robot).xpath("//section[starts-with(@aria-labelledby, 'change-')]")
     assert section.xpath("string(h2)") == "From firmware 2.3 to 2.4"
-    assert section.xpath("string(p)").startswith("2 regressions: 1 new failures, 1 lost coverage")
+    assert section.xpath("string(p)").startswith("2 regressions: 1 new failure, 1 lost coverage")
     assert [item.text_content() for item in section.xpath(".//th/code")] == ["http/a", "http/b"]
 
 
