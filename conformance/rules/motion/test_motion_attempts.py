@@ -15,12 +15,18 @@ from conformance.statement.motion_map import MotionMap
 
 
 def _moved(quiet: Quiet, motion: MotionMap) -> str | None:
-    """Return how the device moved in a watch; empty if it stayed, None if it could not be read."""
+    """Return how the device moved in a watch; empty if it stayed, None if it could not be read.
+
+    It may rest anywhere within the tolerance of its last target, so two places of rest may be twice that apart.
+    """
     seen = tuple(one for one in quiet.readings if one.values)
     if len(seen) < SEVERAL:
         return None
     windows = (seen[index : index + SEVERAL] for index in range(len(seen) - SEVERAL + 1))
-    elsewhere = next(filter(None, (off(at(window, motion), quiet.where, motion) for window in windows)), "")
+    places = [at(window, motion) for window in windows]
+    if quiet.home:
+        places = [place for place in places if off(place, quiet.home, motion)]
+    elsewhere = next(filter(None, (off(place, quiet.where, motion) for place in places)), "")
     return elsewhere or fastest(seen, motion)
 
 
@@ -32,10 +38,17 @@ def _nothing_moved(trace: Quiet, motion: MotionMap, *kinds: str) -> Iterator[Out
         yield NotClaimed("of the map and the description no such request can be made")
     elif together is None:
         yield NotTested("the state could not be read")
+    elif _moves_anyway(trace, motion):
+        yield NotTested("the device also moved at rest while the suite sent only reads")
     elif together == "":
         yield from (Case(True, one.exchange, f"rest after {one.what}") for one in tried)
     else:
         yield from _alone(trace, motion, kinds)
+
+
+def _moves_anyway(trace: Quiet, motion: MotionMap) -> bool:
+    """Return whether the device also moved without any attempt, as one whose position or velocity drifts or lags."""
+    return trace.idle is not None and bool(_moved(trace.idle, motion))
 
 
 def _alone(trace: Quiet, motion: MotionMap, kinds: tuple[str, ...]) -> Iterator[Outcome]:
@@ -78,7 +91,8 @@ def refused_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a target beyond the limits, or an invalid one, moves nothing."""
     yield from _nothing_moved(trace, motion, "beyond", "invalid")
     together = _moved(trace, motion)
-    if together and len(trace.alone) == len(trace.tried) and not any(_moved(one, motion) for one in trace.alone):
+    alone = len(trace.alone) == len(trace.tried) and not any(_moved(one, motion) for one in trace.alone)
+    if together and alone and not _moves_anyway(trace, motion):
         # It moves now and then, or after several of them; which one it was, nobody can say.
         last = next((one.exchange for one in reversed(trace.tried) if one.exchange is not None), None)
         yield Case(False, last, f"rest after {len(trace.tried)} attempts in a row", observed=together, cause="together")

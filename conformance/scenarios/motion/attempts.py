@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
 
-from conformance.scenarios.motion.mapped import MappedDevice
+from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice
 from conformance.scenarios.motion.moves import beyond
 from conformance.scenarios.motion.trace import Quiet, Tried, fastest
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, PartialTraceError, scenario
@@ -24,7 +24,7 @@ _READ_S: Final = 0.03
 
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.STANDSTILL)
 def attempts_at_rest(mapped: MappedDevice) -> Quiet:
-    """At rest, send what must move nothing, watch once, and if the device moves, try each again alone."""
+    """At rest, send what must move nothing, and watch. If the device moves, try each again alone, and then nothing."""
     _settle(mapped)
     tries = list(_tries(mapped))
     quiet = _quiet(mapped, tries)
@@ -35,6 +35,8 @@ def attempts_at_rest(mapped: MappedDevice) -> Quiet:
         for one in tries:
             _settle(mapped)
             alone.append(_quiet(mapped, [one]))
+        _settle(mapped)
+        quiet = replace(quiet, idle=_quiet(mapped, []))
         mapped.bring_home()
     except (NoAnswerError, NotPossibleError) as error:
         raise PartialTraceError(replace(quiet, alone=tuple(alone))) from error
@@ -44,7 +46,9 @@ def attempts_at_rest(mapped: MappedDevice) -> Quiet:
 def _settle(mapped: MappedDevice) -> None:
     """Bring the device home, and to rest there: one that has arrived may still turn."""
     mapped.bring_home()
-    if mapped.motion.velocity is not None:
+    velocity = mapped.motion.velocity
+    if velocity is not None:
+        mapped.clock.sleep(velocity.settle_s - STAYS_S)  # a velocity that is read may come so late
         mapped.come_to_rest()
 
 
@@ -52,7 +56,7 @@ def _quiet(mapped: MappedDevice, tries: list[Callable[[], Tried]]) -> Quiet:
     where = mapped.where()
     tried = tuple(one() for one in tries)
     readings = mapped.watch(mapped.clock.now() + _effect_s(mapped))
-    return Quiet(where, tried, tuple(readings))
+    return Quiet(where, tried, tuple(readings), home=mapped.home if mapped.motion.goto else {})
 
 
 def _effect_s(mapped: MappedDevice) -> float:
@@ -64,7 +68,10 @@ def _effect_s(mapped: MappedDevice) -> float:
 
 
 def _moved(mapped: MappedDevice, quiet: Quiet) -> bool:
-    elsewhere = any(one.values and not mapped.is_near(one.values, quiet.where) for one in quiet.readings)
+    def rests(here: Mapping[str, float]) -> bool:
+        return mapped.is_near(here, quiet.where) or bool(quiet.home and mapped.is_near(here, quiet.home))
+
+    elsewhere = any(one.values and not rests(one.values) for one in quiet.readings)
     return elsewhere or bool(fastest(quiet.readings, mapped.motion))
 
 

@@ -214,12 +214,16 @@ class Quiet:
         tried: the attempts.
         readings: after the last of them.
         alone: the same, one attempt at a time, if the device moved after all of them.
+        idle: the same without any attempt, after those.
+        home: the target near which it rests, by axis; empty: it takes no positions.
     """
 
     where: dict[str, float]
     tried: tuple[Tried, ...]
     readings: tuple[Reading, ...]
     alone: tuple[Quiet, ...] = ()
+    idle: Quiet | None = None
+    home: dict[str, float] = field(default_factory=dict)
 
 
 def usual_s(readings: Sequence[Reading]) -> float:

@@ -1,5 +1,6 @@
 """The simulated arm, asked what must move nothing and by several clients at once; right, or careless in one way."""
 
+import math
 from unittest.mock import patch
 
 import simulated
@@ -59,15 +60,18 @@ class _Binding(JsonBinding):
         return any(not isinstance(one, int | float) for one in body.values())
 
 
-def played(careless):
+def played(careless, sway=0.0, phase=0.0):
     """Return what the arm is recorded to do, and its map: by the name of the scenario.
 
     Args:
         careless: refused, incomplete or unauthorised requests that move it, or "mixes" for targets of two clients; ""
             for a right one.
+        sway: how far to each side of its place the arm says that it is, in turn, rad; phase: at first, rad.
     """
     clock = SimulatedClock()
-    arm = Arm(Body(simulated.LIMITS, clock.now, clock.sleep), fault=careless)
+    body = Body(simulated.LIMITS, clock.now, clock.sleep)
+    body.said = lambda now: {name: value + sway * math.sin(2.5 * now + phase) for name, value in body.at(now).items()}
+    arm = Arm(body, fault=careless)
     api = _Api(arm, clock, lambda: 0.002)
     api.careless = careless
     motion = simulated.map_of(MAP)
