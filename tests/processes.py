@@ -46,13 +46,14 @@ def ended(
         command: its words. `python -m roaas` runs in a process that has imported other people's packages before.
         check: raise an error if the exit code is not 0.
         peak_mb: the file for its peak memory.
-        fresh: start Python anew for `python -m roaas` as well.
+        fresh: start Python anew for `python -m roaas` as well, as an environment of its own (`env`) always does.
         options: of `subprocess.run`.
     """
     given = {"capture_output": True, "text": True, "timeout": 240} | options
     weighed = (sys.executable, "-I", "-S", "-c", _WEIGHED, peak_mb) if peak_mb else ()
-    if command[:3] == (sys.executable, "-m", "roaas") and not (fresh or peak_mb or "preexec_fn" in options):
-        command = (*warm_commands.beginning(str(command[3])), *command[3:])
+    anew = fresh or peak_mb or not {"env", "preexec_fn"}.isdisjoint(options)
+    if command[:3] == (sys.executable, "-m", "roaas") and not anew:
+        command = (*warm_commands.beginning(), *command[3:])
     return subprocess.run([str(word) for word in (*weighed, *command)], check=check, **given)
 
 

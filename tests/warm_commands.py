@@ -15,15 +15,17 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 from contextlib import suppress
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 
 _IMPORTED = (
     "click", "cryptography.hazmat.primitives.asymmetric.ed25519", "h11", "httpx", "hypothesis", "jinja2", "jsonschema",
-    "jsonschema_rs", "jsonpath", "lxml.etree", "msgspec", "pytest", "regress", "schemathesis", "schemathesis.graphql",
-    "schemathesis.specs.openapi.schemas", "securesystemslib", "segno", "yaml",
+    "jsonschema_rs", "jsonpath", "lxml.etree", "msgspec", "pytest", "regress",
+    "schemathesis", "schemathesis.graphql", "schemathesis.specs.openapi.schemas", "securesystemslib", "segno", "yaml",
 )  # fmt: skip
 _CLIENT = """
 import array, json, os, socket, sys
@@ -40,14 +42,11 @@ sys.exit(code)
 """
 
 
-def beginning(command: str) -> tuple[str, ...]:
-    """Return the words with which a process begins that runs a command of RoAAS."""
-    # `roaas load` imports Locust, and gevent has to patch sockets before others import them.
-    return (sys.executable, "-m", "roaas") if command == "load" or sys.platform != "linux" else _client()
-
-
 @cache
-def _client() -> tuple[str, ...]:
+def beginning() -> tuple[str, ...]:
+    """Return the words with which a process begins that runs a command of RoAAS; start the server for it."""
+    if sys.platform != "linux":
+        return (sys.executable, "-m", "roaas")
     name = f"roaas-tests-{os.getpid()}-{secrets.token_hex(8)}"
     # The server ends when this process does, which holds the other end of its stdin.
     server = subprocess.Popen((sys.executable, __file__, name), stdin=subprocess.PIPE, stdout=subprocess.PIPE)
@@ -64,8 +63,9 @@ def _serve(name: str) -> None:
     """Serve clients until the process that started this one has closed its stdin."""
     del sys.path[0]  # the folder of this file
     for package in _IMPORTED:
-        import_module(package)
-    assert threading.active_count() == 1
+        with suppress(ModuleNotFoundError):  # of an extra that is not installed
+            import_module(package)
+    assert len(list(Path("/proc/self/task").iterdir())) == 1  # a process with threads must not fork
     gc.collect()
     gc.freeze()
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
@@ -113,6 +113,7 @@ def _run(words: list[str], folder: str, environment: dict[str, str], streams: li
         os.close(stream)
     os.environ.clear()
     os.environ.update(environment)
+    tempfile.tempdir = None  # found anew, by the command's environment
     os.chdir(folder)
     sys.path.insert(0, folder)
     sys.argv[1:] = words
