@@ -18,17 +18,17 @@ from conformance.commandline.guard import make_streams_lenient
 def main() -> int:
     """Run the settings on standard input; returns the exit code."""
     make_streams_lenient()
-    make_streams_lenient()
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C during the imports ends it without a traceback
     try:
-        from loadtests.engine.run import carry_out  # noqa: PLC0415 -- it takes a second: Ctrl-C has to work meanwhile
+        from loadtests.engine.carrying_out import carry_out  # noqa: PLC0415 -- it takes a second: Ctrl-C has to work meanwhile
         from loadtests.settings.settings import Settings  # noqa: PLC0415 -- as above
 
         _raise_file_limit()
         written, _, settings = sys.stdin.read().partition("\n")
-        result = carry_out(Settings.from_json(settings))
-        if result.file is not None:
-            Path(written).write_text(str(result.file), encoding="utf-8")
+        path = Path(written)
+        result = carry_out(Settings.from_json(settings), lambda begun: path.write_text(str(begun), encoding="utf-8"))
+        if result.file is None:
+            path.unlink(missing_ok=True)
     except Exception:  # noqa: BLE001 -- exit code 1 would say that the robot missed a threshold
         traceback.print_exc()
         return ExitCode.INCONCLUSIVE

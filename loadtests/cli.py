@@ -98,6 +98,7 @@ def _run_load(settings: Settings, written: Path, summary: IO[str], stopping: Ite
         for number, handler in earlier.items():
             signal.signal(number, handler)
     if code < 0:  # ended by a signal: before it handled Ctrl-C itself, or killed
+        click.echo(f"roaas load: the process that measures was ended by {signal.Signals(-code).name}", err=True)
         code = ExitCode.INTERRUPTED if -code in earlier else ExitCode.INCONCLUSIVE
     path = Path(written.read_text(encoding="utf-8")) if written.exists() else None
     if code == ExitCode.FAILED and path is None:  # Python's own, such as that of a module that cannot be loaded

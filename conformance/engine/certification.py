@@ -192,12 +192,8 @@ def _concluded(
     if run.interrupted or unwritten:
         code = ExitCode.INTERRUPTED if run.interrupted else ExitCode.INCONCLUSIVE
         return Certification(code, document, path, unwritten)
-    code = (
-        OF_VERDICT[overall(accepted, enough=run.enough and not run.judge.faults)] if reached else ExitCode.UNREACHABLE
-    )
-    # No program may take for a good end that the robot drives on.
-    still_moves = code is ExitCode.PASSED and bool(run.stop_undelivered)
-    return Certification(ExitCode.INCONCLUSIVE if still_moves else code, document, path)
+    code = OF_VERDICT[overall(accepted, enough=run.decided)] if reached else ExitCode.UNREACHABLE
+    return Certification(code, document, path)
 
 
 def _deciding(

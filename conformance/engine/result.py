@@ -56,7 +56,7 @@ def result_document(
     verdicts = [one for one in verdicts if one not in aside]
     ids = {one.requirement.id for one in verdicts}
     causes = [cause for cause in causes if cause.finding.requirement in ids]
-    value = overall(classes, enough=run.enough and not run.judge.faults)
+    value = overall(classes, enough=run.decided)
     return {
         "format": RESULT_FORMAT,
         "verdict": value,

@@ -148,6 +148,11 @@ class Run:
         return self.share >= _FEWEST_SHARE and not self.limit.uncalled
 
     @property
+    def decided(self) -> bool:
+        """Whether the robot can be conformant: enough was tried, nothing in the suite broke, and it was stopped."""
+        return self.enough and not self.judge.faults and not self.stop_undelivered
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """Remarks for the report about cases that were omitted because responses took long or time ran out."""
         found = [self.effort.speed.remark] if self.effort.speed.remark else []

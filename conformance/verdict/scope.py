@@ -33,6 +33,8 @@ def view_of(verdicts: Iterable[Verdict]) -> View:
 
 def verdict_line(run: Run, value: Overall, verdicts: Iterable[Verdict]) -> str:
     """Return the verdict in a line, such as "conformant to full (contract 1.2), seen on ROS"."""
+    if run.stop_undelivered and value is Overall.INCONCLUSIVE:
+        return f"inconclusive: {run.stop_undelivered}"
     if run.refused and value is Overall.INCONCLUSIVE:
         return "inconclusive, because the device refused the credentials"
     if run.unshown and value is Overall.INCONCLUSIVE:

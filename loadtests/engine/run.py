@@ -1,19 +1,10 @@
 """One run, from the first call to the written result."""
 
-import logging
-import sys
-import traceback
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
-import gevent
-import locust  # patches the standard library, which has to come before our modules that use it
-
-from conformance.commandline.endings import ending_signals
 from conformance.commandline.exit_codes import ExitCode
-from conformance.commandline.result_command import CommandResult
 from conformance.commandline.started import Started
 from conformance.packs.table1.ros_process import ProbeError
 from loadtests.clients.failures import CallError
@@ -21,7 +12,7 @@ from loadtests.clients.robot import Robot
 from loadtests.clients.wsdl import WsdlError, with_addresses
 from loadtests.engine.deciding import until_decided
 from loadtests.engine.planning import duel_plan
-from loadtests.engine.watching import Watch, follow_parent, show_web_ui, tell, tell_plan
+from loadtests.engine.watching import Watch, show_web_ui, tell, tell_plan
 from loadtests.measuring.distributed_executor import DistributedExecutor, Executor
 from loadtests.measuring.end_to_end import end_to_end
 from loadtests.measuring.errors import GeneratorError
@@ -33,10 +24,7 @@ from loadtests.measuring.restart import start_anew
 from loadtests.measuring.rising_load import RisingLoad
 from loadtests.measuring.robot_process import RobotProcess
 from loadtests.measuring.streams import hear
-from loadtests.result.document import compose
-from loadtests.result.files import write
 from loadtests.result.outcome import Carried, Outcome, RunAborted
-from loadtests.result.terminal import summary
 from loadtests.schedule.plan import QUICK_ANSWER_S, SHORT_BLOCK_S, Plan
 from loadtests.settings.settings import Settings
 
@@ -263,36 +251,3 @@ class Run:
         """Register the series of a plan's segments in the metrics."""
         if self.collector is not None:
             self.collector.series_of.update(plan.series_of())
-
-
-def carry_out(settings: Settings) -> CommandResult:
-    """Carry out a run and write its result."""
-    logging.getLogger(locust.__name__).setLevel(logging.ERROR)  # it warns of fast spawning, which we want
-    run = Run(settings)
-    for number in ending_signals():
-        gevent.signal_handler(number, run.interrupt)
-    gevent.spawn(follow_parent, run.interrupt)
-    aborted: RunAborted | None = None
-    try:
-        run.resolve()
-        run.check()
-        run.measure()
-    except RunAborted as reason:
-        aborted = reason
-        tell(f"roaas load: {aborted}")
-    except Exception as trouble:  # noqa: BLE001 -- our own fault: what was measured is kept, and called invalid
-        traceback.print_exc()
-        aborted = RunAborted(ExitCode.INCONCLUSIVE, f"the load generator failed: {type(trouble).__name__}: {trouble}")
-    run.name_called()
-    code, document = compose(run.outcome, run.plan, aborted)
-    path = None
-    if aborted is None or aborted.code != ExitCode.USAGE:
-        try:
-            tell(f"written: {(path := write(Path(settings.output.folder), document))}")
-        except OSError as error:  # what was measured is printed below
-            code = ExitCode.INCONCLUSIVE
-            tell(f"roaas load: {settings.output.folder}: cannot write there: {error.strerror or error}")
-    if aborted is None:
-        sys.stdout.write(summary(document))
-        sys.stdout.flush()
-    return CommandResult(code, path)

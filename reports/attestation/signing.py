@@ -56,6 +56,8 @@ class Notary:
         problems += contradictions(run)
         if run.interrupted:
             problems.append("the run was interrupted")
+        if "stop_undelivered" in result:
+            problems.append(result["stop_undelivered"])
         if run.suite.digest == known.suite and run.requirement_set is not None:
             problems += departures(run, known.ledger, run.requirement_set.name, same=True)
             problems += _unlike(result, known.ledger)

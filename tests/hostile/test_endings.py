@@ -2,6 +2,7 @@
 
 import base64
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -23,6 +24,7 @@ from conformance.engine.resending import written
 from conformance.selftest.variants import certificate
 from conformance.transport.exchange import Request
 from conformance.verdict.finding import Sent
+from reports.reading import read_latency
 
 _GUARD = Path(conformance.api.rest.guard.__file__).with_name("guard_process.py")
 _CERTIFY = (sys.executable, "-m", "roaas", "certify")
@@ -316,6 +318,22 @@ def test_a_load_test_that_is_killed_leaves_the_device_at_rest(tmp_path):
         assert device.await_that(lambda mover: mover.received >= received + 2)  # the guard stops it again
         assert device.velocity == 0
     assert json.loads((tmp_path / "out/latency.json").read_text(encoding="utf-8"))["interrupted"] is True
+
+
+def test_a_load_test_whose_measuring_process_is_killed_leaves_the_device_at_rest_and_says_so(tmp_path):
+    device = Mover()
+    with small_device(DESCRIPTION, device.routes) as url, _load(tmp_path, url) as process:
+        assert device.await_that(lambda mover: mover.commands >= 50, process), process.communicate()
+        running = [line.split(None, 2) for line in ended("ps", "-A", "-o", "ppid=,pid=,command=").stdout.splitlines()]
+        (pid,) = (int(pid) for parent, pid, words in running if parent == str(process.pid) and "loadtests" in words)
+        os.kill(pid, signal.SIGKILL)
+        said, _ = process.communicate(timeout=120)
+        assert device.velocity == 0, said
+    assert "the process that measures was ended by SIGKILL" in said
+    assert process.returncode == 4
+    found = read_latency(tmp_path / "out/latency.json")
+    assert (found["interrupted"], found["valid"], found["exit_code"]) == (True, False, 4)
+    assert found["invalid_because"] == ["the run has not ended: it is under way, or it was killed"]
 
 
 def test_a_replay_that_is_killed_leaves_the_robot_at_rest(tmp_path):

@@ -110,6 +110,7 @@ EDITED = [
     ("an invented class", lambda result: result["classes"].update(magic="not-claimed"), "has no class magic"),
     ("a seed of one's choice", of_result(nonce="monday", seed=1), "seed was not derived from the nonce"),
     ("interrupted", of_result(interrupted=True), "the run was interrupted"),
+    ("a robot that may still move", of_result(stop_undelivered="the robot may still move"), "the robot may still move"),
     ("no day of the calendar", of_result(finished="2026-02-30T00:00:00Z"), "the calendar has no such time"),
     ("ended before it began", of_result(started="2027-01-01T00:00:00Z"), "ended before it started"),
 ]

@@ -36,18 +36,38 @@ class Driven(Listener):
 
     def __init__(self, contract: Contract, base_url: str) -> None:
         self._contract, self._base_url = contract, base_url
+        #: How many requests may have moved the device since it was last stopped.
+        self.moves = 0
         stops = [operation for operation in operations_of(contract) if operation.stop]
+        # One that names nothing stops all that moves, if there is no other.
+        self._stops_all = len(stops) == 1 and not [*_places(stops[0])]
         self._names = {name for stop in stops for names, _, _ in _places(stop) for name in names}
         # By name and value, whether a response has shown that the device takes the value.
         self._values: dict[str, dict[Any, bool]] = defaultdict(dict)
 
     def sends(self, method: str, url: str) -> None:
         """Note the values in a request that is sent now."""
+        self.moves += self._may_move(method, self._called(method, url))
         self._note(method, url, b"", taken=False)
+
+    @staticmethod
+    def _may_move(method: str, operation: Operation | None) -> bool:
+        if operation is None:
+            return method not in SAFE_METHODS
+        return operation.motion or (method not in SAFE_METHODS and not (operation.stop or operation.reads))
+
+    def _called(self, method: str, url: str) -> Operation | None:
+        path = url.removeprefix(self._base_url).partition("?")[0]
+        return matching(self._contract, method, path) if url.startswith(self._base_url) else None
 
     def answered(self, exchange: Exchange) -> None:
         """Keep the values of a request, or forget them if the device refused it."""
         request = exchange.request
+        called = self._called(request.method, request.url)
+        if called is not None and called.stop and exchange.response.ok and self._stops_all:
+            self.moves = 0
+        elif exchange.response.status in _REFUSED and self.moves:
+            self.moves -= self._may_move(request.method, called)
         if exchange.response.status not in _REFUSED:
             self._note(request.method, request.url, request.body, taken=True)
             return

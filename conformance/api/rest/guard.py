@@ -75,6 +75,8 @@ class Guard:
 
     def start(self) -> int | None:
         """Start the process; return the descriptor that other processes which move the device inherit, or None."""
+        if self._api.driven is not None:
+            self._api.driven.moves += 1  # by the processes
         self._before_sending(acts=True)
         process = self._process
         return process.stdin.fileno() if process is not None and process.stdin is not None else None
@@ -147,4 +149,12 @@ def _told_of(draft: Draft) -> dict[str, Any]:
         "port": draft.client.port,
         "tls": None if draft.client.tls is None else json.dumps(files),
         "request": base64.b64encode(draft.octets).decode(),
+        "digest": _digest_user(draft),
     }
+
+
+def _digest_user(draft: Draft) -> str | None:
+    """Return the user and the password with which the process answers the challenges to a request, if it may."""
+    connection = draft.client.connection
+    users = (one.secret for one in connection.credentials.items if one.kind is Kind.DIGEST)
+    return next(users, None) if connection.may_authorize(draft.client.base_url) else None

@@ -32,10 +32,13 @@ _BETWEEN_S = 0.4
 _AGAIN = frozenset({408, 425, 429})
 _SERVER_ERROR = 500
 _NO_RESPONSE = 599
-_LONGEST_STATUS_LINE = 4096
+_LONGEST_HEAD = 65_536
 # The device refuses who sends the stop (RFC 9110 15.5, RFC 4918 11.3): after a login it is sent again.
 _REFUSALS = frozenset({401, 403, 407, 423, 428})
 _LONGEST_LOGIN = 1 << 20
+_UNAUTHORIZED = 401
+# The hashes of digest authentication that the suite's client knows (RFC 7616 6.1).
+_HASHES = {"MD5": "md5", "SHA": "sha1", "SHA-256": "sha256", "SHA-512": "sha512"}
 
 
 @contextlib.contextmanager
@@ -50,18 +53,70 @@ def _sent(request: dict[str, Any], contexts: Contexts, deadline_s: float) -> Ite
 
 
 def _status(stop: dict[str, Any], contexts: Contexts, deadline_s: float) -> int:
-    """Send a stop; return the status of the response, 599 without one."""
+    """Send a stop, and once more if it gets a challenge; return the status of the response, 599 without one."""
+    status, head = _response(stop, contexts, deadline_s)
+    if status == _UNAUTHORIZED and stop.get("digest") and _answer(stop, head):
+        status, _ = _response(stop, contexts, deadline_s)
+    return status
+
+
+def _response(stop: dict[str, Any], contexts: Contexts, deadline_s: float) -> tuple[int, str]:
+    """Send a stop; return status and beginning of the response: its whole head if a challenge may be in it."""
+    end = b"\r\n\r\n" if stop.get("digest") else b"\n"
     came = b""
     try:
         with _sent(stop, contexts, deadline_s) as link:
-            while b"\n" not in came and len(came) < _LONGEST_STATUS_LINE:
-                part = link.recv(_LONGEST_STATUS_LINE)
+            while end not in came and len(came) < _LONGEST_HEAD:
+                part = link.recv(_LONGEST_HEAD)
                 if not part:
                     break
                 came += part
-        return int(came.split(None, 2)[1])
-    except (OSError, ValueError, IndexError):
-        return _NO_RESPONSE
+    except OSError:
+        pass  # what came until then may say enough
+    try:
+        return int(came.split(None, 2)[1]), came.decode("latin-1")
+    except (ValueError, IndexError):
+        return _NO_RESPONSE, ""
+
+
+def _answer(stop: dict[str, Any], head: str) -> bool:
+    """Put the answer to a challenge (RFC 7616 3.4) into a stop; return whether there is one that can be answered."""
+    import hashlib  # noqa: PLC0415 - they are seldom needed, and take longer than everything else here
+    import re  # noqa: PLC0415
+
+    offers = ", ".join(re.findall(r"(?im)^www-authenticate:(.*)$", head))
+    for offer in re.split(r"(?i)\bdigest\s+", offers)[1:]:
+        pairs = re.findall(r'([\w-]+)\s*=\s*(?:"([^"]*)"|([^\s,"]+))', offer)
+        given = {name.lower(): quoted or plain for name, quoted, plain in pairs}
+        algorithm = given.get("algorithm", "MD5")
+        name = _HASHES.get(algorithm.upper().removesuffix("-SESS"))
+        qop = [one for one in given.get("qop", "").split(",") if one.strip() == "auth"]
+        if name is None or not {"realm", "nonce"} <= given.keys() or ("qop" in given and not qop):
+            continue
+
+        def hashed(*texts: str, name: str = name) -> str:
+            return hashlib.new(name, ":".join(texts).encode(), usedforsecurity=False).hexdigest()
+
+        before, blank, body = base64.b64decode(stop["request"]).partition(b"\r\n\r\n")
+        start, *fields = before.split(b"\r\n")
+        method, target = start.decode("latin-1").split(" ")[:2]
+        user, _, password = stop["digest"].partition(":")
+        nonce, cnonce = given["nonce"], os.urandom(8).hex()
+        secret = hashed(user, given["realm"], password)
+        if algorithm.upper().endswith("-SESS"):
+            secret = hashed(secret, nonce, cnonce)
+        use = ("00000001", cnonce, "auth") if qop else ()
+        words = {"username": user, "realm": given["realm"], "nonce": nonce, "uri": target}
+        words |= {"response": hashed(secret, nonce, *use, hashed(method, target))}
+        words |= {key: given[key] for key in ("opaque",) if key in given}
+        field = ", ".join(f'{key}="{value}"' for key, value in words.items())
+        field += f", algorithm={algorithm}" if "algorithm" in given else ""
+        field += f', qop=auth, nc={use[0]}, cnonce="{cnonce}"' if use else ""
+        fields = [one for one in fields if not one.lower().startswith(b"authorization:")]
+        request = b"\r\n".join([start, f"Authorization: Digest {field}".encode(), *fields]) + blank + body
+        stop["request"] = base64.b64encode(request).decode()
+        return True
+    return False
 
 
 def _log_in(told: dict[str, Any], contexts: Contexts) -> None:

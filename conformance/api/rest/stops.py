@@ -19,7 +19,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.statuses import REFUSALS
 from conformance.api.rest.values import Values
 from conformance.documents.openapi import Operation, operations_of
-from conformance.transport.client import HttpClient
+from conformance.transport.client import HttpClient, is_drafting
 from conformance.transport.exchange import Exchange, Listener, NoAnswerError, NotPermittedError
 
 #: What is said of a device that may still move begins with these words.
@@ -131,7 +131,13 @@ def _stop_as_marked(api: RestInterface) -> str:
     if not (api.call_rules.allow or api.run.statement.motion_map):
         return ""
     marked = (operation for operation in operations_of(api.run.contract) if operation.stop)
-    return "; ".join(filter(None, (_send(api, operation) for operation in marked)))
+    problem = "; ".join(filter(None, (_send(api, operation) for operation in marked)))
+    if api.driven is None or is_drafting():
+        return problem
+    if not problem:
+        api.driven.moves = 0
+    # What was not moved since it was stopped needs no stop, and many devices answer 404 or 409 to one then.
+    return problem if api.driven.moves else ""
 
 
 def _naming(inputs: Inputs, values: Iterable[tuple[str, str, Any]]) -> Inputs:

@@ -2,6 +2,7 @@
 
 import hashlib
 import threading
+import time
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
@@ -9,19 +10,34 @@ import pytest
 from msgspec.structs import replace
 from requests.utils import parse_dict_header
 
+from conformance.api.rest.guard import Guard
+from conformance.api.rest.interface import RestInterface
 from conformance.commandline.secrecy import SECRETS
+from conformance.contract.pack import Contract
 from conformance.engine.connecting import connection_of
 from conformance.engine.resending import send_again
 from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import empty_statement
 from conformance.transport import raw
 from conformance.transport.client import HttpClient
 from conformance.transport.incomplete_request import PartialRequest
+from conformance.verdict.run import Run
 
 _SHARED = "known-to-both"
 
 
 def _digest(text, algorithm):
-    return hashlib.new({"MD5": "md5", "SHA-256": "sha256"}[algorithm], text.encode()).hexdigest()
+    hashes = {"MD5": "md5", "MD5-sess": "md5", "SHA-256": "sha256"}
+    return hashlib.new(hashes[algorithm], text.encode()).hexdigest()
+
+
+def _response(algorithm, request, given):
+    """Return what answers a challenge (RFC 7616 3.4.1)."""
+    secret = _digest(f"user:the device:{_SHARED}", algorithm)
+    if algorithm.endswith("-sess"):
+        secret = _digest(f"{secret}:{given['nonce']}:{given['cnonce']}", algorithm)
+    uses = f"{given['nonce']}:{given['nc']}:{given['cnonce']}:auth"
+    return _digest(f"{secret}:{uses}:{_digest(request, algorithm)}", algorithm)
 
 
 @contextmanager
@@ -39,9 +55,7 @@ def _protected(algorithm="SHA-256", lasts=1_000_000):
             nonce = given.get("nonce")
             if nonce not in counts or given["uri"] != self.path or given["nc"] in counts[nonce]:
                 return False
-            one = _digest(f"user:the device:{_SHARED}", algorithm)
-            two = _digest(f"{self.command}:{self.path}", algorithm)
-            wanted = _digest(f"{one}:{nonce}:{given['nc']}:{given['cnonce']}:auth:{two}", algorithm)
+            wanted = _response(algorithm, f"{self.command}:{self.path}", given)
             counts[nonce].add(given["nc"])
             if len(counts[nonce]) >= lasts:
                 del counts[nonce]
@@ -66,6 +80,9 @@ def _protected(algorithm="SHA-256", lasts=1_000_000):
             self.wfile.write(body)
 
         def do_PUT(self):
+            self.do_GET()
+
+        def do_DELETE(self):
             self.do_GET()
 
         def log_message(self, *_):
@@ -153,3 +170,23 @@ def test_raw_requests_answer_it_and_can_be_sent_again(pair):
         assert send_again(shown, connection_of(replace(pair, rest=url))).response.status == 200
         assert SECRETS.masked_json({"a": f"x {_SHARED}"}) == {"a": "x $ROAAS_DIGEST"}
     assert state["challenged"] == 2
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "is_known"), [("MD5", True), ("SHA-256", True), ("MD5-sess", True), ("SHA-256", False)]
+)
+def test_the_guard_of_a_killed_run_answers_each_new_challenge(pair, algorithm, is_known):
+    contract = Contract.load()
+    with _protected(algorithm, lasts=1) as (url, state):
+        where = replace(pair, rest=url)
+        client = HttpClient(url, connection_of(where))
+        if is_known:
+            client.send("GET", "/")
+        run = Run(replace(empty_statement(contract), endpoints=where), contract, allow_motion=True, stop_s=60.0)
+        guard, before = Guard(RestInterface(run, client)), state["served"]
+        guard.start()
+        guard.release(stopped=False)  # as the end of this process does
+        until = time.monotonic() + 60
+        while state["served"] < before + 2 and time.monotonic() < until:  # the goal is cancelled, and the velocity 0
+            time.sleep(0.02)
+    assert state["served"] >= before + 2
