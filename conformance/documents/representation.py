@@ -121,9 +121,10 @@ def local_name(element: etree._Element) -> str:
 def from_element(element: etree._Element, schema: Schema) -> Any:
     """Return an XML element as a JSON value by a schema, as read() does."""
     schema = flat(schema)
-    kind = kind_of(schema)
+    types = types_of(schema)
+    kind = next((name for name in types if name != "null"), "string")
     children = xml.elements(element)
-    if "null" in types_of(schema) and (element.get(_NIL) in {"true", "1"} or (not children and not element.text)):
+    if "null" in types and (element.get(_NIL) in {"true", "1"} or (not children and not element.text)):
         return None
     if kind == "array":
         return [from_element(child, schema.get("items", {})) for child in children]
@@ -210,7 +211,11 @@ def projected(value: Any, schema: Schema) -> Any:
     properties: dict[str, Schema] = schema.get("properties", {})
     if not properties:
         return value
-    return {name: projected(item, properties[name]) for name, item in value.items() if name in properties}
+    return {
+        name: projected(item, properties[name]) if isinstance(item, list | dict) else item
+        for name, item in value.items()
+        if name in properties
+    }
 
 
 def flat(schema: Schema, within: frozenset[str] = frozenset()) -> Schema:

@@ -349,10 +349,10 @@ class RobotUnderTest:
 
     def _is_of_gateway(self, exchange: Exchange) -> bool:
         """Return whether a response has a status of gateways that the first requests of the run did not get."""
-        looked = self.rest.looked if self.rest else []
-        before = {one.response.status for one in looked}
-        put_off = exchange.response.header("retry-after") is not None
-        return bool(before) and exchange.response.status in OF_GATEWAY.keys() - before and not put_off
+        if exchange.response.status not in OF_GATEWAY or exchange.response.header("retry-after") is not None:
+            return False
+        before = {one.response.status for one in (self.rest.looked if self.rest else [])}
+        return bool(before) and exchange.response.status not in before
 
     def _is_away(self, exchange: Exchange) -> bool:
         """Return whether a gateway sent a response in the device's place: it sends the like to what worked before."""

@@ -10,7 +10,7 @@ import time
 from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import unquote
@@ -142,7 +142,14 @@ class Survey:
 
     def of(self, operation: str, *kinds: Kind) -> list[Probe]:
         """Return the probes of one operation, of these kinds or of all."""
-        return [one for one in self.probes if one.operation == operation and (not kinds or one.kind in kinds)]
+        return [one for one in self._by_operation.get(operation, ()) if not kinds or one.kind in kinds]
+
+    @cached_property
+    def _by_operation(self) -> dict[str, list[Probe]]:
+        found: dict[str, list[Probe]] = {}
+        for one in self.probes:
+            found.setdefault(one.operation, []).append(one)
+        return found
 
     def held(self, label: str) -> bool:
         """Return whether the device's state kept it from acting on each usual request of an operation."""
@@ -275,8 +282,10 @@ class Surveyor:
 
     def look_elsewhere(self, operation: Operation) -> None:
         """Where an operation's usual requests were all answered 404, get a path beside it that is not described."""
-        usual = [one for one in self.probes if one.operation == operation.label and one.kind is Kind.USUAL]
-        if not _has_input(operation) or not usual or any(one.status != _NOT_FOUND for one in usual):
+        if not _has_input(operation):
+            return
+        usual = [one for one in self.probes if one.kind is Kind.USUAL and one.operation == operation.label]
+        if not usual or any(one.status != _NOT_FOUND for one in usual):
             return
         path = f"{operation.template.partition('{')[0].rstrip('/').rpartition('/')[0]}/{UNKNOWN}"
         path = f"{path}/{UNKNOWN}" if known_path(self.api.run.contract, path) else path
