@@ -4,6 +4,7 @@ import ssl
 from pathlib import Path
 from typing import NamedTuple
 
+from conformance.commandline.device_options import advice
 from conformance.commandline.secrecy import SECRETS
 from conformance.commandline.secret_file import read_secret
 
@@ -49,10 +50,8 @@ class ClientCertificate(NamedTuple):
             context.load_cert_chain(self.file, self.key_file, given)
         except (OSError, ValueError) as error:
             if is_encrypted and not self.passphrase_file:
-                raise CertificateError(
-                    f"the client key in {key} is encrypted: name the file with its passphrase by "
-                    "--client-key-passphrase-file"
-                ) from None
+                how = advice(": name the file with its passphrase by --client-key-passphrase-file")
+                raise CertificateError(f"the client key in {key} is encrypted{how}") from None
             if is_encrypted:
                 raise CertificateError(
                     f"the passphrase in {self.passphrase_file} does not decrypt the client key in {key}"
