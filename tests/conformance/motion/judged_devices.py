@@ -26,6 +26,12 @@ def judged_by_map(serving, motion, tmp_path, api='openapi = "{url}/openapi.json"
     return done, {one["id"]: one["verdict"] for one in result["requirements"] if one["id"].startswith("motion/")}
 
 
+def not_passed(judged):
+    """Return what a run did not pass, without what a busy machine kept it from judging."""
+    assert judged["motion/reaches"] == "pass", judged
+    return {id_ for id_, verdict in judged.items() if verdict not in {"pass", "error"}}
+
+
 def of_arm(arm, tmp_path, motion=QUICK):
     """Return the same of the arm, whose moves are short."""
     return judged_by_map(serving_app(arm.app()), motion, tmp_path)

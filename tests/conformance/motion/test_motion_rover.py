@@ -2,7 +2,7 @@
 
 import rover
 from body import Body
-from judged_devices import judged_by_map
+from judged_devices import judged_by_map, not_passed
 from rover import Rover, serving_rover
 
 
@@ -10,7 +10,7 @@ def test_a_right_rover_that_clamps_and_takes_one_move_at_a_time_is_not_blamed(tm
     done, judged = judged_by_map(serving_rover(Rover(Body(rover.LIMITS, noise=0.004))), rover.MAP, tmp_path)
     undeclared = {"unauthorised-still", "action-runs", "action-succeeds", "action-canceled"}
     missing = {f"motion/{name}" for name in undeclared}
-    assert {id_ for id_, verdict in judged.items() if verdict != "pass"} == missing, done.stdout
+    assert not_passed(judged) == missing, done.stdout
     calls = (
         "Calls 4, because the motion map names it: PUT /goal/{x}/{y}, DELETE /goal, PUT /velocity, PUT /gripper/{state}"
     )
