@@ -12,8 +12,8 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from functools import cache, cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, Final, cast
+from functools import cache, cached_property, lru_cache, partial
+from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar, cast
 from urllib.parse import unquote
 
 import jsonschema_rs
@@ -26,10 +26,16 @@ if TYPE_CHECKING:
     from jsonschema.exceptions import ValidationError
 
 Schema = dict[str, Any]
+T = TypeVar("T")
 # So many nodes of a document, and references one behind the other, are copied before the others stay lazy references.
 _MOST_NODES: Final = 2_000
 _DEEPEST: Final = 8
 _SCHEME: Final = "roaas-lazy:"
+# The keyword of such a reference where its schema is compiled on its own.
+_KEYWORD: Final = "roaas-referred"
+_UNEVALUATED: Final = frozenset({"unevaluatedProperties", "unevaluatedItems"})
+# Schemas of so many nodes are kept compiled, in nearly 1 kB each.
+_MOST_KEPT: Final = 100_000
 _LAZY: Final[list[tuple[Schema, str]]] = []
 _LAZY_NUMBERS: Final[dict[tuple[int, str], int]] = {}
 _VALUES: Final = frozenset({"example", "examples", "default", "enum", "const"})
@@ -155,8 +161,8 @@ def changed_alike(schema: Schema, change: str) -> Schema:
 
 
 @lru_cache(maxsize=4096)
-def _lazy(uri: str) -> Any:
-    """Return the schema of a lazy reference.
+def referred(uri: str) -> Any:
+    """Return the schema that the URI of a lazy reference leads to.
 
     Raises:
         UnresolvedError: it is another URI. Nothing is fetched for a schema.
@@ -179,7 +185,7 @@ def whole(schema: Schema) -> Schema:
     seen: set[str] = set()
     while isinstance(reference, str) and reference.startswith(_SCHEME) and reference not in seen:
         seen.add(reference)
-        target = _lazy(reference)
+        target = referred(reference)
         schema = {**target, **{key: item for key, item in schema.items() if key != "$ref"}}
         reference = schema.get("$ref")
     return schema
@@ -365,7 +371,7 @@ def _local(value: Any, uris: list[str]) -> Any:
 def _localized(uri: str) -> tuple[Any, tuple[str, ...]]:
     """Return the schema of a lazy reference as `bundled` has it, and the URIs that it refers to; many share it."""
     uris: list[str] = []
-    return _local(_lazy(uri), uris), tuple(uris)
+    return _local(referred(uri), uris), tuple(uris)
 
 
 def _unevaluated(validator: Any, schema: Any, instance: Any, beside: Schema) -> Iterator[ValidationError]:
@@ -425,20 +431,84 @@ def _are_plain(found: Iterator[str]) -> bool:
     return not others
 
 
-def validator_of(schema: Schema, **options: Any) -> Any:
+class _Referred:
+    """The keyword that stands for a lazy reference in jsonschema-rs: its schema is compiled when a value gets there."""
+
+    def __init__(self, holds: Callable[[str, Any], bool], _: Schema, uri: str, __: list[Any]) -> None:
+        self._holds, self._uri = holds, uri
+
+    def validate(self, instance: Any) -> None:
+        if not self._holds(self._uri, instance):
+            raise ValueError("a value that the schema refuses")
+
+
+def _by_keyword(schema: Any) -> Any:
+    """Return a copy of a schema with the keyword in the place of each lazy reference."""
+    if isinstance(schema, list):
+        return [_by_keyword(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    is_lazy = isinstance(schema.get("$ref"), str) and schema["$ref"].startswith(_SCHEME)
+    return {_KEYWORD if is_lazy and key == "$ref" else key: _by_keyword(item) for key, item in schema.items()}
+
+
+def validator_of(schema: Schema, holds: Callable[[str, Any], bool] | None = None, **options: Any) -> Any:
     """Return jsonschema-rs's validator for a schema; it follows lazy references, and fetches nothing.
 
     If patterns that it does not read as ECMA-262 does name members, members pass that the schema refuses.
 
+    Args:
+        schema: to be compiled.
+        holds: returns whether a value is valid by the schema of a lazy reference. Without it, all that the schema
+            refers to is compiled with it, as often as others do so.
+        options: of jsonschema-rs.
+
     Raises:
         ValueError: it is no JSON Schema.
     """
-    whole = bundled(schema)
+    keywords: dict[str, Any] = {}
+    # What is evaluated behind a keyword of ours is unknown to these words.
+    if holds is None or _has_words(schema, _UNEVALUATED):
+        whole = bundled(schema)
+    else:
+        whole = _by_keyword(schema)
+        keywords[_KEYWORD] = partial(_Referred, holds)
     if not _are_plain(_patterns_in(whole, names=True)):
         whole = _without_names(whole)
     if not _are_plain(_patterns_in(whole, names=False)):
-        options["keywords"] = {"pattern": _Pattern}
-    return jsonschema_rs.validator_for(whole, offline=True, **options)
+        keywords["pattern"] = _Pattern
+    return jsonschema_rs.validator_for(whole, offline=True, **options, **({"keywords": keywords} if keywords else {}))
+
+
+def _has_words(schema: Any, words: frozenset[str]) -> bool:
+    if isinstance(schema, dict):
+        return not words.isdisjoint(schema) or any(_has_words(item, words) for item in schema.values())
+    return isinstance(schema, list) and any(_has_words(item, words) for item in schema)
+
+
+class Kept(Generic[T]):
+    """What schemas are compiled to, by the schema object, as long as these do not have too many nodes together."""
+
+    def __init__(self, compiled: Callable[[Schema], T]) -> None:
+        self._compiled = compiled
+        self._kept: dict[int, tuple[Schema, T]] = {}
+        self._nodes = 0
+
+    def of(self, schema: Schema) -> T:
+        """Return what a schema is compiled to."""
+        found = self._kept.get(id(schema))
+        if found is None or found[0] is not schema:
+            self._nodes += _nodes_in(schema)
+            if self._nodes > _MOST_KEPT:
+                self._kept.clear()
+                self._nodes = _nodes_in(schema)
+            found = self._kept[id(schema)] = schema, self._compiled(schema)
+        return found[1]
+
+
+def _nodes_in(value: Any) -> int:
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return 1 + sum(map(_nodes_in, inner))
 
 
 class Shape:
@@ -446,11 +516,9 @@ class Shape:
 
     def __init__(self, schema: Schema) -> None:
         self.schema = schema
-        self._quick = validator_of(schema)
+        self._quick = validator_of(schema, _holds_by)
         # By such names, jsonschema-rs allows too much.
-        whole = bundled(schema)
-        self._is_exact = _are_plain(_patterns_in(whole, names=True))
-        self.size = 1 + len(whole.get("$defs", ()))
+        self._is_exact = _are_plain(_patterns_in(schema, names=True))
 
     def problem(self, value: Any, where: str = "") -> str:
         """Return the first violation in ``value``, with its place below ``where``; empty if the value is valid."""
@@ -468,6 +536,10 @@ class Shape:
             return self._passes(value) or bool(self._validator.is_valid(value))
         except RecursionError:
             return False
+
+    def holds_within(self, value: Any) -> bool:
+        """Return the same for a part of a value whose numbers are finite."""
+        return bool(self._quick.is_valid(value) if self._is_exact else self._validator.is_valid(value))
 
     def broken_rule(self, value: Any) -> tuple[str, bool]:
         """Return the violated schema keyword, and True if ``value`` itself violates it, and not only a member.
@@ -514,19 +586,17 @@ def _described(error: ValidationError, where: str) -> str:
     return f"{place}: {error.message[:300]}"
 
 
-_SHAPES: dict[int, Shape] = {}
-# Each keeps the schemas that it refers to, compiled for it alone.
-_MOST_SCHEMAS: Final = 20_000
+_SHAPES: Final = Kept(Shape)
 
 
 def shape_of(schema: Schema) -> Shape:
     """Return the Shape of a schema, cached by the schema object."""
-    shape = _SHAPES.get(id(schema))
-    if shape is None or shape.schema is not schema:
-        if sum(one.size for one in _SHAPES.values()) > _MOST_SCHEMAS:
-            _SHAPES.clear()
-        shape = _SHAPES[id(schema)] = Shape(schema)
-    return shape
+    return _SHAPES.of(schema)
+
+
+def _holds_by(uri: str, value: Any) -> bool:
+    schema = referred(uri)
+    return shape_of(schema).holds_within(value) if isinstance(schema, dict) else schema is not False
 
 
 def numbers_in(value: Any) -> Iterator[float]:

@@ -5,7 +5,16 @@ from __future__ import annotations
 import re
 from typing import Any, Final
 
-from conformance.documents.json_schema import CHANGES, Schema, bundled, changed_alike, pointed, validator_of
+from conformance.documents.json_schema import (
+    CHANGES,
+    Kept,
+    Schema,
+    bundled,
+    changed_alike,
+    pointed,
+    referred,
+    validator_of,
+)
 
 _SINGLE: Final = 3.4028234663852886e38
 # The lowest and the highest value by the OpenAPI Initiative's Format Registry. Any number of JSON may be a double.
@@ -19,12 +28,11 @@ _DATA: Final = frozenset({"example", "examples", "default", "enum", "const"})
 _BASE64: Final = re.compile(r"(?:[A-Za-z0-9+/]*|[A-Za-z0-9_-]*)={0,2}")
 _GROUP: Final = 4
 _NAME: Final = re.compile(r"'format': '([^']+)'")
-_VALIDATORS: Final[dict[int, tuple[Schema, Any]]] = {}
 
 
 def has_formats(schema: Schema, value: Any) -> bool:
     """Return whether each string and number in a value has the ``format`` of its schema; unknown formats hold."""
-    validator = _validator(schema)
+    validator = _VALIDATORS.of(schema)
     try:
         return validator is None or bool(validator.is_valid(value))
     except (ValueError, TypeError, OverflowError, RecursionError):
@@ -33,7 +41,7 @@ def has_formats(schema: Schema, value: Any) -> bool:
 
 def wrong_formats(schema: Schema, value: Any) -> list[tuple[Any, str, str]]:
     """Return the first value at each place that does not have its declared format, the place, and the format's name."""
-    validator = _validator(schema)
+    validator = _validator(schema, whole=True)
     found: dict[str, tuple[Any, str, str]] = {}
     root = bundled(in_range(schema)) if validator is not None else schema
     for error in validator.iter_errors(value) if validator is not None else ():
@@ -46,15 +54,21 @@ def wrong_formats(schema: Schema, value: Any) -> list[tuple[Any, str, str]]:
     return list(found.values())
 
 
-def _validator(schema: Schema) -> Any:
-    """Return the validator of a schema with its formats; None if it names none."""
-    kept = _VALIDATORS.get(id(schema))
-    if kept is None or kept[0] is not schema:
-        named = "'format'" in str(schema) or "roaas-lazy:" in str(schema)
-        checks = {"byte": is_base64, "base64url": is_base64}
-        validator = validator_of(in_range(schema), validate_formats=True, formats=checks) if named else None
-        kept = _VALIDATORS[id(schema)] = schema, validator
-    return kept[1]
+def _validator(schema: Schema, *, whole: bool = False) -> Any:
+    """Return the validator of a schema with its formats, with all that it refers to if `whole`; None if it has none."""
+    if "'format'" not in str(schema) and "roaas-lazy:" not in str(schema):
+        return None
+    checks = {"byte": is_base64, "base64url": is_base64}
+    return validator_of(in_range(schema), None if whole else _holds_by, validate_formats=True, formats=checks)
+
+
+def _holds_by(uri: str, value: Any) -> bool:
+    schema = referred(uri)
+    validator = _VALIDATORS.of(schema) if isinstance(schema, dict) else None
+    return validator is None or bool(validator.is_valid(value))
+
+
+_VALIDATORS: Final = Kept(_validator)
 
 
 def in_range(schema: Any) -> Any:

@@ -82,6 +82,48 @@ def test_a_device_with_schemas_that_unroll_without_end_is_judged_by_the_others(t
     assert int((tmp_path / "peak").read_text()) < _MOST_MB
 
 
+def _ring() -> dict[str, Any]:
+    """Return 900 schemas, each of which refers to two others."""
+    members = {f"member_{k}": {"type": "string", "description": "A member. " * 5} for k in range(30)}
+    return {
+        f"s{i}": {"properties": {**members, "a": _ref(f"s{(i + 1) % 900}"), "b": _ref(f"s{i * 7 % 900}")}}
+        for i in range(900)
+    }
+
+
+def _large(place: str, value: Any) -> dict[str, Any]:
+    """Return a description with something large in a place of its schema or its media type."""
+    item = reading({"type": "string"})
+    content = item["get"]["responses"]["200"]["content"]["application/json"]
+    (content["schema"] if place == "schema" else content).update(value)
+    return described({"/good": item})
+
+
+#: Descriptions that are judged as others are, though they are large.
+LARGE = {
+    "ring": lambda: described(
+        {"/good": reading({"type": "string"}), **{f"/{i}": reading(_ref(f"s{i}")) for i in range(30)}},
+        components={"schemas": _ring()},
+    ),
+    "example": lambda: _large("content", {"example": "a" * 20_000_000}),
+}
+
+
+@pytest.mark.parametrize("name", LARGE)
+def test_a_large_description_is_judged_in_little_memory(name: str, tmp_path: Path) -> None:
+    document = LARGE[name]()
+    (tmp_path / "large.json").write_text(json.dumps(document), encoding="utf-8")
+    routes = {path: constant("yes" if path == "/good" else {}) for path in document["paths"]}
+
+    with small_device({}, routes) as url:
+        words = ("--base-url", url, "--class", "description", "--timeout", 60)
+        found = certified(tmp_path / "large.json", tmp_path / "out", *words, peak_mb=tmp_path / "peak")
+
+    assert found.exit_code in {0, 4}, found.text
+    assert found.requirement("description/body-schema")["verdict"] == "pass"
+    assert int((tmp_path / "peak").read_text()) < _MOST_MB
+
+
 def test_reading_is_interrupted_by_ctrl_c(tmp_path: Path) -> None:
     lines = "".join(f"  k{i}: [a, b, {{c: 'text {i}'}}]\n" for i in range(150_000))
     (tmp_path / "large.yaml").write_text(f"openapi: 3.0.3\npaths: {{}}\nx:\n{lines}", encoding="utf-8")

@@ -10,11 +10,10 @@ from typing import Any
 
 import jsonschema_rs
 
-from conformance.documents.json_schema import Schema, validator_of
+from conformance.documents.json_schema import Kept, Schema, referred, validator_of
 from conformance.documents.openapi import Operation, is_json
 from conformance.mutation.messages import Response
 
-_VALIDATORS: dict[int, tuple[Schema, Any]] = {}
 # Statuses that any HTTP server may send, or that a description need not know (RFC 9110 15, OpenAPI 3.1 4.8.16).
 ANY_SERVER = frozenset(
     {206, 304, 401, 403, 405, 406, 407, 408, 411, 412, 413, 414, 415, 416, 417, 421, 426, 428, 429, 431, 501, 503}
@@ -23,17 +22,21 @@ ANY_SERVER = frozenset(
 
 def valid(schema: Schema, value: Any) -> bool:
     """Return whether a value is valid by a schema and its formats; an unusable schema allows everything."""
-    known = _VALIDATORS.get(id(schema))
-    if known is None or known[0] is not schema:
-        try:
-            validator = validator_of(schema, validate_formats=True)
-        except (ValueError, jsonschema_rs.ValidationError):
-            validator = None
-        known = _VALIDATORS[id(schema)] = schema, validator
+    validator = _VALIDATORS.of(schema)
     try:
-        return known[1] is None or bool(known[1].is_valid(value))
+        return validator is None or bool(validator.is_valid(value))
     except (ValueError, TypeError, OverflowError):
         return False
+
+
+def _validator(schema: Schema) -> Any:
+    try:
+        return validator_of(schema, lambda uri, value: valid(referred(uri), value), validate_formats=True)
+    except (ValueError, jsonschema_rs.ValidationError):
+        return None
+
+
+_VALIDATORS = Kept(_validator)
 
 
 @lru_cache(maxsize=4096)

@@ -96,6 +96,42 @@ def test_openapi_3_0_ignores_constraints_beside_a_reference() -> None:
     assert _problem({"a": 1}, _document(schema, named, "3.0.3")) == ""
 
 
+_S0 = {"$ref": "#/components/schemas/S0"}
+_ODD = {"properties": {"s": _S0}, "patternProperties": {"^x\\cA": {"type": "integer"}}, "additionalProperties": False}
+#: Schemas that refer to themselves, in each way in which what is behind a reference is judged.
+RECURSIVE = {
+    "not": ({"properties": {"no": {"not": _S0}}, "required": ["a"]}, {"no": {}, "a": 1}, {"no": {"a": 1}, "a": 1}),
+    "one of": (
+        {"oneOf": [{"type": "null"}, {"type": "object", "properties": {"s": _S0}, "required": ["s"]}]},
+        {"s": {"s": None}},
+        {"s": {"s": 1}},
+    ),
+    "names that only ECMA-262 reads": (_ODD, {"s": {"x\x01": 1}}, {"s": {"s": {"x\x01": "a"}}}),
+    "such names, refused": (
+        {"properties": {"s": {"not": _ODD}}, "required": ["b"]}, {"s": {"c": 1}, "b": 1}, {"s": {}, "b": 1},
+    ),
+    "unevaluated": (
+        {"properties": {"s": {"allOf": [_S0], "unevaluatedProperties": False}}}, {"s": {"s": {}}}, {"s": {"t": {}}},
+    ),
+    "large numbers": (
+        {"properties": {"n": {"multipleOf": 1, "maximum": 10**25}, "s": _S0}},
+        {"s": {"n": 10**25}},
+        {"s": {"n": 10**26}},
+    ),
+    "boolean": (
+        {"properties": {"s": {"anyOf": [_S0, False]}}, "required": ["a"]}, {"a": 1, "s": {"a": 1}}, {"a": 1, "s": {}},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", RECURSIVE)
+def test_a_recursive_schema_is_judged_behind_its_references(name: str) -> None:
+    schema, right, wrong = RECURSIVE[name]
+    document = _document(_S0, {"S0": schema})
+    assert _problem(right, document) == ""
+    assert _problem(wrong, document) != ""
+
+
 @pytest.mark.parametrize("value", [{"$ref": "elsewhere.json#/a"}, {"a": {"$ref": "#/nowhere"}}, [{"$ref": "#/paths"}]])
 def test_a_constant_is_data_though_it_looks_like_a_reference(value: Any) -> None:
     document = _document(
