@@ -44,7 +44,7 @@ _COMMANDS = {
     "explain": ("conformance.cli.explain", "Explain a requirement: why, by which source, how judged, how to fix it."),
 }
 _EXTRAS = {"load"}  # commands that need the optional dependencies of the same name
-_USAGE, _INTERRUPTED = 2, 130
+_USAGE, _INCONCLUSIVE, _INTERRUPTED = 2, 4, 130
 _INSTALLED = Path(__file__).with_name("roaas_rooms")
 
 
@@ -75,6 +75,10 @@ class _Rooms(click.Group):
         if cmd_name not in _COMMANDS:
             return None
         open_rooms()
+        if lack := import_module("conformance.commandline.guard").lacks_addresses(cmd_name):
+            error = click.ClickException(lack)
+            error.exit_code = _INCONCLUSIVE
+            raise error
         if cmd_name in _EXTRAS:
             extras = import_module("conformance.commandline.extras")
             problem = extras.lacking(cmd_name, f"'roaas {cmd_name}'")

@@ -10,11 +10,34 @@ from typing import Any, TextIO
 
 import click
 
+try:
+    import resource
+except ImportError:  # no POSIX system
+    resource = None  # type: ignore[assignment]
+
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.secrecy import SECRETS
 from conformance.commandline.terminal import inert
 
 _SHOWN = 300
+# What Python and the loader of its modules say where the memory of a process is limited, beside MemoryError.
+_NO_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread", "out of memory")
+# With fewer, libraries end the process in the middle of a run, with exit code 1 or an abort, and not with MemoryError.
+_LEAST_MB = {"certify": 400, "replay": 400, "load": 1_200}
+# Freed where memory ends, so that this can be told.
+_RESERVE = bytearray(1 << 20)
+
+
+def lacks_addresses(command: str) -> str:
+    """Return why a command cannot run within this process's limit of addresses (ulimit -v); empty if it can."""
+    if resource is None or command not in _LEAST_MB:
+        return ""
+    given = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if given == resource.RLIM_INFINITY or given >= _LEAST_MB[command] << 20:
+        return ""
+    return (
+        f"this process may use {given >> 20:,} MB of addresses (ulimit -v); {command} needs {_LEAST_MB[command]:,} MB"
+    )
 
 
 class _Lenient(io.FileIO):
@@ -62,6 +85,15 @@ def inert_lines(text: str) -> str:
 
 def report_failure(error: Exception) -> ExitCode:
     """Print one sentence on an exception that no command expects, and where the details are; return the exit code."""
+    if isinstance(error, MemoryError) or any(said in str(error).lower() for said in _NO_MEMORY):
+        _RESERVE.clear()
+        traceback.clear_frames(error.__traceback__)
+        click.echo(
+            "error: this process got no more memory or threads (ulimit -v, or a container's limit). Nothing was judged "
+            "by this; a result that was begun is kept.",
+            err=True,
+        )
+        return ExitCode.INCONCLUSIVE
     if isinstance(error, OSError) and error.errno is not None:
         said = f"error: {inert(str(error))[:_SHOWN]}. Nothing was judged by this."
         click.echo(said, err=True)
@@ -80,6 +112,6 @@ def _kept(error: Exception) -> str:
         descriptor, path = tempfile.mkstemp(prefix="roaas-error-", suffix=".txt")
         with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:
             file.write(SECRETS.masked("".join(traceback.format_exception(error))))
-    except (OSError, RecursionError):
+    except (OSError, RecursionError, MemoryError):
         return ""
     return f"; the details are in {path}"

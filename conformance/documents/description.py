@@ -291,5 +291,6 @@ def _with_defaults(server: Schema) -> str:
     url = _VARIABLE.sub(default, str(server.get("url", "/")))
     server_part = _SERVER.match(url)
     begin = server_part.end() if server_part else 0
-    # No request target has a space or a line end.
-    return url[:begin] + quote(url[begin:], safe="%/:?#[]@!$&'()*+,;=~\\")
+    # No request target has a space, a line end or a lone surrogate, and no host has the last one.
+    host = url[:begin].encode("utf-8", "backslashreplace").decode()
+    return host + quote(url[begin:], safe="%/:?#[]@!$&'()*+,;=~\\", errors="surrogatepass")

@@ -477,7 +477,9 @@ def validator_of(schema: Schema, holds: Callable[[str, Any], bool] | None = None
         whole = _without_names(whole)
     if not _are_plain(_patterns_in(whole, names=False)):
         keywords["pattern"] = _Pattern
-    return jsonschema_rs.validator_for(whole, offline=True, **options, **({"keywords": keywords} if keywords else {}))
+    if keywords:
+        options["keywords"] = keywords
+    return jsonschema_rs.validator_for(whole, offline=True, **options)
 
 
 def _has_words(schema: Any, words: frozenset[str]) -> bool:

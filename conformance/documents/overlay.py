@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 import time
 from typing import Any, Final
 
@@ -43,9 +44,11 @@ def overlaid(document: Schema, overlay: Schema) -> Schema:
                 places, nodes = places + 1, nodes + size
                 if places > _MOST_PLACES or nodes > _MOST_NODES or time.monotonic() > until:
                     limits = f"{_MOST_PLACES:,} places, {_MOST_NODES:,} values and {_MOST_S:g} s"
-                    raise OverlayError(f"actions[{number}] goes beyond the limit of an overlay: {limits}")
+                    raise OverlayError(f"actions[{number}] goes beyond the limit of an overlay: {limits}")  # noqa: TRY301 - within the loop
                 matches.append(match)
-        except JSONPathError as error:
+        except OverlayError:
+            raise
+        except (JSONPathError, ValueError, OverflowError, re.error) as error:  # Python reads its numbers and patterns
             raise OverlayError(f"actions[{number}] target {action['target']!r} is no JSONPath: {error}") from error
         # The last first, so that removing an item of a list does not move the next one.
         for match in reversed(matches):

@@ -171,6 +171,32 @@ def test_what_a_command_does_not_expect_never_ends_with_1(raised, code, command,
     assert CliRunner().invoke(roaas.main, [command]).exit_code == code
 
 
+#: Limits of addresses (ulimit -v), MB: from where `roaas --version` works to where a run does.
+_LIMITS = {"explain": (30, 60, 90), "certify": (30, 60, 110, 390), "load": (60, 110, 600, 1_190), "diff": (30, 60, 90)}
+
+
+@pytest.mark.parametrize(("command", "limit"), [(name, limit) for name, each in _LIMITS.items() for limit in each])
+def test_a_limit_of_memory_is_told_in_one_line(command: str, limit: int, tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_text(json.dumps(_DESCRIPTION), encoding="utf-8")
+    more = {"explain": ["http/date"], "diff": [tmp_path / "a.json"]}.get(command, ["--out", tmp_path / "out"])
+    words = (command, *([] if command == "explain" else [tmp_path / "a.json"]), *more)
+    within = f'ulimit -v {limit * 1024}; exec "$@"'
+
+    done = ended("bash", "-c", within, "bash", sys.executable, "-m", "roaas", *words)
+
+    assert "Traceback" not in done.stderr
+    assert done.returncode == 4 or (done.returncode == 0 and command in {"explain", "diff"}), done.stderr
+    assert done.returncode == 0 or len(done.stderr.splitlines()) == 1, done.stderr
+
+
+def test_a_run_within_the_least_memory_has_a_result(tmp_path: Path) -> None:
+    with small_device(_DESCRIPTION, {"/state": constant({})}) as url:
+        within = f'ulimit -v {400 * 1024}; exec "$@"'
+        done = ended("bash", "-c", within, "bash", *_command(url, tmp_path, "--class", "description"))
+    assert done.returncode == 0, done.stderr
+    assert _result(tmp_path)["verdict"] == "conformant"
+
+
 @pytest.mark.parametrize("words", [["--help"], ["certify", "--help"], ["--version"], ["explain", "http/date"]])
 @pytest.mark.parametrize("streams", [">/dev/full", ">&-", "| true", "<&- >&- 2>&-"])
 def test_output_that_nobody_takes_is_no_failure(words, streams):

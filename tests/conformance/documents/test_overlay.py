@@ -28,6 +28,12 @@ def test_actions(action, place, found):
     assert _DOCUMENT["l"] == [1, 2, 3]
 
 
+@pytest.mark.parametrize("target", ["$.l[?@ == 1e999]", f"$.l[{'9' * 5000}]", "$.o[?@ =~ /(/]", "$.l[1e400:]"])
+def test_a_target_with_a_number_or_pattern_that_nothing_reads_says_why(target):
+    with pytest.raises(OverlayError, match="is no JSONPath"):
+        overlaid({"l": ["a"], "o": ["a"]}, {"overlay": "1.0.0", "actions": [{"target": target, "remove": True}]})
+
+
 @pytest.mark.parametrize(
     "overlay", [{}, {"overlay": "1.0.0"}, *({"overlay": "1.0.0", "actions": [one]} for one in ({}, {"target": "$["}))]
 )

@@ -131,6 +131,13 @@ def test_the_base_url_follows_from_servers_and_source(source, said, base, remark
     assert (found.base_url, bool(found.remarks)) == (base, remarked)
 
 
+@pytest.mark.parametrize("url", ["/\ud800", "//\ud800/a", "http://a:\ud800/a", "/{v}"])
+@pytest.mark.parametrize("source", ["a.json", "http://device.invalid/a.json"])
+def test_a_server_that_no_text_can_hold_is_read(url: str, source: str) -> None:
+    servers = [{"url": url, "variables": {"v": {"default": "\ud800"}}}]
+    assert _read(json.dumps({"openapi": "3.1.0", "paths": _PATHS, "servers": servers}), source).base_url.isascii()
+
+
 @pytest.mark.parametrize(
     ("source", "said", "base"),
     [
