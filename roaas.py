@@ -76,9 +76,8 @@ class _Rooms(click.Group):
             return None
         open_rooms()
         if lack := import_module("conformance.commandline.guard").lacks_addresses(cmd_name):
-            error = click.ClickException(lack)
-            error.exit_code = _INCONCLUSIVE
-            raise error
+            click.echo(f"error: {lack}", err=True)
+            ctx.exit(_INCONCLUSIVE)
         if cmd_name in _EXTRAS:
             extras = import_module("conformance.commandline.extras")
             problem = extras.lacking(cmd_name, f"'roaas {cmd_name}'")

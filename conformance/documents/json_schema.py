@@ -34,6 +34,8 @@ _SCHEME: Final = "roaas-lazy:"
 # The keyword of such a reference where its schema is compiled on its own.
 _KEYWORD: Final = "roaas-referred"
 _UNEVALUATED: Final = frozenset({"unevaluatedProperties", "unevaluatedItems"})
+# A schema that refers to no more than so many is compiled together with them.
+_MOST_TOGETHER: Final = 30
 # Schemas of so many nodes are kept compiled, in nearly 1 kB each.
 _MOST_KEPT: Final = 100_000
 _LAZY: Final[list[tuple[Schema, str]]] = []
@@ -467,8 +469,7 @@ def validator_of(schema: Schema, holds: Callable[[str, Any], bool] | None = None
         ValueError: it is no JSON Schema.
     """
     keywords: dict[str, Any] = {}
-    # What is evaluated behind a keyword of ours is unknown to these words.
-    if holds is None or _has_words(schema, _UNEVALUATED):
+    if holds is None or _is_together(schema):
         whole = bundled(schema)
     else:
         whole = _by_keyword(schema)
@@ -488,6 +489,25 @@ def _has_words(schema: Any, words: frozenset[str]) -> bool:
     return isinstance(schema, list) and any(_has_words(item, words) for item in schema)
 
 
+def _is_together(schema: Schema) -> bool:
+    """Return whether a schema is compiled with all that it refers to: that is quicker to judge by, if it is little."""
+    # What is evaluated behind a keyword of ours is unknown to these words.
+    if _has_words(schema, _UNEVALUATED):
+        return True
+    waiting: list[str] = []
+    _local(schema, waiting)
+    seen: set[str] = set()
+    while waiting and len(seen) <= _MOST_TOGETHER:
+        if (uri := waiting.pop()) not in seen:
+            seen.add(uri)
+            waiting += _localized(uri)[1]
+    return len(seen) <= _MOST_TOGETHER
+
+
+def _compiled_of(schema: Schema) -> Schema:
+    return bundled(schema) if _is_together(schema) else schema
+
+
 class Kept(Generic[T]):
     """What schemas are compiled to, by the schema object, as long as these do not have too many nodes together."""
 
@@ -500,10 +520,11 @@ class Kept(Generic[T]):
         """Return what a schema is compiled to."""
         found = self._kept.get(id(schema))
         if found is None or found[0] is not schema:
-            self._nodes += _nodes_in(schema)
-            if self._nodes > _MOST_KEPT:
+            nodes = _nodes_in(_compiled_of(schema))
+            if self._nodes + nodes > _MOST_KEPT:
                 self._kept.clear()
-                self._nodes = _nodes_in(schema)
+                self._nodes = 0
+            self._nodes += nodes
             found = self._kept[id(schema)] = schema, self._compiled(schema)
         return found[1]
 
@@ -520,7 +541,7 @@ class Shape:
         self.schema = schema
         self._quick = validator_of(schema, _holds_by)
         # By such names, jsonschema-rs allows too much.
-        self._is_exact = _are_plain(_patterns_in(schema, names=True))
+        self._is_exact = _are_plain(_patterns_in(_compiled_of(schema), names=True))
 
     def problem(self, value: Any, where: str = "") -> str:
         """Return the first violation in ``value``, with its place below ``where``; empty if the value is valid."""
