@@ -8,13 +8,16 @@ done it lingers, because its pod and the result in it vanish with it.
 import os
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.guard import make_streams_lenient
+from conformance.transport.reach import Trust
 from loadtests.cli import DEFAULT_OUT, load
+from loadtests.clients.robot import as_http
 from loadtests.described.device import CREDENTIALS, secrets_of
 from loadtests.settings.errors import SettingsError
 
@@ -45,26 +48,29 @@ def _work(words: list[str]) -> int:
         click.echo("--worker needs --master-host", err=True)
         return ExitCode.USAGE
     try:
+        trust = Trust.of(*map(as_http, _said(words)), hosts=_said(words, "--trust-host"))
         secrets = secrets_of({name: _value(words, f"--{name.replace('_', '-')}") for name in CREDENTIALS})
-    except SettingsError as error:
+    except (SettingsError, ValueError) as error:
         click.echo(f"roaas-load-node: {error}", err=True)
         return ExitCode.USAGE
     from loadtests.measuring.worker import serve  # noqa: PLC0415 -- imports Locust, which patches the process
 
-    both = [secrets, secrets]  # the same for both robots of --against
+    both = [replace(secrets, trust=trust)] * 2  # the same for both robots of --against
     port, folder = int(_value(words, "--master-port") or PORT), Path(_value(words, "--out") or DEFAULT_OUT)
     serve(host, port, both, folder, scenario=_value(words, "--scenario"))
     return ExitCode.PASSED
 
 
 def _value(words: list[str], option: str) -> str | None:
-    """Return an option's value, given as `--option value` or `--option=value`."""
-    for word, following in zip(words, [*words[1:], ""], strict=True):
-        if word == option:
-            return following
-        if word.startswith(f"{option}="):
-            return word.split("=", 1)[1]
-    return None
+    """Return an option's value."""
+    return next(iter(_said(words, option)), None)
+
+
+def _said(words: list[str], option: str = "") -> list[str]:
+    """Return the values of an option, given as `--option value` or `--option=value`; without it, all words' values."""
+    apart = [part for word in words for part in (word.split("=", 1) if word.startswith("--") else [word])]
+    pairs = zip(["", *apart], apart, strict=False)
+    return [value for name, value in pairs if option in {"", name} and not value.startswith("--")]
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from typing import Any, Self
 from conformance.commandline.secrecy import SECRETS
 from conformance.packs.table1.statement import Ros
 from conformance.transport.credentials import Credential, Credentials, Kind
+from conformance.transport.reach import Trust
 from conformance.transport.tls import ClientCertificate
 from conformance.transport.username_token import UsernameToken
 from loadtests.clients.described import VARIABLE, Described
@@ -19,11 +20,27 @@ from loadtests.clients.wire import Connection, Request
 
 @dataclass(frozen=True)
 class Secrets:
-    """What a robot's requests prove who sends them with: the bearer token, other credentials, WS-Security's user."""
+    """What a robot's requests prove who sends them with: the bearer token, other credentials, WS-Security's user.
+
+    Attributes:
+        trust: the servers to which they may go; None: to those of the robot.
+    """
 
     token: str | None = None
     credentials: tuple[Credential, ...] = ()
     username_token: UsernameToken | None = None
+    trust: Trust | None = None
+
+    def refusal(self, robot: "Robot") -> str:
+        """Return why they may not go to a robot that a master names, or an empty text."""
+        if self.trust is None or not (self.token or self.credentials or self.username_token):
+            return ""
+        named = (*robot.addresses, robot.publishers_wsdl, robot.subscribers_wsdl, robot.rosbridge)
+        for address in named:
+            # A WSDL may be a file.
+            if address and "://" in address and (why := self.trust.refusal(as_http(address))):
+                return f"the credentials of this worker do not go to {address}, which its options do not name: {why}"
+        return ""
 
     @classmethod
     def of(cls, robot: "Robot") -> Self:
@@ -168,6 +185,11 @@ class Robot:
         return [BUILDERS[interface](endpoint, operation, values, self.token) for values in variants(operation, seed)]
 
 
+def as_http(address: str) -> str:
+    """Return the address of a WebSocket as that of the HTTP server that opens it (RFC 6455 4.1); others as they are."""
+    return f"http{address[2:]}" if address[:2].lower() == "ws" else address
+
+
 def without_secrets(robot: Robot) -> Robot:
     """Return a robot as it is sent to workers, each of which has secrets of its own."""
     user = robot.username_token and replace(robot.username_token, password="")
@@ -178,8 +200,10 @@ def with_secrets(robot: Robot, secrets: Secrets | None) -> Robot:
     """Return a robot that came without its secrets with those of this machine.
 
     Raises:
-        ValueError: its requests need a credential that this machine does not have.
+        ValueError: its requests need a credential that this machine does not have, or that must not go to it.
     """
+    if secrets is not None and (why := secrets.refusal(robot)):
+        raise ValueError(why)
     found = replace(robot, token=secrets.token, credentials=secrets.credentials) if secrets else robot
     user = found.username_token
     if user is not None and secrets is not None and secrets.username_token is not None:

@@ -79,14 +79,14 @@ async def _failing(request: web.Request) -> web.Response:
 
 
 class _Tiring:
-    """Answers as it should three times, and then with 500 and what it was sent."""
+    """Answers as it should twelve times, and then with 500 and what it was sent."""
 
     def __init__(self) -> None:
         self.calls = 0
 
     async def __call__(self, request: web.Request) -> web.Response:
         self.calls += 1
-        if self.calls > 3 and self.calls % 4 == 0:
+        if self.calls > 12 and self.calls % 4 == 0:
             return await _failing(request)
         return web.json_response({"number": 1}, headers={**_headers(request), "Server": _sent(request, b"")[:4000]})
 

@@ -76,7 +76,7 @@ def test_a_worker_from_elsewhere_joins_the_master(toy, load, wait_for, free_port
         f"--processes 0 --expect-workers 1 --web-port {free_port}",
     )
     port = wait_for(process, r"master on 127\.0\.0\.1:(\d+)")[1]
-    options = f"--worker --master-host 127.0.0.1 --master-port={port} --token-file {token} --rate 60"
+    options = f"--worker --master-host 127.0.0.1 --master-port={port} --token-file {token} --trust-host 127.0.0.1"
     with subprocess.Popen([sys.executable, "-c", f"import sys\n{habit}\n{NODE}", *options.split()]) as worker:
         run = finish()
         assert worker.wait(60) == 0

@@ -171,7 +171,7 @@ def test_workers_outlive_no_master_and_leave_what_they_recorded(worker, begin, w
         assert left["requests"] >= sum(entry["count"] + entry["errors"] for entry in left["series"]) > 20
 
 
-def test_any_number_of_workers_measures_a_described_device_alike(device, worker, begin, tmp_path):
+def test_any_number_of_workers_measures_a_described_device_alike(network, device, worker, begin, tmp_path):
     token, medians = tmp_path / "token", {}
     token.write_text("t0ken-of-robot")
     for number in (1, 2, 4):
@@ -179,7 +179,7 @@ def test_any_number_of_workers_measures_a_described_device_alike(device, worker,
             "--operation 'GET /state=2' --operation 'GET /items/{item_id}' --rate 30 --duration 3 --warmup 0",
             f"--processes 0 --expect-workers {number}",
             target=[device("--auth", "bearer", "--slow", "0.15")],
-            shared=f"--token-file {token}",
+            shared=f"--token-file {token} --trust-host {network.address('middle')}",
         )
         join(*(worker(own_clock=place % 2 == 1) for place in range(number)))
         run = finish()
