@@ -91,6 +91,12 @@ def renamed(ledger: Mapping[str, Requirement]) -> dict[str, str]:
     return {alias: item.id for item in ledger.values() for alias in item.aliases}
 
 
+def classes_of(ledger: Mapping[str, Requirement], ids: Iterable[str]) -> tuple[str, ...]:
+    """Return the conformance classes of some requirements, by their ids or aliases, which need not begin with them."""
+    names = renamed(ledger)
+    return tuple(dict.fromkeys(ledger[names.get(id_, id_)].class_ for id_ in ids))
+
+
 def load_ledger(path: Path, classes: Collection[str]) -> dict[str, Requirement]:
     """Read a ``requirements.toml``.
 

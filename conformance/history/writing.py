@@ -28,7 +28,7 @@ _FAST: Final = 1
 _GATHERED_S: Final = 0.1
 # A history has at most so many octets on disk: ten times what a long run writes.
 _MOST: Final = 512 << 20
-_LAST_S: Final = 10.0
+_LAST_S: Final = 60.0
 
 
 class HistoryWriter(Recorder):

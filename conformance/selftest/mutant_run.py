@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
+from conformance.contract.ledger import classes_of
 from conformance.contract.pack import Contract
 from conformance.mutation.messages import Change, unchanged
 from conformance.mutation.mutant import Mutant
@@ -176,7 +177,7 @@ def run_mutants(
     def one(mutant: Mutant) -> MutantResult:
         robot, proxy = pool.take()
         try:
-            return _try(mutant, robot, proxy, effort, seed, already)
+            return _try(pool.contract, mutant, robot, proxy, effort, seed, already)
         finally:
             pool.give(robot, proxy)
 
@@ -194,11 +195,13 @@ def _obstacle(mutant: Mutant, robot: Robot, already: frozenset[str]) -> str:
     return ""
 
 
-def _try(mutant: Mutant, robot: Robot, proxy: Proxy, effort: str, seed: int, already: frozenset[str]) -> MutantResult:
+def _try(
+    contract: Contract, mutant: Mutant, robot: Robot, proxy: Proxy, effort: str, seed: int, already: frozenset[str]
+) -> MutantResult:
     result = MutantResult(mutant, not_tried=_obstacle(mutant, robot, already))
     if result.not_tried:
         return result
-    classes = tuple(dict.fromkeys(id_.split("/")[0] for id_ in mutant.catches))
+    classes = classes_of(contract.ledger, mutant.catches)
     domain_id = robot.domain_id if mutant.probe else None
     seen: dict[str, None] = {}
     # The checks that judge the requirements alone; then the whole classes; then those with more cases.

@@ -2,8 +2,6 @@
 
 They send target, headers and their order exactly as given. h11 parses responses strictly, so it also checks their
 framing. Why no common HTTP client is used: docs/design.md.
-
-Over 300 lines because a connection, the pool that keeps it and what tells its end from a fault belong together.
 """
 
 import math

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from conformance.contract.classes import Level
+from conformance.contract.ledger import classes_of
 from conformance.contract.pack import Contract
 from conformance.mutation.messages import unchanged
 from conformance.selftest.at_once import each_at_once
@@ -74,7 +75,7 @@ def judge(
         unreached: names of mutants that are known to alter nothing in any run.
         tell: called with each result when it is ready.
     """
-    control = _Control(seed)
+    control = _Control(pool.contract, seed)
 
     def one(mutant: GeneratedMutant) -> GeneratedResult:
         if mutant.name in unreached:
@@ -91,8 +92,8 @@ def judge(
 class _Control:
     """The A/A control: the requirements that the unchanged device does not pass, which therefore kill no mutant."""
 
-    def __init__(self, seed: int) -> None:
-        self._seed = seed
+    def __init__(self, contract: Contract, seed: int) -> None:
+        self._contract, self._seed = contract, seed
         self._known: dict[str, dict[str, bool]] = {}
         self._lock = threading.Lock()
 
@@ -118,7 +119,7 @@ class _Control:
                 known |= {id_: id_ in outcome.not_passed() for id_ in outcome.verdicts}
             if new := tuple(id_ for id_ in ids if id_ not in known):
                 proxy.change = unchanged
-                classes = tuple(dict.fromkeys(id_.split("/")[0] for id_ in new))
+                classes = classes_of(self._contract.ledger, new)
                 outcome = run_job(job_for(robot, proxy, effort, self._seed, classes=classes, requirements=new))
                 if outcome.exit_code < 0:
                     # Nothing is known of the good device, so nothing is shown of the mutant.
@@ -190,7 +191,7 @@ def _attempts(contract: Contract, mutant: GeneratedMutant, claimed: tuple[str, .
         # The class that should see it is not judged: any other may.
         classes = (*classes, *(class_ for class_ in claimed if class_ not in classes))
     words = {word.lower() for word in _WORD.findall(mutant.exchange.name)}
-    first = tuple(id_ for id_ in contract.ledger if id_.split("/")[0] == classes[0])
+    first = tuple(id_ for id_, item in contract.ledger.items() if item.class_ == classes[0])
     near = tuple(id_ for id_ in first if id_.split("/")[1].split("-")[0] in words)
     types = tuple(id_ for id_ in near if id_.endswith("-type"))
     for requirements in dict.fromkeys((types, near)):

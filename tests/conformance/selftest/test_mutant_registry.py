@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from conformance.contract.classes import Level
+from conformance.contract.ledger import classes_of
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
 from conformance.mutation.messages import unchanged
@@ -47,6 +48,14 @@ def test_mutant_is_well_made(mutant):
     assert mutant.says.endswith(".")
     assert callable(mutant.make())
     assert mutant.incomplete_request is None or callable(mutant.incomplete_request())
+
+
+@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
+def test_what_must_kill_a_mutant_is_claimed_in_its_run(mutant):
+    """An id begins with the class that judges any API; a pack may claim it in another one."""
+    claims = classes_of(CONTRACT.ledger, mutant.catches)
+    assert all(CONTRACT.ledger[CONTRACT.renamed.get(id_, id_)].binds(claims) for id_ in mutant.catches)
+    assert set(claims) <= CONTRACT.classes.keys()
 
 
 def test_each_run_gets_a_change_of_its_own():
