@@ -191,7 +191,8 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
     if outcome.unwritten:
         print_summary(outcome)
         kept = "What is printed is all that is kept" if outcome.path.parent == options["out"] else f"See {outcome.path}"
-        click.echo(f"error: the result could not be written: {inert(outcome.unwritten)}. {kept}", err=True)
+        where = inert(str(options["out"]))
+        click.echo(f"error: the result could not be written to {where}: {inert(outcome.unwritten)}. {kept}", err=True)
         return CommandResult(outcome.exit_code)
     if options["as_json"]:
         click.echo(outcome.path.read_text(encoding="utf-8"), nl=False)

@@ -14,6 +14,7 @@ from conformance.cli.contract import contract_option, loaded
 from conformance.cli.selftest_progress import Progress, compare
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.extras import lacking_soap
+from conformance.commandline.terminal import inert
 from conformance.contract.locating import ContractError
 
 if TYPE_CHECKING:
@@ -223,9 +224,13 @@ def _finish(report: Report, run: Callable[[], None], options: dict[str, Any]) ->
         interrupted = True
         report.notes.append("The self-test was interrupted; this is what was judged until then.")
     report.seconds = time.monotonic() - started
-    path = report.write(options["out"])
     click.echo(report.summary())
-    click.echo(f"result: {path}")
+    try:
+        click.echo(f"result: {report.write(options['out'])}")
+    except OSError as error:
+        where = inert(str(options["out"]))
+        click.echo(f"error: the result could not be written to {where}: {inert(str(error))}", err=True)
+        sys.exit(ExitCode.INTERRUPTED if interrupted else ExitCode.INCONCLUSIVE)
     sys.exit(ExitCode.INTERRUPTED if interrupted else ExitCode.PASSED if report.holds else ExitCode.FAILED)
 
 

@@ -20,8 +20,11 @@ from processes import ended
 from small_device import Handle, constant, described, reading, small_device
 
 import roaas
+from conformance.cli.selftest import _finish
 from conformance.commandline import started
 from conformance.commandline.out_folder import LOCK_NAME
+from conformance.contract.pack import Contract
+from conformance.selftest.report import Report
 
 _OBJECT = {"type": "object"}
 _DESCRIPTION = described({"/state": reading(_OBJECT)})
@@ -70,8 +73,21 @@ def test_a_folder_that_is_lost_during_the_run_does_not_lose_the_result(lose, tmp
         done = ended(*_command(url, out, "--class", "description"))
     assert done.returncode == 4, done.stderr
     (kept,) = elsewhere.glob("roaas-result-*/result.json")
-    assert str(kept) in done.stderr
+    (said,) = (line for line in done.stderr.splitlines() if line.startswith("error: "))
+    assert f"the result could not be written to {out}: " in said
+    assert str(kept) in said
     assert _result(kept.parent)["interrupted"] is False
+
+
+def test_a_self_test_whose_folder_takes_nothing_names_the_folder_and_prints_what_it_found(tmp_path, capsys):
+    (tmp_path / "file").touch()
+    out, report = tmp_path / "file/out", Report(Contract.load(), "plain")
+    with pytest.raises(SystemExit) as ended_with:
+        _finish(report, lambda: None, {"out": out})
+    said = capsys.readouterr()
+    assert ended_with.value.code == 4
+    assert report.summary() in said.out
+    assert said.err.startswith(f"error: the result could not be written to {out}: ")
 
 
 def _no_room() -> None:
