@@ -135,3 +135,27 @@ def test_the_suite_and_the_load_tests_start_without_ros(command):
     call = f"roaas.main(['{command}', '--help'], standalone_mode=False)"
     done = ended(sys.executable, "-c", blocked + call)
     assert done.returncode == 0, done.stderr
+
+
+def _weights():
+    """Lines and modules of Python by room; of the suite's rooms, by the folder inside."""
+    weights = {}
+    for top in (*ROOMS, "benchmarks", "tests"):
+        for path in (ROOT / top).rglob("*.py"):
+            parts = path.relative_to(ROOT).parts
+            room = "/".join(parts[:2]) if top == "conformance" and len(parts) > len(("conformance", "x.py")) else top
+            lines, modules = weights.get(room, (0, 0))
+            weights[room] = lines + len(path.read_text(encoding="utf-8").splitlines()), modules + 1
+    return weights
+
+
+def test_no_room_grows_past_its_figure():
+    allowed = tomllib.loads((Path(__file__).parent / "house.toml").read_text(encoding="utf-8"))["rooms"]
+    weights = _weights()
+    assert weights.keys() == allowed.keys()
+    grown = {
+        room: {"is": weight, "may have": tuple(allowed[room])}
+        for room, weight in weights.items()
+        if any(there > most for there, most in zip(weight, allowed[room], strict=True))
+    }
+    assert grown == {}, "delete something, or raise the figure in tests/house.toml with its reason"
