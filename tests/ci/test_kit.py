@@ -100,8 +100,8 @@ def on_gitlab(programs, folder, **variables):
 
 
 def names(folder):
-    """Return the files of a run, without the traces: which scenarios were played depends on the claims."""
-    return {path.name for path in folder.iterdir()} - {"traces.json.gz"}
+    """Return the files of a run, without what it recorded: which scenarios were played depends on the claims."""
+    return {path.name for path in folder.iterdir()} - {"traces.json.gz", "history.jsonl.gz"}
 
 
 CLASS = {"classes": "rest-formats", "effort": "quick"}

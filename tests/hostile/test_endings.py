@@ -253,7 +253,7 @@ def test_a_guard_stops_the_device_unless_that_is_done(told, tmp_path):
     if told.tls:
         context, ca_file = certificate(tmp_path)
         server.socket = context.wrap_socket(server.socket, server_side=True)
-        files = json.dumps([str(ca_file), None, None])
+        files = json.dumps([str(ca_file)])
     request = b"PUT /v HTTP/1.1\r\nHost: robot\r\nContent-Length: 1\r\nConnection: close\r\n\r\n0"
     stop = {
         "host": "localhost" if told.tls else "127.0.0.1",
