@@ -3,7 +3,6 @@
 import argparse
 import json
 import os
-import random
 import re
 import signal
 import subprocess
@@ -16,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from conformance.commandline.exit_codes import ExitCode
-from conformance.selftest.robots import stopped
+from conformance.selftest.robots import own_domain, stopped
 
 _ROAAS = (sys.executable, "-P", "-m", "roaas")
 _START_S = 60
@@ -38,10 +37,7 @@ def main() -> int:
     started = time.monotonic()
     # SIGTERM, which ends a CI job, stops the robot too, like Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    # A ROS domain that other robots on this machine probably do not use.
-    domain = random.SystemRandom().randint(1, 101)
-    _say("1/3", f"starting the reference robot on ROS domain {domain}")
-    with _robot(domain) as (rest, soap):
+    with own_domain(1) as domain, _robot(domain) as (rest, soap):
         endpoints = [str(_STATEMENT), "--rest", rest, "--publishers-wsdl", soap]
         endpoints += ["--subscribers-wsdl", soap.replace("publisher", "subscriber")]
         common = [*endpoints, "--allow-motion", "--out", str(options.out)]
@@ -56,6 +52,7 @@ def main() -> int:
 @contextmanager
 def _robot(domain: int) -> Iterator[tuple[str, str]]:
     """Run the reference robot on free ports; yield the REST base URL and the WSDL URL of the publishers' service."""
+    _say("1/3", f"starting the reference robot on ROS domain {domain}")
     command = [*_ROAAS, "robot", "--rest-port", "0", "--soap-port", "0", "--domain-id", str(domain)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)  # noqa: S603 - ours
     with stopped(process):

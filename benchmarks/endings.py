@@ -29,6 +29,7 @@ from urllib.parse import urlsplit
 
 from programs import machine, started
 
+from conformance.selftest.robots import own_domain
 from reports.errors import ReportError
 from reports.reading import read_result
 
@@ -161,15 +162,15 @@ def _is_readable(out: Path) -> bool:
 
 
 @contextlib.contextmanager
-def _robot(name: str, folder: Path, domain_id: int) -> Iterator[Reference | Small]:
+def _robot(name: str, folder: Path) -> Iterator[Reference | Small]:
     if name == "small":
         device, statement = Mover(), folder / "device.toml"
         with small_device(DESCRIPTION, device.routes) as url:
             statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n{MAP}', encoding="utf-8")
             yield Small(device, statement)
         return
-    command = (sys.executable, "-m", "reference_robot", "--rest-port=0", "--soap-port=0", f"--domain-id={domain_id}")
-    with started(*command, stderr=subprocess.DEVNULL) as (_, line):
+    command = (sys.executable, "-m", "reference_robot", "--rest-port=0", "--soap-port=0")
+    with own_domain(1) as domain, started(*command, f"--domain-id={domain}", stderr=subprocess.DEVNULL) as (_, line):
         yield Reference(*(word.split("=", 1)[1] for word in line.split()[1:3]))
 
 
@@ -179,11 +180,10 @@ def main() -> int:
     options.add_argument("--robot", choices=("reference", "small"), default="reference")
     options.add_argument("--moments", type=int, default=30)
     options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--domain-id", type=int, default=71, help="ROS domain of the reference robot")
     chosen = options.parse_args()
     chance, ends = random.Random(chosen.seed), list[Ended]()  # noqa: S311 - no secret
     logging.disable(logging.CRITICAL)
-    with tempfile.TemporaryDirectory() as name, _robot(chosen.robot, Path(name), chosen.domain_id) as robot:
+    with tempfile.TemporaryDirectory() as name, _robot(chosen.robot, Path(name)) as robot:
         kinds = {"whole run": (), robot.moving_class: ("--class", robot.moving_class)}
         usual = {kind: run_once(robot, "", more, Path(name, kind)) for kind, more in kinds.items()}
         for kind, run in usual.items():

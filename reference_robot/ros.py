@@ -27,7 +27,7 @@ import rclpy
 from rclpy.action import ActionClient, ActionServer
 from rclpy.context import Context
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException, ShutdownException
+from rclpy.executors import Executor, ExternalShutdownException, ShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as rclpy_c
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -35,9 +35,9 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
 try:
-    from rclpy.experimental.events_executor import EventsExecutor as RosExecutor
+    from rclpy.experimental.events_executor import EventsExecutor
 except ImportError:  # an early Jazzy, without the backport
-    from rclpy.executors import SingleThreadedExecutor as RosExecutor
+    EventsExecutor = None
 
 # Measured with 50 Hz odometry, two action servers and a dozen subscriptions in one process:
 # EventsExecutor 2.2 % of a core, SingleThreadedExecutor, which builds its wait set anew for every
@@ -87,7 +87,7 @@ class RosRuntime:
             )
         except (rclpy_c.RCLError, rclpy_c.RCLInvalidROSArgsError, rclpy_c.UnknownROSArgsError) as error:
             raise RosArgumentsError(f"ROS does not accept {' '.join(arguments)}: {error}") from error
-        self._executors = [RosExecutor(context=self.context)]
+        self._executors = [_executor(self.context)]
         self._awake: list[float] = []  # for each thread: when its last callback or wait ended
         self._nodes: list[Node] = []
         self._threads: list[threading.Thread] = []
@@ -114,7 +114,7 @@ class RosRuntime:
         if not spun:
             return node
         if apart:
-            self._executors.append(RosExecutor(context=self.context))
+            self._executors.append(_executor(self.context))
         self._executors[-1 if apart else 0].add_node(node)
         return node
 
@@ -178,7 +178,7 @@ class RosRuntime:
     ) -> None:
         self.close()
 
-    def _spin(self, number: int, executor: RosExecutor) -> None:
+    def _spin(self, number: int, executor: Executor) -> None:
         # Not executor.spin(): outside the main thread, EventsExecutor's loop uses a whole core.
         while not self._closing.is_set() and self.context.ok():
             self._awake[number] = time.monotonic()
@@ -202,6 +202,25 @@ class RosRuntime:
             if waiting.is_ready("subscription", 0):
                 notify()
                 self._closing.wait(pause_s)
+
+
+class _NoNode:
+    """What an executor takes for a second node, with nothing in it and unknown to ROS."""
+
+    subscriptions = timers = clients = services = waitables = guards = ()
+
+
+def _executor(context: Context) -> Executor:
+    """Return an executor that survives an exception in a callback.
+
+    An EventsExecutor with exactly one node ends the process with a segmentation fault when a task raises (rclpy issue
+    1641). Tasks are the callbacks of futures and of ``watch``. Something that is not a node makes the nodes two.
+    """
+    if EventsExecutor is None:
+        return SingleThreadedExecutor(context=context)
+    executor = EventsExecutor(context=context)
+    executor.add_node(_NoNode())
+    return executor
 
 
 def waiting_messages(subscription: Subscription) -> Iterator[bytes]:

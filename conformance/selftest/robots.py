@@ -99,7 +99,7 @@ def running(contract: Contract, device: GoodDevice, domain_id: int = 0, seed: in
     """
     check_available(contract, device)
     with contextlib.ExitStack() as stack:
-        own = stack.enter_context(_own_domain(domain_id)) if device.on_ros else None
+        own = stack.enter_context(own_domain(domain_id)) if device.on_ros else None
         process = stack.enter_context(_started(device.command(Start(own or 0, seed))))
         rest, soap = _ready(process, device.name)
         wsdls = self_test_of(contract).wsdls(soap) if soap else ("", "")
@@ -107,7 +107,7 @@ def running(contract: Contract, device: GoodDevice, domain_id: int = 0, seed: in
 
 
 @contextlib.contextmanager
-def _own_domain(first: int) -> Iterator[int]:
+def own_domain(first: int) -> Iterator[int]:
     """Reserve a ROS domain that no other run on this machine uses, beginning the search at ``first``; yield its id.
 
     Raises:
@@ -117,10 +117,11 @@ def _own_domain(first: int) -> Iterator[int]:
     import fcntl  # noqa: PLC0415
 
     for domain in range(first, _DOMAINS):
-        with Path(tempfile.gettempdir(), f"roaas-domain-{domain}.lock").open("w", encoding="utf-8") as lock:
+        with contextlib.ExitStack() as held:
             try:
+                lock = held.enter_context(Path(tempfile.gettempdir(), f"roaas-domain-{domain}.lock").open("wb"))
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
+            except OSError:  # held by a process, or another user's
                 continue
             yield domain
             return

@@ -6,6 +6,7 @@ import pytest
 from observer import until
 from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.serialization import deserialize_message
+from rclpy.task import Future
 from std_msgs.msg import String
 
 from reference_robot.names import RosNames
@@ -26,6 +27,26 @@ def test_a_failing_callback_stops_no_other(domain_id):
         node.create_timer(0.005, lambda: calls.append("sound"))
         ros.start()
         until(lambda: calls.count("failing") > 3 and calls.count("sound") > 3)
+
+
+@pytest.mark.parametrize("apart", [False, True])
+def test_a_failing_task_ends_no_process(domain_id, apart):
+    """EventsExecutor crashes the process if it has exactly one node: two robots on one domain ended each other."""
+
+    def fail(_done):
+        failed.append(1)
+        raise ValueError("on purpose")
+
+    failed, calls = [], []
+    with RosRuntime(domain_id) as ros:
+        node = ros.create_node("only", apart=apart)
+        future = Future(executor=node.executor)
+        future.add_done_callback(fail)
+        ros.start()
+        future.set_result(None)
+        until(lambda: failed)
+        node.create_timer(0.005, lambda: calls.append(1))
+        until(lambda: calls)
 
 
 def test_a_closed_runtime_leaves_no_node_on_the_graph_and_no_thread(domain_id):
