@@ -29,6 +29,7 @@ _COMMANDS = {
     "certify": ("conformance.cli.certify", "Judge a robot by its contract."),
     "load": ("loadtests.cli", "Measure how fast a robot responds."),
     "replay": ("conformance.cli.replay", "Send a finding's requests again, and report whether it persists."),
+    "judge": ("conformance.cli.judge", "Judge a stored run again, without the robot."),
     "report": ("reports.cli.pages", "Write the pages from the result files again."),
     "compare": ("reports.cli.pages", "Show whether a robot got slower between two load tests."),
     "diff": ("reports.cli.difference", "Show what changed between two results, or between two descriptions of an API."),

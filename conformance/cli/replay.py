@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 import click
 import msgspec
 
+from conformance.cli.stored_contract import contract_of
 from conformance.cli.summary import warning
 from conformance.commandline.device_options import client_certificate_options
 from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.commandline.terminal import inert
-from conformance.contract.described import copy_as_data
-from conformance.contract.locating import ContractError, is_installed
+from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.engine.stored_result import MALFORMED, StoredResultError, findings, not_well_made, read_result
 from conformance.statement.endpoints import Endpoints
-from conformance.statement.statement import Statement, StatementError, api_of, empty_statement, load_statement
+from conformance.statement.statement import Statement, StatementError, api_of, load_statement
 from conformance.verdict.finding import counted
 
 if TYPE_CHECKING:
@@ -46,7 +46,6 @@ _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
     metavar="PACK",
     help="Folder of the contract pack, if the result's pack is not installed; its code is run.",
 )
-@click.option("--recorded", is_flag=True, help="Judge the traces of the run again; send nothing.")
 @click.option("--token-file", type=click.Path(exists=True, dir_okay=False), help="File with the bearer token to send.")
 @click.option(
     "--token-for",
@@ -73,7 +72,6 @@ def replay(  # noqa: C901 - one branch for each way to judge
     allow_motion: bool,
     statement_file: Path | None,
     pack: str | None,
-    recorded: bool,
     token_file: str | None,
     trusted: tuple[str, ...],
     ca_file: str | None,
@@ -104,8 +102,6 @@ def replay(  # noqa: C901 - one branch for each way to judge
     given = {name: value for name, value in options.items() if value is not None}
     connection = _connection(given)
     try:
-        if recorded:
-            return _judge_recorded(document, folder, statement_file, pack, requirement)
         chosen = list(findings(document, requirement))
         if not chosen:
             raise click.UsageError(f"{result} has no finding" + (f" of {requirement}" if requirement else ""))
@@ -113,7 +109,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
             place, requirements = (folder, pack), {id_ for id_, _ in chosen}
             return _judge_again(document, place, statement_file, given, requirements, allow_motion=allow_motion)
         # The contract at hand judges what was judged by it.
-        contract = _contract_of(document, pack, folder)
+        contract = contract_of(document, pack, folder)
         rest = document["target"].get("rest") if contract else None
         sure = [allow_motion or not moves(failure, contract, rest or "") for _, failure in chosen]
         acting = [failure for (_, failure), may in zip(chosen, sure, strict=True) if not may]
@@ -173,7 +169,7 @@ def _judge_again(
     try:
         api = api_of(statement_file)
         is_described = bool(api.openapi or api.wsdl)
-        contract = _contract_of(document, pack, folder) if pack or not is_described else None
+        contract = contract_of(document, pack, folder) if pack or not is_described else None
         if contract is None and is_described:
             statement, contract = _described(statement_file, given)
         elif contract is None:
@@ -222,34 +218,6 @@ def _described(statement_file: Path, given: dict[str, Any]) -> tuple[Statement, 
     return what_is_judged(None, statement_file, options)
 
 
-def _judge_recorded(
-    document: dict[str, Any], folder: Path, statement_file: Path | None, pack: str | None, requirement: str | None
-) -> CommandResult:
-    """Judge the traces in a folder by the current rules."""
-    from conformance.engine.recorded import judge_recorded  # noqa: PLC0415 - see replay()
-    from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
-    from conformance.scenarios.stored import TracesError  # noqa: PLC0415
-    from conformance.verdict.run import Run  # noqa: PLC0415
-
-    contract = _contract_of(document, pack, folder)
-    if contract is None:
-        raise click.UsageError("the result is by a contract that is not at hand: name its pack with --contract")
-    try:
-        statement = load_statement(statement_file, contract) if statement_file else empty_statement(contract)
-        run = Run(statement, contract, claims=tuple(contract.classes), allow_motion=True)
-        judged = judge_recorded(RobotUnderTest(run), folder)
-    except (StatementError, TracesError) as error:
-        raise click.UsageError(str(error)) from error
-    wanted = contract.renamed.get(requirement, requirement) if requirement else None
-    chosen = [one for one in judged if wanted in {None, one.requirement}]
-    for one in chosen:
-        word = f"fails: {inert('; '.join(one.failures))}" if one.failures else "passes"
-        click.echo(f"{one.requirement} {word} ({counted(one.cases, 'case')})")
-    if not chosen:
-        raise click.UsageError(f"no recorded trace shows {requirement or 'any requirement'}")
-    return CommandResult(ExitCode.FAILED if any(one.failures for one in chosen) else ExitCode.PASSED)
-
-
 def _check_addresses(failures: list[dict[str, Any]], trusted: tuple[str, ...]) -> None:
     """Check that token and certificate are sent only to origins that the user trusts.
 
@@ -265,31 +233,3 @@ def _check_addresses(failures: list[dict[str, Any]], trusted: tuple[str, ...]) -
             f"the result has requests for {', '.join(map(inert, others))}: where your credentials may go there, add "
             + " ".join(f"--token-for {inert(address)}" for address in others)
         )
-
-
-def _contract_of(document: dict[str, Any], pack: str | None, folder: Path) -> Contract | None:
-    """Return the current version of the contract that judged, or None if it is not installed.
-
-    That of a device's own description is in the folder of the result, of which nothing is executed: a result is data.
-
-    Raises:
-        click.UsageError: the pack named by the user cannot be used.
-    """
-    from conformance.documents.unreadable_parts import without_unreadable  # noqa: PLC0415 - see replay()
-    from conformance.engine.describing import FOLDER  # noqa: PLC0415 - see replay()
-
-    described, named = folder / FOLDER, pack or str(document.get("pack", {}).get("name", DEFAULT_PACK))
-    try:
-        if pack is None and "api" in document:
-            copy = click.get_current_context().with_resource(tempfile.TemporaryDirectory())
-            named = str(copy_as_data(described, Path(copy), lambda found: without_unreadable(found)[0]))
-        elif pack is None and not is_installed(named):
-            return None
-        contract = Contract.load(named)
-    except ContractError as error:
-        if pack:
-            raise click.UsageError(str(error)) from error
-        return None
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-    return contract if document["suite"]["contract"] == contract.label else None

@@ -5,10 +5,11 @@ from typing import Final
 from conformance.api.rest.variations import Kind
 from conformance.contract.pack import Contract
 from conformance.documents.resources import matching
-from conformance.scenarios.rule import Case, Rule
+from conformance.scenarios.rule import Rule
 from conformance.scenarios.survey import Probe, Survey
 from conformance.statement.statement import empty_statement
 from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
 from conformance.verdict.run import Run
 
 SECURITY: Final = "description/security"

@@ -3,7 +3,6 @@
 import re
 import ssl
 from collections import deque
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -58,7 +57,7 @@ def connection_of(where: Endpoints) -> Connection:
     )
     if where.auth is not None and where.rest:
         # What the run permits, counts and judges is not for a login.
-        found.log_in = partial(_logged_in, where.auth, where.rest, replace(found, listeners=[], recent=deque()))
+        found.log_in = partial(_logged_in, where.auth, where.rest, found.unheard(recent=deque()))
         found.credentials = Credentials((*found.credentials.items, found.log_in()))
     return found
 

@@ -193,7 +193,7 @@ class LostDevice:
         if not self._is_back or len(requests) > self._sends or time.monotonic() > self._until:
             return False
         self._sends -= len(requests)
-        silent = replace(self._connection, listeners=[], recent=deque(), sent=0)
+        silent = self._connection.unheard(recent=deque(), sent=0)
         came: Attempt | None = None
         try:
             for request in requests:

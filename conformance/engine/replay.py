@@ -15,8 +15,8 @@ import msgspec
 
 from conformance.api.rest.guard import Guard
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.observers import Observer
 from conformance.api.rest.stops import UNDELIVERED, stop_device
+from conformance.checkers.rest import RestCheckers
 from conformance.commandline.endings import undisturbed
 from conformance.contract.described import MOTION
 from conformance.contract.pack import Contract
@@ -33,6 +33,7 @@ from conformance.statement.statement import Calls, Statement, empty_statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Response, Unanswered
 from conformance.verdict.effort import Effort
+from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
 # A pause between two requests is kept, as what is judged may be what comes after it; never longer than this, s.
@@ -292,7 +293,8 @@ def _observed_to_fail(contract: Contract, base_url: str, requirement: str, excha
     run = Run(empty_statement(contract), contract)
     with closing(HttpClient(base_url, Connection())) as client:
         api = RestInterface(run, client)
-        for observer in (Observer(api), *api.device.observers(api)):
+        checked = Observers(run.judge, [RestCheckers(contract, base_url)])
+        for observer in (checked, *api.device.observers(api)):
             observer.answered(exchange)
     evidence = run.judge.of(requirement)
     return bool(evidence and evidence.failures)

@@ -9,7 +9,7 @@ import time
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import TextIO
 
@@ -323,7 +323,7 @@ class RobotUnderTest:
         """Return whether the robot responds, on any interface that responded at the start, within so many seconds."""
         until = time.monotonic() + within_s
         # Nothing is judged by these requests, and none of them made the robot stop.
-        silent = replace(self.connection, listeners=[], recent=deque(), sent=0, is_away=self._is_of_gateway)
+        silent = self.connection.unheard(recent=deque(), sent=0, is_away=self._is_of_gateway)
         clients = [(HttpClient(client.base_url, silent), path) for client, path in self._answering()]
         try:
             while not (responds := any(self._answers(client, path) for client, path in clients)):

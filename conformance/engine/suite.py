@@ -23,6 +23,7 @@ JUDGING = (
     "observe",
     "api",
     "scenarios",
+    "checkers",
     "rules",
     "engine",
 )

@@ -10,7 +10,7 @@ from typing import Final, Self
 import msgspec
 
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Response, Unanswered
-from conformance.transport.passage import EyeState, Passage
+from conformance.transport.passage import EyeState, Heard, Passage
 
 #: The version of what is written.
 VERSION: Final = 1
@@ -68,7 +68,7 @@ class Sent(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", t
     """One attempt to send a request over a connection, and what came back.
 
     Attributes:
-        id: number of the event, from 1, in the order of completion.
+        id: number of the event, from 1.
         span: what the suite was doing, as in Span.
         client: the client that sent it, as the suite's threads are called.
         connection, place, attempt: as in Passage.
@@ -80,6 +80,7 @@ class Sent(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", t
         came: the response; None: there was none, or it was not parsed.
         octets: what a raw socket received, as it came.
         problem, kind: what happened instead of a response.
+        heard: whether the response is judged by the rules for every response.
     """
 
     id: int
@@ -103,6 +104,7 @@ class Sent(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", t
     octets: Octets | None = None
     problem: str = ""
     kind: NoAnswer | None = None
+    heard: Heard = Heard.ALWAYS
 
     @classmethod
     def of(cls, passage: Passage, number: int, span: str, client: str, began_s: float) -> Self:
@@ -134,6 +136,7 @@ class Sent(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", t
             Octets.of(response) if isinstance(response, bytes) else None,
             passage.problem,
             passage.kind,
+            passage.heard,
         )
 
     @property
@@ -180,6 +183,12 @@ class Span(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", t
     name: str
 
 
+class Withdrawn(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", tag="withdrawn"):
+    """The response in the event ``id`` was not the device's to that request, and is not judged."""
+
+    id: int
+
+
 class Seen(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", tag="seen"):
     """What an eye saw beside the requests, such as a message on a ROS topic, dated where it was seen."""
 
@@ -210,4 +219,4 @@ class Ended(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", 
     problem: str = ""
 
 
-Event = Began | Sent | Span | Seen | Eye | Ended
+Event = Began | Sent | Withdrawn | Span | Seen | Eye | Ended

@@ -5,6 +5,7 @@ last moments before the process is killed is lost; everything before can be read
 the compressed data (RFC 1951, as zlib's Z_SYNC_FLUSH makes it).
 """
 
+import itertools
 import math
 import threading
 import time
@@ -18,7 +19,7 @@ from typing import Final
 import msgspec
 
 from conformance.commandline.secrecy import SECRETS
-from conformance.history.events import VERSION, Began, Ended, Event, Eye, Seen, Sent, Span
+from conformance.history.events import VERSION, Began, Ended, Event, Eye, Seen, Sent, Span, Withdrawn
 from conformance.transport.passage import EyeState, Passage, Recorder
 
 HISTORY_NAME: Final = "history.jsonl.gz"
@@ -46,15 +47,22 @@ class HistoryWriter(Recorder):
     def __init__(self, folder: Path, suite: str, started: str) -> None:
         self.path, self.problem = folder / HISTORY_NAME, ""
         self._began_s, self._span, self._sent = time.monotonic(), "", 0
-        self._queue: SimpleQueue[tuple[Passage, str, str] | Event | None] = SimpleQueue()
+        self._number = itertools.count(1).__next__
+        self._queue: SimpleQueue[tuple[int, Passage, str, str] | Event | None] = SimpleQueue()
         self._closing = threading.Event()
         self._queue.put(Began(VERSION, suite, started))
         self._thread = threading.Thread(target=self._write, name="history", daemon=True)
         self._thread.start()
 
-    def record(self, passage: Passage) -> None:
+    def record(self, passage: Passage) -> int:
         """Add an exchange."""
-        self._queue.put((passage, self._span, threading.current_thread().name))
+        number = self._number()
+        self._queue.put((number, passage, self._span, threading.current_thread().name))
+        return number
+
+    def withdraw(self, number: int) -> None:
+        """Add that a response was none to its request."""
+        self._queue.put(Withdrawn(number))
 
     def begin(self, span: str) -> None:
         """Say what the suite does from now on."""
@@ -119,12 +127,12 @@ class HistoryWriter(Recorder):
             item = self._queue.get()
         return lines, True
 
-    def _event(self, item: tuple[Passage, str, str] | Event) -> Event:
+    def _event(self, item: tuple[int, Passage, str, str] | Event) -> Event:
         if not isinstance(item, tuple):
             return item
-        passage, span, client = item
+        number, passage, span, client = item
         self._sent += 1
-        return Sent.of(passage, self._sent, span, client, self._began_s)
+        return Sent.of(passage, number, span, client, self._began_s)
 
 
 def _masked(event: Event) -> object:

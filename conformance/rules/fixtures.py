@@ -9,13 +9,15 @@ from typing import Final
 import pytest
 
 from conformance.api.interfaces import Interfaces
+from conformance.api.rest.habits import Habits
 from conformance.api.rest.kept_exchanges import KeptExchanges
-from conformance.api.rest.observers import Observer
 from conformance.api.rest.references import collections_of
 from conformance.api.rest.values import Values
-from conformance.api.soap.observer import PASSIVE, SoapObserver, answers_of
 from conformance.api.soap.service import SoapService
+from conformance.checkers.rest import RestCheckers
+from conformance.checkers.soap import PASSIVE, SoapCheckers, answers_of
 from conformance.documents.openapi import operations_of
+from conformance.documents.wsdl import Description
 from conformance.scenarios.motion.binding import binding_of
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.other_exchanges import OtherExchanges
@@ -23,6 +25,7 @@ from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_map import MotionMap
 from conformance.transport.client import Connection
 from conformance.transport.exchange import Listener
+from conformance.verdict.case import Checker
 from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
@@ -44,20 +47,29 @@ def _watched(
     """
     services = interfaces.soap.there.values()
     api = interfaces.rest
-    observers: list[Listener] = []
+    checkers: list[Checker] = []
     listeners: list[Listener] = []
     if api is not None:
-        observers.append(Observer(api, [service.endpoint for service in services]))
+        elsewhere = [service.endpoint for service in services]
+        checkers += [Habits(api), RestCheckers(run.contract, api.client.base_url, elsewhere)]
         listeners += api.device.observers(api)
         listeners += [one for one in (other_exchanges, kept_exchanges) if one is not None]
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
-        answers = {service.endpoint: answers_of(service) for service in services}
-        observers.append(SoapObserver(run.judge, answers))
-    listeners.append(Observers(run.judge, observers))
+        answers = {service.endpoint: answers_of(*_descriptions(service)) for service in services}
+        checkers.append(SoapCheckers(answers))
+    listeners.append(Observers(run.judge, checkers))
     connection.listeners.extend(listeners)
     for exchange in api.looked if api is not None else ():
         for listener in listeners:
             listener.answered(exchange)
+
+
+def _descriptions(service: SoapService) -> Iterator[Description]:
+    """Yield what the robot says of a service, and what the contract does."""
+    if service.own is not None:
+        yield service.own
+    if service.contract_wsdl_path is not None:
+        yield service.contract
 
 
 @pytest.fixture(scope="session")

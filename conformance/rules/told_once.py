@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 from conformance.api.rest.statuses import HELD, held_text
 from conformance.api.rest.variations import Kind
-from conformance.scenarios.rule import Case, NotSeen
+from conformance.scenarios.rule import NotSeen
 from conformance.scenarios.survey import Probe
+from conformance.verdict.case import Case
 from conformance.verdict.finding import Showing
 
 _LESS_PLAIN = frozenset({Kind.GENERATED, Kind.OTHER})

@@ -6,32 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from conformance.scenarios.scenario import NotPossibleError, Scenario
-from conformance.transport.exchange import Attempt, NoAnswerError
+from conformance.transport.exchange import NoAnswerError
+from conformance.verdict.case import Case
 from conformance.verdict.evidence import Judge
-from conformance.verdict.finding import Showing
-
-
-@dataclass(frozen=True)
-class Case:
-    """One case of a requirement that a rule judged.
-
-    Attributes:
-        holds: whether the device meets the requirement in this case.
-        exchange: the evidence, or None.
-        expected: what the requirement demands here, as a noun phrase.
-        observed: what the trace shows instead; empty: a description of the response.
-        cause: failures of the same cause are one finding; empty: derived from the texts.
-        subject: what was tested; empty: method and target of the request.
-        operations: how each operation shows it, that of the exchange first, if not only that of the request.
-    """
-
-    holds: bool
-    exchange: Attempt | None
-    expected: str
-    observed: str = ""
-    cause: str = ""
-    subject: str = ""
-    operations: tuple[Showing, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -139,16 +116,7 @@ def record(judge: Judge, requirement: str, outcomes: Iterable[Outcome]) -> None:
     for one in outcomes:
         match one:
             case Case():
-                judge.check(
-                    requirement,
-                    one.holds,
-                    one.exchange,
-                    one.expected,
-                    found=one.observed,
-                    cause=one.cause,
-                    subject=one.subject,
-                    operations=one.operations,
-                )
+                judge.record(one, requirement)
             case NotTested():
                 judge.skip(requirement, one.reason)
             case NotSeen():

@@ -11,9 +11,9 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 from urllib.parse import urlsplit
 
 import h11
@@ -37,7 +37,7 @@ from conformance.transport.exchange import (
     sendable,
 )
 from conformance.transport.pace import Pace, time_to_arrive
-from conformance.transport.passage import Passage, Recorder
+from conformance.transport.passage import Heard, Passage, Recorder
 from conformance.transport.reach import Trust
 from conformance.transport.tls import ClientCertificate, tls_context
 
@@ -91,6 +91,7 @@ class Connection:
         permit: is called with method and absolute URL before each request; returns an empty text if the request may be
             sent, else why not. By default everything may be sent.
         recorder: records each attempt to send a request, by whatever client, thread or socket.
+        heard: whether its responses are judged by the rules for every response.
         number: returns the number of a new connection.
     """
 
@@ -115,6 +116,7 @@ class Connection:
     trust: Trust | None = None
     patience_s: float = 120.0
     recorder: Recorder = field(default_factory=Recorder)
+    heard: Heard = Heard.ALWAYS
     number: Callable[[], int] = field(default_factory=lambda: itertools.count(1).__next__)
     _next_slot: float = 0.0
 
@@ -129,6 +131,10 @@ class Connection:
     def may_authorize(self, url: str) -> bool:
         """Return whether the credentials may go to the server of a URL."""
         return self.trust is None or self.trust.trusts(url)
+
+    def unheard(self, **changes: Any) -> "Connection":
+        """Return a copy, with some settings changed, of which no listener is told."""
+        return replace(self, **{"listeners": [], "heard": Heard.NEVER, **changes})
 
     def take_slot(self, *requests: tuple[str, str]) -> None:
         """Count one message, after waiting until ``request_rate`` allows it. Everything that sends calls this before.
@@ -183,6 +189,7 @@ class HttpClient:
         self.prefix = parts.path
         self.authority = parts.netloc.rsplit("@", 1)[-1]
         self._hangs: defaultdict[str, list[float]] = defaultdict(list)
+        self._recorded = 0
         self._authorized = connection.may_authorize(self.base_url)
         self.tls = connection.tls(authorized=self._authorized) if parts.scheme == "https" else None
         self._connections = Connections(
@@ -252,6 +259,7 @@ class HttpClient:
         try:
             response = self._exchange(request, target, sent, deadline, fresh=fresh)
             if authorized and response.status == _CHALLENGE and credentials.learn(response.headers):
+                self.connection.recorder.withdraw(self._recorded)
                 sent = credentials.added(fields, method, self.prefix + target)
                 response = self._exchange(request, target, sent, deadline, fresh=fresh)
             self.connection.note(method)
@@ -263,7 +271,9 @@ class HttpClient:
             raise self._unanswered(request, str(none), none.kind) from none
         self.connection.pace.took(response.elapsed_ms / 1000, len(body) + len(response.body))
         exchange = Exchange(request, response)
+        number = self._recorded
         if self.connection.is_away(exchange):
+            self.connection.recorder.withdraw(number)
             problem = f"a gateway responded {response.status} in the device's place"
             raise self._unanswered(request, problem, OF_GATEWAY[response.status])
         self.connection.recent.append(Sending(request, None))
@@ -361,9 +371,8 @@ class HttpClient:
     ) -> None:
         ended_s = came.received_s if isinstance(came, Response) else time.monotonic()
         what = (came,) if isinstance(came, Response) else (None, str(came), came.kind)
-        self.connection.recorder.record(
-            Passage(shown, on.number, on.place, attempt, on.sent_s, on.first_s, ended_s, within_s, *what)
-        )
+        passage = Passage(shown, on.number, on.place, attempt, on.sent_s, on.first_s, ended_s, within_s, *what)
+        self._recorded = self.connection.recorder.record(replace(passage, heard=self.connection.heard))
 
 
 @dataclass(frozen=True)

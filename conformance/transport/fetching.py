@@ -22,7 +22,7 @@ from conformance.commandline.device_options import advice
 from conformance.transport.client import Connection
 from conformance.transport.credentials import Credentials
 from conformance.transport.exchange import Request, Response
-from conformance.transport.passage import Passage
+from conformance.transport.passage import Heard, Passage
 from conformance.transport.reach import ElsewhereError, Trust, UnreachableError
 
 _REDIRECTS: Final = 4
@@ -128,14 +128,15 @@ class Fetcher:
         octets: bytes = b"",
     ) -> None:
         """Record the responses on the way to a document, with its content as unpacked, or why there was none."""
-        within_s, ended = self._connection.timeout_s, time.monotonic()
+        ended = time.monotonic()
+        link = 0, 0, 1, began, 0.0, ended, self._connection.timeout_s
         for one in came:
             sent = Request(one.request.method, str(one.request.url), tuple(one.request.headers.multi_items()))
             fields = tuple(pair for pair in one.headers.multi_items() if pair[0] != "content-encoding")
             response = Response(one.status_code, fields, octets if one is came[-1] else b"", 1000 * (ended - began))
-            self._connection.recorder.record(Passage(sent, 0, 0, 1, began, 0.0, ended, within_s, response))
+            self._connection.recorder.record(Passage(sent, *link, response, heard=Heard.NEVER))
         if request is not None:
-            self._connection.recorder.record(Passage(request, 0, 0, 1, began, 0.0, ended, within_s, None, problem))
+            self._connection.recorder.record(Passage(request, *link, None, problem, heard=Heard.NEVER))
 
     def _hint(self, url: str, status: int) -> str:
         """Return which option sends the credentials that a server asks for."""

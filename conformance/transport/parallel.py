@@ -3,12 +3,13 @@
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Final
 
 from conformance.transport.client import Headers, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError
+from conformance.transport.passage import Heard
 
 # More than this at once is a load test, and more than a small robot has sockets for.
 MOST_CLIENTS: Final = 8
@@ -85,7 +86,7 @@ class _Client:
         """Wait for the other clients, then send."""
         shared = request.client
         # The ceiling on the rate has been kept to before.
-        settings = replace(shared.connection, listeners=[], request_rate=None, resent=0)
+        settings = shared.connection.unheard(heard=Heard.UNLESS_BUSY, request_rate=None, resent=0)
         _, own = self._clients.setdefault(shared.base_url, (shared, HttpClient(shared.base_url, settings)))
         wait()
         try:

@@ -11,6 +11,16 @@ from enum import StrEnum
 from conformance.transport.exchange import NoAnswer, Request, Response
 
 
+class Heard(StrEnum):
+    """Whether what comes back is judged by the rules for every response."""
+
+    ALWAYS = "always"
+    #: Several clients ask at once: that the device has too much to do is no fault.
+    UNLESS_BUSY = "unless busy"
+    #: Such as a login, a sign of life, or the commands that keep a device going while it is measured.
+    NEVER = "never"
+
+
 @dataclass(frozen=True, slots=True)
 class Passage:
     """One attempt to send a request over a connection, and what came back.
@@ -28,6 +38,7 @@ class Passage:
         problem: what happened instead of a response, in words, or empty.
         kind: the same as an enum value.
         whole: whether all of the request was sent.
+        heard: whether what came back is judged like every response.
     """
 
     request: Request
@@ -42,6 +53,7 @@ class Passage:
     problem: str = ""
     kind: NoAnswer | None = None
     whole: bool = True
+    heard: Heard = Heard.ALWAYS
 
 
 class EyeState(StrEnum):
@@ -55,8 +67,12 @@ class EyeState(StrEnum):
 class Recorder:
     """Base class of what records a run. Does nothing. Any thread may call its methods, which return at once."""
 
-    def record(self, passage: Passage) -> None:
-        """Record an attempt to send a request."""
+    def record(self, passage: Passage) -> int:  # noqa: ARG002 - for those that record
+        """Record an attempt to send a request; return its number in the run, from 1."""
+        return 0
+
+    def withdraw(self, number: int) -> None:
+        """Record that a response was none of the device's to this request: a gateway's, or the challenge before it."""
 
     def saw(self, eye: str, at_s: float, values: Sequence[float | int | str]) -> None:
         """Record what an eye saw, and when, by its own reading of the machine's monotonic clock, s."""

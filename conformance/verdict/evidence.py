@@ -15,6 +15,7 @@ from conformance.contract.classes import CauseKind
 from conformance.contract.ledger import Requirement, renamed
 from conformance.documents.patterns import PatternError
 from conformance.transport.exchange import Attempt, NoAnswer, Request, Unanswered
+from conformance.verdict.case import Case
 from conformance.verdict.finding import Finding, Sent, Showing, causes_of, kind_of, likeness, observed_in, subject_of
 
 # Findings of one requirement that are kept: further causes share one more. And how many have all of their requests.
@@ -191,6 +192,19 @@ class Judge:
                 operations = [Showing(label, 1, exchange.request) for label in self.concerned(exchange.request)]
             self._found(evidence, requirement, exchange, expected, found, cause, subject, operations, cases)
         return holds
+
+    def record(self, case: Case, requirement: str = "") -> bool:
+        """Record a case of the requirement that it names, or of the given one; return whether it holds."""
+        return self.check(
+            case.requirement or requirement,
+            case.holds,
+            case.exchange,
+            case.expected,
+            found=case.observed,
+            cause=case.cause,
+            subject=case.subject,
+            operations=case.operations,
+        )
 
     def failed(self, requirement: str) -> None:
         """Do nothing; a judge that wants to know at once of a failed case overrides it."""

@@ -1,43 +1,42 @@
-"""Observers: judge every exchange of a run, whichever check sent it."""
+"""Judge every exchange of a run by checkers, whichever check sent it."""
 
-from collections.abc import Callable, Iterable
-from typing import Final, TypeVar
+from collections.abc import Iterable
+from typing import Final
 
 from conformance.transport.exchange import Attempt, Exchange, Listener, Unanswered
+from conformance.verdict.case import Checker
 from conformance.verdict.evidence import Judge
 
-_Attempt = TypeVar("_Attempt", bound=Attempt)
 _SHOWN: Final = 100
 
 
 class Observers(Listener):
-    """Calls observers with every exchange. What they judge holds for every response, errors included.
+    """Calls checkers with every exchange. What they judge holds for every response, errors included.
 
     Args:
-        judge: records their judgements.
-        observers: the observers.
+        judge: records their cases.
+        checkers: the checkers.
     """
 
-    def __init__(self, judge: Judge, observers: Iterable[Listener]) -> None:
+    def __init__(self, judge: Judge, checkers: Iterable[Checker]) -> None:
         self._judge = judge
-        self._observers = tuple(observers)
+        self._checkers = tuple(checkers)
 
     def answered(self, exchange: Exchange) -> None:
-        """Call each observer with an exchange."""
-        with self._judge.by_rule():
-            for observer in self._observers:
-                self._call(observer.answered, exchange)
+        """Judge an exchange."""
+        self._check(exchange)
 
     def unanswered(self, request: Unanswered) -> None:
-        """Call each observer with a request without a response."""
-        with self._judge.by_rule():
-            for observer in self._observers:
-                self._call(observer.unanswered, request)
+        """Judge a request without a response."""
+        self._check(request)
 
-    def _call(self, observe: Callable[[_Attempt], None], attempt: _Attempt) -> None:
-        """Call an observer; what it cannot judge is no reason not to judge the rest of the run."""
-        try:
-            observe(attempt)
-        except Exception as error:  # noqa: BLE001 - whatever it is, it is told
-            request = attempt.request
-            self._judge.fault(f"{request.method} {request.target.partition('?')[0][:_SHOWN]}", error)
+    def _check(self, attempt: Attempt) -> None:
+        """Call each checker; what one cannot judge is no reason not to judge the rest of the run."""
+        with self._judge.by_rule():
+            for checker in self._checkers:
+                try:
+                    for case in checker(attempt):
+                        self._judge.record(case)
+                except Exception as error:  # noqa: BLE001 - whatever it is, it is told
+                    request = attempt.request
+                    self._judge.fault(f"{request.method} {request.target.partition('?')[0][:_SHOWN]}", error)

@@ -109,7 +109,7 @@ def test_a_signed_certificate_is_verified_and_registered(results):
 def test_recorded_traces_are_judged_again_without_the_device(results):
     folder, _ = results
     for name, code in (("good", 0), ("broken", 1)):
-        done = roaas("replay", folder / name, "lamp/fades", "--recorded", "--contract", LAMP)
+        done = roaas("judge", folder / name, "lamp/fades", "--contract", LAMP)
         assert (done.exit_code, "lamp/fades" in done.output) == (code, True), done.output
 
 

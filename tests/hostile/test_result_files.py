@@ -83,7 +83,7 @@ SPECIAL = (a_pipe, a_folder, endless, elsewhere, a_circle, huge)
 # Commands that read a file of a result, and their exit codes for one that cannot be used. A refused certificate is 1.
 READERS = {
     "result/result.json": {
-        "replay {}/result": (2,), "replay {}/result --recorded": (2,), "report {}/result": (2,),
+        "replay {}/result": (2,), "judge {}/result": (2,), "report {}/result": (2,),
         "report {}/result --format badge": (2,), "diff {}/result {}/result": (2,), "sign {}/result --key {key}": (2,),
     },
     "load/latency.json": {"report {}/load": (2,), "compare {}/load {}/load": (2,)},
@@ -93,7 +93,8 @@ READERS = {
         "registry build {}/result --keys {}/keys --out {}/site": (1, 2),
         "report {}/result": (0, 2),
     },
-    "result/traces.json.gz": {"replay {}/result --recorded": (2,), "report {}/result": (0,)},
+    "result/traces.json.gz": {"judge {}/result": (0, 2), "report {}/result": (0,)},
+    "result/history.jsonl.gz": {"judge {}/result": (1, 2), "report {}/result": (0,)},
     "result/description/openapi.json": {"diff {}/result {}/result": (2,), "replay {}/result": (2, 4)},
     "result/description/pack.toml": {"replay {}/result": (2, 4)},
 }  # fmt: skip
@@ -144,14 +145,15 @@ def _bomb():
     return gzip.compress(b"\x1f" + bytes(1 << 28), 9)
 
 
-@pytest.mark.parametrize("command", ["replay {}/result --recorded", "report {}/result"])
-def test_a_trace_that_unpacks_to_more_than_any_run_writes(well_made, bomb, tmp_path, command):
+@pytest.mark.parametrize("name", ["traces.json.gz", "history.jsonl.gz"])
+@pytest.mark.parametrize("command", ["judge {}/result", "report {}/result"])
+def test_a_file_that_unpacks_to_more_than_any_run_writes(well_made, bomb, tmp_path, command, name):
     sent = well_made.sent(tmp_path / "sent")
     document = well_made.document("result/result.json")
     document["classes"]["motion"] = "pass"
     (sent / "result" / "result.json").write_text(json.dumps(document))
-    (sent / "result" / "traces.json.gz").write_bytes(bomb)
-    check(run(command, sent), 0, 2)
+    (sent / "result" / name).write_bytes(bomb)
+    check(run(command, sent), 0, 1, 2)
 
 
 @pytest.mark.parametrize(
@@ -174,7 +176,7 @@ def test_a_pack_that_a_result_names_is_no_path(well_made, tmp_path, monkeypatch,
         document.pop("api", None)
         document |= {} if api is None else {"api": api}
         (sent / "result" / "result.json").write_text(json.dumps(document))
-        commands = ("replay {}/result", "replay {}/result --recorded", "report {}/result", "diff {}/result {}/result")
+        commands = ("replay {}/result", "judge {}/result", "report {}/result", "diff {}/result {}/result")
         for command in commands:
             check(run(command, sent), 0, 1, 2, 4)
     assert not marker.exists()
@@ -456,5 +458,5 @@ def test_a_schema_in_a_result_that_no_run_leaves_there(well_made, tmp_path, name
     content["schema"] = {"$ref": "#/components/schemas/a0"}
     document.setdefault("components", {})["schemas"] = NETS[name]
     place.write_text(json.dumps(document), encoding="utf-8")
-    for command in ("replay {}/result description/body-schema", "replay {}/result --recorded"):
+    for command in ("replay {}/result description/body-schema", "judge {}/result"):
         check(run(command, sent), 0, 1, 2, 4)

@@ -20,7 +20,7 @@ COMMANDS = (
     "certify {url}/openapi.json --effort quick --out first",
     "certify --fleet fleet.toml --effort quick --out fleet",
     "load {url}/openapi.json --operation GET./a --rate 20 --warmup 0 --duration 1 --processes 1 --out load",
-    "replay first --recorded",
+    "judge first",
     "report first",
     "diff first first",
     "compare load load",

@@ -10,7 +10,7 @@ from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation
 from conformance.documents.resources import is_normal, matching
 from conformance.transport.credentials import is_shown
-from conformance.transport.exchange import Request
+from conformance.transport.exchange import Request, Response
 
 _USUAL_FIELDS = {
     "host",
@@ -23,6 +23,9 @@ _USUAL_FIELDS = {
     "user-agent",
 }
 _USUAL_OCTETS = 2000
+# Fields that ask for a part or set a condition, and the statuses that only such requests get (RFC 9110 13, 14).
+_CONDITIONS = frozenset({"range", "if-none-match", "if-modified-since", "if-match", "if-unmodified-since"})
+_CONDITIONAL = frozenset({206, 304, 412, 416})
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,11 @@ class RequestContext:
             and names.count("host") == 1
             and self.request.size - len(self.request.body) < _USUAL_OCTETS
         )
+
+    def is_own_of(self, answer: Response) -> bool:
+        """Return whether a response is the server's own: to a condition or a range, so that no description has it."""
+        asked = any(name.lower() in _CONDITIONS for name, _ in self.request.headers)
+        return asked and answer.status in _CONDITIONAL
 
     @property
     def plain(self) -> bool:

@@ -21,6 +21,7 @@ from conformance.api.rest.values import Values
 from conformance.documents.openapi import Operation, operations_of
 from conformance.transport.client import HttpClient, is_drafting
 from conformance.transport.exchange import Exchange, Listener, NoAnswerError, NotPermittedError
+from conformance.transport.passage import Heard
 
 #: What is said of a device that may still move begins with these words.
 UNDELIVERED: Final = "the stop could not be delivered; the robot may still move"
@@ -101,6 +102,7 @@ def _unheard(client: HttpClient) -> Iterator[_Refusals]:
     deadline_s = max(_DEADLINE_S, _ANSWERS * connection.pace.usual_s)
     changed = {
         "listeners": [refusals := _Refusals()],
+        "heard": Heard.NEVER,
         "recent": deque(maxlen=1),
         "is_away": lambda _exchange: False,
         "request_rate": None,

@@ -4,7 +4,8 @@ from collections.abc import Iterable
 from http import HTTPStatus
 
 from conformance.scenarios.lifecycles import Life, lifecycles
-from conformance.scenarios.rule import Case, Outcome, rule
+from conformance.scenarios.rule import Outcome, rule
+from conformance.verdict.case import Case
 
 
 @rule("description/created-is-there", on=(lifecycles,))

@@ -3,8 +3,9 @@
 from collections.abc import Iterable
 
 from conformance.scenarios.anonymous import anonymous_requests
-from conformance.scenarios.rule import Case, Outcome, rule
+from conformance.scenarios.rule import Outcome, rule
 from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
 
 
 @rule("description/security", on=(anonymous_requests,))

@@ -18,8 +18,9 @@ from conformance.scenarios.motion.trace import (
     middle_of,
     usual_s,
 )
-from conformance.scenarios.rule import Case, NotTested, Outcome
+from conformance.scenarios.rule import NotTested, Outcome
 from conformance.statement.motion_map import MotionMap
+from conformance.verdict.case import Case
 
 # A reading is late if it takes longer than usual, and more than this share of the drive.
 _SHARE = 0.1

@@ -21,8 +21,9 @@ from conformance.rules.motion.judging import (
 from conformance.scenarios.motion.moves import many_commands, new_targets, repeated, stops, targets
 from conformance.scenarios.motion.several import several_clients, several_drivers
 from conformance.scenarios.motion.trace import SEVERAL, Drive, Leg, Reading, fastest, middle_of
-from conformance.scenarios.rule import Case, NotClaimed, NotTested, Outcome, rule
+from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
+from conformance.verdict.case import Case
 
 # Readings that are so far apart tell a speed, s.
 _APART_S = 0.15

@@ -10,8 +10,9 @@ from conformance.scenarios.motion.attempts import attempts_at_rest
 from conformance.scenarios.motion.moves import clamped_targets
 from conformance.scenarios.motion.trace import SEVERAL, Drive, Leg, Quiet, Tried, fastest, is_refusal, is_soap
 from conformance.scenarios.motion.velocities import clamped_velocities
-from conformance.scenarios.rule import Case, NotClaimed, NotTested, Outcome, rule
+from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
+from conformance.verdict.case import Case
 
 
 def _moved(quiet: Quiet, motion: MotionMap) -> str | None:

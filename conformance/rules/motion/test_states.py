@@ -8,8 +8,9 @@ from conformance.rules.motion.judging import off, stopped, usable
 from conformance.scenarios.motion.moves import stops, targets
 from conformance.scenarios.motion.states import agreement, switched
 from conformance.scenarios.motion.trace import SEVERAL, Leg, Reading, Switched, Told
-from conformance.scenarios.rule import Case, NotClaimed, NotTested, Outcome, rule
+from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
+from conformance.verdict.case import Case
 
 _NO_ACTION = NotClaimed("the map has no [motion.action]")
 

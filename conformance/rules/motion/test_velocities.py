@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from conformance.rules.motion.judging import at, driven, is_each_late, measured, must_rest_from, off, went_on
 from conformance.scenarios.motion.trace import SEVERAL, Command, Drive, Reading, fastest, longest_s
 from conformance.scenarios.motion.velocities import let_go, velocities
-from conformance.scenarios.rule import Case, NotTested, Outcome, rule
+from conformance.scenarios.rule import NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
+from conformance.verdict.case import Case
 
 # Of the hold time: within that part the device must still drive, and at least at this part of its velocity.
 _HELD = (0.2, 0.7)

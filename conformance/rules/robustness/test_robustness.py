@@ -12,10 +12,11 @@ from conformance.api.rest.variations import Kind
 from conformance.documents.traceback import inside_shown, path_shown
 from conformance.rules.told_once import Fault, told_once
 from conformance.scenarios.other_exchanges import others
-from conformance.scenarios.rule import Case, NotTested, Outcome, rule
+from conformance.scenarios.rule import NotTested, Outcome, rule
 from conformance.scenarios.survey import TIMED, Probe, Survey, generated_requests, survey
 from conformance.scenarios.timed_again import TimedAgain, timed_again
 from conformance.transport.exchange import Exchange, NoAnswer
+from conformance.verdict.case import Case
 from conformance.verdict.finding import Showing, likeness
 
 _ON = (survey, generated_requests)

@@ -4,7 +4,7 @@ import pytest
 
 from conformance.api.soap.callable_services import SoapServices, callable_services
 from conformance.api.soap.calls import call
-from conformance.api.soap.observer import PASSIVE
+from conformance.checkers.soap import PASSIVE
 from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
 from conformance.verdict.effort import Effort

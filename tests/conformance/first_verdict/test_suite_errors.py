@@ -8,9 +8,10 @@ from small_device import constant, described, reading, small_device
 import roaas
 from conformance.api.rest.variations import Kind
 from conformance.contract.pack import Contract
-from conformance.scenarios.rule import Case, Rule
+from conformance.scenarios.rule import Rule
 from conformance.scenarios.survey import Probe, Survey
-from conformance.transport.exchange import Exchange, Listener, Request, Response
+from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.case import Case
 from conformance.verdict.evidence import Judge
 from conformance.verdict.observers import Observers
 
@@ -38,20 +39,19 @@ def test_a_rule_that_cannot_judge_one_operation_judges_the_others():
     assert [(operation, str(error)) for operation, error in told] == [("GET /bad", "too deep")]
 
 
-def test_an_observer_that_fails_ends_no_request_and_no_other_observer():
+def test_a_checker_that_fails_ends_no_request_and_no_other_checker():
     seen = []
 
-    class Fails(Listener):
-        def answered(self, exchange):
-            raise ValueError(f"pattern\nof {exchange.request.url}")
+    def fails(exchange):
+        raise ValueError(f"pattern\nof {exchange.request.url}")
 
-    class Sees(Listener):
-        def answered(self, exchange):
-            seen.append(exchange)
+    def sees(exchange):
+        seen.append(exchange)
+        yield from ()
 
     judge = Judge(Contract.load().ledger)
     for _ in range(3):
-        Observers(judge, [Fails(), Sees()]).answered(_exchange("/x?a=1"))
+        Observers(judge, [fails, sees]).answered(_exchange("/x?a=1"))
     assert len(seen) == 3
     assert list(judge.faults) == ["GET /x: not judged: ValueError: pattern"]
 

@@ -18,10 +18,11 @@ from conformance.rules.motion import test_motion, test_motion_attempts, test_sta
 from conformance.scenarios.motion import moves, several, states, velocities
 from conformance.scenarios.motion.binding import SoapBinding
 from conformance.scenarios.motion.mapped import MappedDevice
-from conformance.scenarios.rule import Case, Rule
+from conformance.scenarios.rule import Rule
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError
 from conformance.statement.motion_map import MotionMap
 from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.case import Case
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 

@@ -14,6 +14,6 @@ def test_a_right_arm_is_not_blamed(tmp_path):
     missing = {f"motion/{name}" for name in undeclared}
     assert not_passed(judged) == missing, done.stdout
     # Its moves are stored, and can be judged again without it.
-    again = ["replay", "--recorded", str(tmp_path / "out"), "--statement", str(tmp_path / "device.toml")]
+    again = ["judge", str(tmp_path / "out"), "motion/stop-lasts", "--statement", str(tmp_path / "device.toml")]
     told = ended(sys.executable, "-m", "roaas", *again)
-    assert (told.returncode, "motion/stop-lasts passes" in told.stdout) == (0, True), told.stdout + told.stderr
+    assert (told.returncode, "pass: motion/stop-lasts" in told.stdout) == (0, True), told.stdout + told.stderr

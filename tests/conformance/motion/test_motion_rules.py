@@ -11,9 +11,9 @@ from simulated import DEVICES, MUTANTS, RULES, cases_of, played
 
 from conformance.rules.motion import test_motion_attempts
 from conformance.scenarios.motion.trace import Quiet, Reading, Tried
-from conformance.scenarios.rule import Case
 from conformance.statement.motion_map import MotionMap
 from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.case import Case
 
 
 def _relay(seed):

@@ -5,13 +5,14 @@ import itertools
 import pytest
 from toy_server import serving
 
+from conformance.api.rest.habits import Habits
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.observers import Observer
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Statement
 from conformance.transport.client import Connection, HttpClient
+from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
 _DOCUMENT = {
@@ -31,7 +32,7 @@ def test_a_crash_that_any_check_meets_is_one_finding(tmp_path, status, path, fou
     with serving(lambda *_: (status if next(turns) % 3 == 0 else 200, {})) as url:
         run = Run(statement=Statement(endpoints=Endpoints(rest=url)), contract=contract)
         client = HttpClient(url, Connection())
-        client.connection.listeners.append(Observer(RestInterface(run, client)))
+        client.connection.listeners.append(Observers(run.judge, [Habits(RestInterface(run, client))]))
         for _ in range(9):
             client.send("GET", path)
         client.close()

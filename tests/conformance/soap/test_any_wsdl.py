@@ -16,12 +16,13 @@ from conformance.contract.pack import Contract
 from conformance.documents.soap_services import WsdlError, read_services
 from conformance.documents.wsdl_pack import write_soap_pack
 from conformance.rules.soap import test_soap
-from conformance.scenarios.rule import Case, Rule
+from conformance.scenarios.rule import Rule
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.scenarios.soap_survey import soap_survey, wsdl_faults
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Statement
 from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.case import Case
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 

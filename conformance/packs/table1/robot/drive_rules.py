@@ -12,8 +12,9 @@ from conformance.packs.table1.robot.message_shapes import TWIST, VECTOR3, read_a
 from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import Velocity, is_near
 from conformance.packs.table1.robot.windows import SEVERAL, middle, newest, shown, velocities
-from conformance.scenarios.rule import Case, NotTested, Outcome
+from conformance.scenarios.rule import NotTested, Outcome
 from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
 
 # What was measured for so long alike is steady: readings of two resources may be compared, s.
 _STEADY_S: Final = 0.3

@@ -8,8 +8,8 @@ from conformance.packs.table1.robot.drive_trace import Trace
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import CANCELLED, NEW, REPEATED
 from conformance.packs.table1.robot.plan import Start
-from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
 
 # The statuses that conform, and what is expected, for each kind of step.
 _STEPS: Final[dict[str, tuple[frozenset[int], str]]] = {

@@ -14,8 +14,8 @@ from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, read_as
 from conformance.packs.table1.robot.robot import PLAN, Robot
 from conformance.packs.table1.robot.state_over_soap import answered
-from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
 
 _TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130, -130, 180))
 # A way so much longer than the distance goes around something: not what a short drive is for.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 from conformance.api.rest.calls import JSON
@@ -136,7 +136,7 @@ class Robot:
     def apart(self) -> Robot:
         """Return the robot for another thread, with connections of its own and without listeners; to be closed."""
         other = copy(self)
-        settings = replace(self.rest.connection, listeners=[], request_rate=None, resent=0)
+        settings = self.rest.connection.unheard(request_rate=None, resent=0)
         other.rest = HttpClient(self.rest.base_url, settings)
         return other
 

@@ -19,8 +19,8 @@ from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.robot import FARTHEST, Velocity, is_near
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
-from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
 from conformance.verdict.evidence import Judge
 
 Stamp = tuple[int, int]

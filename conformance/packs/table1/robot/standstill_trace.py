@@ -3,8 +3,9 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from conformance.scenarios.rule import Case, NotTested
+from conformance.scenarios.rule import NotTested
 from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from conformance.packs.table1.robot.agreement import Slack, disagreement, stamp_
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST
 from conformance.packs.table1.robot.robot import FARTHEST, GOAL_PATH, POSE, VELOCITY, Robot
 from conformance.packs.table1.robot.soap_services import ask, returned
-from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
 
 _SLACK: Final = Slack()
 # Two samples are farther apart than this, ns.

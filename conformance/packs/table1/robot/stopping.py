@@ -1,7 +1,6 @@
 """Bring a robot to rest: before a check that needs it, and at the end of every run."""
 
 import math
-from dataclasses import replace
 from http import HTTPStatus
 from typing import Any, Final
 
@@ -66,7 +65,7 @@ def leave_at_rest(api: RestInterface) -> str:
         # A client of its own: no listener judges any more, an endpoint that hung once is asked again all the same, and
         # nothing is late.
         timeout_s = min(_LAST_TIMEOUT_S + 3 * api.run.effort.usual_ms / 1000, api.client.connection.timeout_s)
-        connection = replace(api.client.connection, timeout_s=timeout_s, listeners=[], pace=Pace(math.inf))
+        connection = api.client.connection.unheard(timeout_s=timeout_s, pace=Pace(math.inf))
         client = HttpClient(api.client.base_url, connection)
         try:
             return _Stiller(client, _slowest(api)).bring(_LAST_S, _LAST_S)

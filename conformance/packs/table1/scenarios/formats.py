@@ -36,18 +36,20 @@ _TRIES: Final = 3
 
 @dataclass(frozen=True)
 class FormatsRead:
-    """A resource in all of its formats.
+    """A resource in all of its formats, or a goal that was PUT as XML.
 
     Attributes:
         template, operation: path template and operation id of the resource.
         exchange: the exchange whose response differs from JSON, or the last JSON exchange.
         differs: the value in both formats; empty if all formats agree.
+        put: whether XML was sent; then ``differs`` is where the robot's JSON differs from it.
     """
 
     template: str
     operation: str
     exchange: Exchange
     differs: str = ""
+    put: bool = False
 
     @classmethod
     def of(cls, call: Call, exchange: Exchange, found: Disagreement | None = None) -> "FormatsRead":
@@ -56,14 +58,6 @@ class FormatsRead:
         if found is None:
             return cls(operation.template, operation.id, exchange)
         return cls(operation.template, operation.id, found.exchange, found.description)
-
-
-@dataclass(frozen=True)
-class XmlPut:
-    """A goal that was PUT as XML, and where the robot's JSON differs from it; empty if nowhere."""
-
-    exchange: Exchange
-    differs: str
 
 
 @scenario(needs={Need.REST, Need.MOTION})
@@ -101,13 +95,13 @@ def formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> tuple
 
 
 @scenario(needs={Need.REST, Need.MOTION})
-def formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> tuple[FormatsRead | XmlPut, ...]:
+def formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> tuple[FormatsRead, ...]:
     """PUT several goals, every other one as XML, and read each in all formats, from the first reading on."""
     call = _reader(api, GOAL_PATH)
     if call is None:
         return ()
     poses = choose_goals(robot, 1.5, 2)
-    trace: list[FormatsRead | XmlPut] = []
+    trace: list[FormatsRead] = []
     suspects: Found | None = None
     for number in range(effort.cases(12)):
         pose = in_turn(poses, number)
@@ -119,7 +113,7 @@ def formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> tuple[
             put_goal(robot, body)
         goal, differs, _ = await_goal(robot, body)
         if as_xml is not None and not (goal is None and arrived(robot, pose)):
-            trace.append(XmlPut(as_xml, differs))
+            trace.append(FormatsRead(GOAL_PATH, call.operation.id, as_xml, differs, put=True))
         # Where the goals before were out, this one gets the time that commands may take.
         robot.clock.sleep(robot.settle_s if suspects else 0.0)
         found, exchange = one_turn(api, call, _others(call))

@@ -12,8 +12,8 @@ from conformance.packs.table1.robot.drive_rules import every_outcome
 from conformance.packs.table1.robot.drive_trace import Command, Turn
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.robot import STILL, Odometry, Velocity
-from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
 
 WANTED: Final = Velocity(linear_x=0.5)
 SETTLE_S: Final = 1.2

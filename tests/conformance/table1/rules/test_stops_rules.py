@@ -13,8 +13,8 @@ from conformance.packs.table1.robot.robot import STILL, Velocity
 from conformance.packs.table1.rules.safety import test_driving as rules
 from conformance.packs.table1.scenarios.trace import Driven
 from conformance.packs.table1.statement import Statement
-from conformance.scenarios.rule import Case
 from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
 from conformance.verdict.run import Run
 
 _FAST = Velocity(linear_x=0.3)

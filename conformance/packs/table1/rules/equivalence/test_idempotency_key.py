@@ -4,7 +4,8 @@ from collections.abc import Iterator
 from http import HTTPStatus
 
 from conformance.packs.table1.scenarios.counted_deliveries import CountedDeliveries, Keyed, counted_deliveries
-from conformance.scenarios.rule import Case, NotTested, Outcome, rule
+from conformance.scenarios.rule import NotTested, Outcome, rule
+from conformance.verdict.case import Case
 
 
 @rule("equivalence/idempotency-key", on=(counted_deliveries,))

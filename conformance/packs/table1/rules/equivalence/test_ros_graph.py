@@ -11,7 +11,8 @@ from conformance.packs.table1.robot.probe.client import Probe, ProbeError, RosPr
 from conformance.packs.table1.robot.robot import SENSORS, Robot
 from conformance.packs.table1.scenarios.velocities_on_ros import OnRos, velocities_on_ros
 from conformance.packs.table1.statement import said_of
-from conformance.scenarios.rule import Case, Outcome, rule
+from conformance.scenarios.rule import Outcome, rule
+from conformance.verdict.case import Case
 from conformance.verdict.evidence import Judge
 from conformance.verdict.run import Run
 

@@ -3,8 +3,9 @@
 from collections.abc import Iterator
 
 from conformance.packs.table1.scenarios.concurrent_deliveries import concurrent_deliveries
-from conformance.scenarios.rule import Case, Outcome, rule
+from conformance.scenarios.rule import Outcome, rule
 from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
 
 
 @rule("http/concurrent-answers", on=(concurrent_deliveries,))

@@ -6,7 +6,8 @@ from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, VELOCITY
 from conformance.packs.table1.robot.standstill_trace import Standing, stays
 from conformance.packs.table1.scenarios.not_acceptable import NotAcceptable, not_acceptable
 from conformance.packs.table1.scenarios.standing import standing
-from conformance.scenarios.rule import Case, Note, Outcome, rule
+from conformance.scenarios.rule import Note, Outcome, rule
+from conformance.verdict.case import Case
 
 Puts = tuple[NotAcceptable, ...]
 

@@ -5,31 +5,31 @@ from collections.abc import Iterator
 from conformance.documents.representation import UnreadableError, by_itself
 from conformance.packs.table1.scenarios.formats import (
     FormatsRead,
-    XmlPut,
     formats_in_motion,
     formats_of_goals,
     formats_of_plans,
     goal_as_text,
 )
-from conformance.scenarios.rule import Case, NotClaimed, Outcome, rule
+from conformance.scenarios.rule import NotClaimed, Outcome, rule
 from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
 
 
 @rule("rest-formats/same-values", on=(formats_in_motion, formats_of_goals, formats_of_plans))
-def same_values(trace: tuple[FormatsRead | XmlPut, ...]) -> Iterator[Outcome]:
+def same_values(trace: tuple[FormatsRead, ...]) -> Iterator[Outcome]:
     """Judge that all formats of a resource have the same values."""
     for one in trace:
-        if isinstance(one, XmlPut):
+        if one.put:
             continue
         expected = f"the same values in all formats of {one.template}"
         yield Case(not one.differs, one.exchange, expected, one.differs, cause=one.operation)
 
 
 @rule("rest-formats/xml-input", on=(formats_of_goals,))
-def xml_input(trace: tuple[FormatsRead | XmlPut, ...]) -> Iterator[Outcome]:
+def xml_input(trace: tuple[FormatsRead, ...]) -> Iterator[Outcome]:
     """Judge that a goal in XML is the goal that the robot then has."""
     for one in trace:
-        if isinstance(one, XmlPut):
+        if one.put:
             yield Case(not one.differs, one.exchange, "the goal that was sent", one.differs, cause="putGoal effect")
 
 

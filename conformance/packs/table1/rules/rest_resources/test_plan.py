@@ -14,8 +14,9 @@ from conformance.packs.table1.scenarios.plans import (
     plans_outside,
 )
 from conformance.packs.table1.statement import said_of
-from conformance.scenarios.rule import Case, Outcome, rule
+from conformance.scenarios.rule import Outcome, rule
 from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
 from conformance.verdict.run import Run
 
 Plans = PlansFromRobot | PlansFromStart

@@ -6,7 +6,8 @@ from conformance.packs.table1.robot.standstill_trace import Rest, Standing, stay
 from conformance.packs.table1.scenarios.plans import is_refused
 from conformance.packs.table1.scenarios.refused_velocities import RefusedVelocities, refused_velocities
 from conformance.packs.table1.scenarios.standing import standing
-from conformance.scenarios.rule import Case, NotClaimed, Note, Outcome, rule
+from conformance.scenarios.rule import NotClaimed, Note, Outcome, rule
+from conformance.verdict.case import Case
 
 
 @rule("safety/limits-refused", on=(refused_velocities,))

@@ -11,7 +11,8 @@ from conformance.packs.table1.scenarios.soap_effects import (
     goal_by_soap,
     misunderstood,
 )
-from conformance.scenarios.rule import Case, Note, Outcome, rule
+from conformance.scenarios.rule import Note, Outcome, rule
+from conformance.verdict.case import Case
 
 _LAST = ("detail", "last_goal")
 # The goal has succeeded, or was cancelled.

@@ -11,8 +11,9 @@ from conformance.packs.table1.scenarios.counted_deliveries import (
     Rejected,
     counted_deliveries,
 )
-from conformance.scenarios.rule import Case, Note, Outcome, rule
+from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.transport.exchange import SAFE_METHODS
+from conformance.verdict.case import Case
 
 
 @rule("strict-input/delivery-refused", on=(counted_deliveries,))

@@ -7,7 +7,8 @@ from conformance.packs.table1.robot.standstill_trace import Rest, Standing, stay
 from conformance.packs.table1.scenarios.invalid_goals import InvalidGoal, invalid_goals
 from conformance.packs.table1.scenarios.invalid_velocities import invalid_velocities
 from conformance.packs.table1.scenarios.standing import standing
-from conformance.scenarios.rule import Case, Outcome, rule
+from conformance.scenarios.rule import Outcome, rule
+from conformance.verdict.case import Case
 
 _VELOCITY: Final = "strict-input/velocity-refused"
 

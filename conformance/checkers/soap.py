@@ -1,21 +1,19 @@
-"""The observer of SOAP: judges every response of a run, so that a failure in one of many is noticed."""
+"""The checkers of SOAP: they judge every response of a run, so that a failure in one of many is noticed."""
 
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
 from lxml import etree
 
-from conformance.api.expectation import expect
 from conformance.api.soap.envelope import Envelope, Fault, NotSoapError, read_root
-from conformance.api.soap.service import SoapService
 from conformance.documents.traceback import inside_shown
-from conformance.documents.wsdl import DescriptionError
+from conformance.documents.wsdl import Description, DescriptionError
 from conformance.documents.xml import NotXmlError, elements, has_doctype, parse
 from conformance.documents.xml_names import ENVELOPE, clark, local, namespace
-from conformance.transport.exchange import Exchange, Listener, Response
-from conformance.verdict.evidence import Judge
+from conformance.transport.exchange import Attempt, Exchange, Response
+from conformance.verdict.case import Case
 
 # BP 1.1 R1012; ASCII is a part of UTF-8.
 _ENCODINGS: Final = frozenset({"", "utf-8", "utf8", "utf-16", "utf-16le", "utf-16be", "us-ascii", "ascii"})
@@ -57,53 +55,51 @@ PASSIVE: Final = tuple(
 )
 
 
-class SoapObserver(Listener):
+class SoapCheckers:
     """Judges every response to a POST at one of the endpoints.
 
     Args:
-        judge: takes the evidence.
         endpoints: URL of each service, with the tags of the elements that its responses may hold.
     """
 
-    def __init__(self, judge: Judge, endpoints: Mapping[str, Collection[str]]) -> None:
-        self._judge = judge
+    def __init__(self, endpoints: Mapping[str, Collection[str]]) -> None:
         self._endpoints = endpoints
 
-    def answered(self, exchange: Exchange) -> None:
-        """Judge one exchange, if it is a call of one of the services."""
-        request, response = exchange.request, exchange.response
-        if request.method != "POST" or request.url not in self._endpoints or _SOAP_12 in request.body:
-            # A node that has SOAP 1.2 as well answers a request of that version in it.
+    def __call__(self, attempt: Attempt) -> Iterator[Case]:
+        """Yield the cases of one exchange; none if it is no call of one of the services."""
+        request = attempt.request
+        if not isinstance(attempt, Exchange) or request.method != "POST" or request.url not in self._endpoints:
             return
-        rules = _Rules(self._judge, exchange)
-        rules.judge("R1141", response.http_version in {"HTTP/1.1", "HTTP/1.0"}, "HTTP/1.1 or HTTP/1.0")
-        inside = inside_shown(exchange)
+        if _SOAP_12 in request.body:
+            return  # a node that has SOAP 1.2 as well answers a request of that version in it
+        rules, response = _Rules(attempt), attempt.response
+        yield rules.case("R1141", response.http_version in {"HTTP/1.1", "HTTP/1.0"}, "HTTP/1.1 or HTTP/1.0")
+        inside = inside_shown(attempt)
         expected = "a response that shows nothing of the program"
-        rules.judge("fault-no-traceback", not inside, expected, lambda: f"{inside!r} in the response")
+        yield rules.case("fault-no-traceback", not inside, expected, lambda: f"{inside!r} in the response")
         if response.body:
-            _judge_document(rules, response, self._endpoints[request.url])
+            yield from _document(rules, response, self._endpoints[request.url])
 
 
 @dataclass(frozen=True)
 class _Rules:
     """The rules for one SOAP response."""
 
-    judging: Judge
     exchange: Exchange
 
-    def judge(
+    def case(
         self,
         name: str,
-        holds: bool,  # noqa: FBT001 - as Judge.check()
+        holds: bool,  # noqa: FBT001 - as Occasion.case()
         expected: str,
         got: Callable[[], str] = str,
-    ) -> None:
-        """Judge one rule; ``got`` is called only where it is broken."""
-        id_ = f"soap-basic-profile/{name}"
-        expect(self.judging, id_, self.exchange).that(holds, expected, "" if holds else got())
+    ) -> Case:
+        """Return the case of one rule; ``got`` is called only where it is broken."""
+        found = "" if holds else got()
+        return Case(holds, self.exchange, expected, found, requirement=f"soap-basic-profile/{name}")
 
 
-def _judge_document(rules: _Rules, response: Response, answers: Collection[str]) -> None:
+def _document(rules: _Rules, response: Response, answers: Collection[str]) -> Iterator[Case]:
     is_text_xml = response.media_type == "text/xml"
     encoding = _encoding(response)
     try:
@@ -111,48 +107,50 @@ def _judge_document(rules: _Rules, response: Response, answers: Collection[str])
     except NotXmlError as error:
         problem = str(error)
         if is_text_xml:
-            rules.judge("R1012", encoding in _ENCODINGS, _UTF, lambda: f"the encoding {encoding!r}")
+            yield rules.case("R1012", encoding in _ENCODINGS, _UTF, lambda: f"the encoding {encoding!r}")
         is_other = not (response.ok or is_text_xml)
-        rules.judge("content-type", is_other, "a SOAP message as text/xml", lambda: f"a body that is {problem}")
+        yield rules.case("content-type", is_other, "a SOAP message as text/xml", lambda: f"a body that is {problem}")
         return
     if local(str(root.tag)) != "Envelope":
         # An HTML page or a problem document with 4xx is no SOAP response, and none is required there.
-        rules.judge("content-type", not response.ok, "a SOAP message", lambda: f"the root element {root.tag}")
+        yield rules.case("content-type", not response.ok, "a SOAP message", lambda: f"the root element {root.tag}")
         return
-    _judge_message(rules, response, root, answers, encoding)
+    yield from _message(rules, response, root, answers, encoding)
 
 
-def _judge_message(
+def _message(
     rules: _Rules, response: Response, root: etree._Element, answers: Collection[str], encoding: str
-) -> None:
-    judge = rules.judge
+) -> Iterator[Case]:
+    case = rules.case
     once = not response.repeated("Content-Type")
-    judge("content-type", response.media_type == "text/xml" and once, "Content-Type: text/xml", lambda: _type(response))
-    judge("R1012", encoding in _ENCODINGS, _UTF, lambda: f"the encoding {encoding!r}")
-    judge("R1018", _fits(response), "the charset of the body in Content-Type", lambda: _type(response))
-    judge("R1008", not has_doctype(root), "a message without DOCTYPE", lambda: "a message with a DOCTYPE")
+    yield case(
+        "content-type", response.media_type == "text/xml" and once, "Content-Type: text/xml", lambda: _type(response)
+    )
+    yield case("R1012", encoding in _ENCODINGS, _UTF, lambda: f"the encoding {encoding!r}")
+    yield case("R1018", _fits(response), "the charset of the body in Content-Type", lambda: _type(response))
+    yield case("R1008", not has_doctype(root), "a message without DOCTYPE", lambda: "a message with a DOCTYPE")
     is_plain = not _has_instruction(root)
-    judge("R1009", is_plain, "a message without processing instructions", lambda: "a processing instruction")
+    yield case("R1009", is_plain, "a message without processing instructions", lambda: "a processing instruction")
     try:
         message = read_root(root)
     except NotSoapError as error:
         problem = str(error)
-        judge("R2712", holds=False, expected="a SOAP 1.1 message", got=lambda: problem)
+        yield case("R2712", holds=False, expected="a SOAP 1.1 message", got=lambda: problem)
         return
     after = elements(root)[elements(root).index(message.body) + 1 :]
-    judge("R1011", not after, "no element after Body", lambda: f"{after[0].tag} after Body")
-    _judge_encoding_styles(rules, message)
+    yield case("R1011", not after, "no element after Body", lambda: f"{after[0].tag} after Body")
+    yield from _encoding_styles(rules, message)
     bare = [str(child.tag) for child in message.payload if not namespace(str(child.tag))]
-    judge("R1014", not bare, "children of Body with a namespace", lambda: f"{bare[0]!r} without a namespace")
+    yield case("R1014", not bare, "children of Body with a namespace", lambda: f"{bare[0]!r} without a namespace")
     odd = [value for block in message.headers if (value := block.get(_MUST_UNDERSTAND)) not in {None, "0", "1"}]
-    judge("R1013", not odd, 'mustUnderstand="0" or "1"', lambda: f"mustUnderstand={odd[0]!r}")
+    yield case("R1013", not odd, 'mustUnderstand="0" or "1"', lambda: f"mustUnderstand={odd[0]!r}")
     if message.fault is not None:
-        _judge_fault(rules, response, message.fault)
+        yield from _fault(rules, response, message.fault)
         return
-    judge("R1124", response.ok, "status 2xx for a message without a fault")
-    judge("R1111", response.status == 200, "status 200 for a message without a fault")  # noqa: PLR2004 - R1111
+    yield case("R1124", response.ok, "status 2xx for a message without a fault")
+    yield case("R1111", response.status == 200, "status 200 for a message without a fault")  # noqa: PLR2004 - R1111
     tag = str(message.first.tag) if message.first is not None else "none"
-    judge(
+    yield case(
         "R2712",
         tag in answers and len(message.payload) == 1,
         "the response element of an operation, alone in the Body",
@@ -160,27 +158,27 @@ def _judge_message(
     )
 
 
-def _judge_encoding_styles(rules: _Rules, message: Envelope) -> None:
+def _encoding_styles(rules: _Rules, message: Envelope) -> Iterator[Case]:
     soap = [
         str(element.tag)
         for element in message.root.iter()
         if isinstance(element.tag, str) and namespace(element.tag) == ENVELOPE and element.get(_ENCODING_STYLE)
     ]
-    rules.judge("R1005", not soap, "no encodingStyle on SOAP's elements", lambda: f"encodingStyle on {soap[0]}")
+    yield rules.case("R1005", not soap, "no encodingStyle on SOAP's elements", lambda: f"encodingStyle on {soap[0]}")
     inside = [str(child.tag) for child in message.payload if child.get(_ENCODING_STYLE) is not None]
-    rules.judge("R1006", not inside, "no encodingStyle in Body", lambda: f"encodingStyle on {inside[0]}")
+    yield rules.case("R1006", not inside, "no encodingStyle in Body", lambda: f"encodingStyle on {inside[0]}")
 
 
-def _judge_fault(rules: _Rules, response: Response, fault: Fault) -> None:
-    judge = rules.judge
-    judge("R1126", response.status == 500, "status 500 with a fault")  # noqa: PLR2004 - R1126
+def _fault(rules: _Rules, response: Response, fault: Fault) -> Iterator[Case]:
+    case = rules.case
+    yield case("R1126", response.status == 500, "status 500 with a fault")  # noqa: PLR2004 - R1126
     odd = [tag for tag in fault.names if local(tag) not in _FAULT_CHILDREN]
     expected = "no other children of Fault than faultcode, faultstring, faultactor and detail"
-    judge("R1000", not odd, expected, lambda: f"the child {odd[0]}")
+    yield case("R1000", not odd, expected, lambda: f"the child {odd[0]}")
     spaced = [tag for tag in fault.names if namespace(tag)]
-    judge("R1001", not spaced, "children of Fault without a namespace", lambda: f"the child {spaced[0]}")
+    yield case("R1001", not spaced, "children of Fault without a namespace", lambda: f"the child {spaced[0]}")
     there = {local(tag) for tag in fault.names}
-    judge(
+    yield case(
         "fault-complete",
         {"faultcode", "faultstring"} <= there and bool(fault.code),
         "a faultcode and a faultstring",
@@ -191,14 +189,14 @@ def _judge_fault(rules: _Rules, response: Response, fault: Fault) -> None:
     if "faultcode" not in there:
         return
     bound = "a faultcode whose prefix is bound"
-    judge("faultcode-qualified", bool(fault.code_namespace), bound, lambda: f"{fault.code!r} without a namespace")
+    yield case("faultcode-qualified", bool(fault.code_namespace), bound, lambda: f"{fault.code!r} without a namespace")
     if fault.code_namespace:
         is_standard = fault.code_namespace != ENVELOPE or fault.code in _FAULT_CODES
         expected = "one of SOAP's fault codes, or a fault code in a namespace of its own"
-        judge("R1004", is_standard, expected, lambda: f"{fault.code!r} in SOAP's namespace")
+        yield case("R1004", is_standard, expected, lambda: f"{fault.code!r} in SOAP's namespace")
         # A service that implements WS-Addressing has codes of its own for headers of it that are wrong.
         addressed = b"addressing" in rules.exchange.request.body and "addressing" in fault.code_namespace
-        judge(
+        yield case(
             "fault-code",
             fault.standard in _FAULT_CODES or addressed,
             f"one of the fault codes {', '.join(sorted(_FAULT_CODES))}",
@@ -236,11 +234,8 @@ def _type(response: Response) -> str:
     return f"Content-Type {response.header('content-type')!r}"
 
 
-def answers_of(service: SoapService) -> frozenset[str]:
-    """Return the tags of the response elements of a service, by the contract and by the robot's own description."""
-    described = [service.own] if service.own is not None else []
-    if service.contract_wsdl_path is not None:
-        described.append(service.contract)
+def answers_of(*described: Description) -> frozenset[str]:
+    """Return the tags of the response elements of a service, by descriptions of it, as the contract's and its own."""
     found: set[str] = set()
     for description in described:
         try:

@@ -4,10 +4,11 @@ import re
 
 import pytest
 
-from conformance.api.soap.observer import SoapObserver
+from conformance.checkers.soap import SoapCheckers
 from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.evidence import Judge
+from conformance.verdict.observers import Observers
 
 URL = "http://robot/ws"
 SPACE = "http://soap.turtlebot.mybot.org/"
@@ -21,7 +22,7 @@ FAULT = f"{OPEN}<s:Fault><faultcode>s:Client</faultcode><faultstring>no</faultst
 def broken(body: str, status: int, media_type: str = XML, version: str = "HTTP/1.1") -> set[str]:
     """Names of the requirements that an answer breaks."""
     judge = Judge(Contract.load().ledger)
-    observer = SoapObserver(judge, {URL: {f"{{{SPACE}}}GetGoalResponse"}})
+    observer = Observers(judge, [SoapCheckers({URL: {f"{{{SPACE}}}GetGoalResponse"}})])
     response = Response(status, (("Content-Type", media_type),), body.encode(), 1.0, version)
     observer.answered(Exchange(Request("POST", URL), response))
     return {id_.rpartition("/")[2] for id_, evidence in judge.evidence.items() if evidence.findings}

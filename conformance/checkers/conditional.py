@@ -1,0 +1,62 @@
+"""Conditions and ranges (RFC 9110 13, 14): 304 to whoever has a current copy alone, 206 to whoever asked for a part."""
+
+import re
+from collections.abc import Iterator
+from http import HTTPStatus
+
+from conformance.checkers.occasion import Occasion
+from conformance.verdict.case import Case
+
+_PART = re.compile(r"bytes (?P<first>\d+)-(?P<last>\d+)/", re.IGNORECASE)
+_TAG = re.compile(r'"[^"]*"')
+
+
+class Conditional:
+    """Judges the responses to conditions; what is current it knows from the entity tags and dates of the run."""
+
+    def __init__(self) -> None:
+        # By URL: the entity tags that were sent, and whether a time of change was.
+        self._tags: dict[str, set[str]] = {}
+        self._dated: set[str] = set()
+
+    def __call__(self, one: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        url, answer = one.request.url, one.response
+        # What comes with 304 may be what the client itself has sent.
+        if answer.status != HTTPStatus.NOT_MODIFIED:
+            self._tags.setdefault(url, set()).update(_TAG.findall(answer.header("etag") or ""))
+            if answer.header("last-modified") is not None:
+                self._dated.add(url)
+        asked = {name.lower(): value for name, value in one.request.headers}
+        yield from self._not_modified(one, asked)
+        if "range" in asked or answer.status == HTTPStatus.PARTIAL_CONTENT:
+            yield _range(one, asked)
+
+    def _not_modified(self, one: Occasion, asked: dict[str, str]) -> Iterator[Case]:
+        id_, is_unchanged = "http/preconditions", one.response.status == HTTPStatus.NOT_MODIFIED
+        tags = _TAG.findall(asked.get("if-none-match", ""))
+        if tags and asked["if-none-match"].strip() != "*":
+            expected = "another status than 304 when the robot never sent the entity tag"
+            has_sent = not self._tags.get(one.request.url, set()).isdisjoint(tags)
+            yield one.case(id_, has_sent or not is_unchanged, expected)
+        elif "if-modified-since" in asked and "if-none-match" not in asked:
+            # Where a robot says when something was changed, by whatever clock, that may have been longer ago.
+            expected = "another status than 304 when the resource has no Last-Modified"
+            yield one.case(id_, not is_unchanged or one.request.url in self._dated, expected)
+        elif is_unchanged and "if-none-match" not in asked:
+            yield one.case(id_, False, "another status than 304 for a request without a condition")  # noqa: FBT003
+
+
+def _range(one: Occasion, asked: dict[str, str]) -> Case:
+    """Judge a request for a part: the response is the whole, or 206 with its Content-Range."""
+    answer = one.response
+    # A server may send less than was asked for, or more, and then says so (RFC 9110 15.3.7).
+    part = _PART.match(answer.header("content-range") or "")
+    fits = part is not None and len(answer.body) == int(part["last"]) - int(part["first"]) + 1
+    fits |= one.context.is_head or answer.media_type == "multipart/byteranges"
+    return one.case(
+        "http/range",
+        answer.status != HTTPStatus.PARTIAL_CONTENT or ("range" in asked and fits),
+        "another status than 206, or a part that was asked for, and the header field Content-Range that fits it",
+        f"status 206 with {len(answer.body)} bytes and Content-Range: {answer.header('content-range')}",
+    )

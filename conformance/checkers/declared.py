@@ -1,0 +1,138 @@
+"""Whether the description declares a response for its operation: status, media type, schema, Vary."""
+
+from collections.abc import Iterator
+from http import HTTPStatus
+
+from conformance.api.rest.accept import quality
+from conformance.api.rest.statuses import is_cut_off
+from conformance.api.rest.validity import INVALID, VALID
+from conformance.checkers.occasion import Occasion
+from conformance.documents.json_schema import Schema, shape_of
+from conformance.documents.openapi import Operation, is_json, is_xml
+from conformance.documents.patterns import PatternError
+from conformance.documents.representation import UnreadableError, read
+from conformance.verdict.case import Case
+
+# RFC 9110 and RFC 6585 allow these for any request: authentication and rate. Another requirement judges 5xx.
+_ANY_REQUEST = frozenset({401, 429})
+# ... and these for a request that has more in it than method, path and Accept.
+_ODD_REQUEST = frozenset({400, 408, 411, 413, 414, 415, 417, 431})
+_OK, _NO_CONTENT, _ERROR, _NOT_FOUND, _NO_METHOD, _NOT_ACCEPTABLE, _SERVER_ERROR = 200, 204, 400, 404, 405, 406, 500
+
+
+def server_error(one: Occasion) -> Iterator[Case]:
+    """Judge a 5xx response: it is wrong for an invalid request, and undeclared for a valid one."""
+    status = one.response.status
+    if one.operation is None or status < _ERROR or not one.context.usual or is_cut_off(one.exchange):
+        return
+    said, crashed, retry = one.validity, status >= _SERVER_ERROR, ""
+    if status == HTTPStatus.SERVICE_UNAVAILABLE:
+        crashed, retry = one.response.header("retry-after") is None, " without Retry-After"
+    operation = said.operation.id if said.operation else one.request.method
+    for verdict, id_, expected in (
+        (INVALID, "http/no-server-error", f"a status below 500 for invalid input ({said.why})"),
+        (VALID, "http/declared-status", f"a status that the contract declares for {operation}"),
+    ):
+        if said.verdict == verdict and (crashed or verdict == INVALID):
+            yield one.case(id_, not crashed, expected, f"status {status}{retry}", cause=f"{status} {operation}")
+
+
+def status(one: Occasion) -> Iterator[Case]:
+    """Judge the status of a response below 500."""
+    operation = one.operation
+    if operation is not None and one.response.status < _SERVER_ERROR:
+        yield one.case(
+            "http/declared-status",
+            _status_fits(one, operation),
+            f"a status that the contract declares for {operation.id}: {', '.join(operation.responses)}",
+            f"status {one.response.status}",
+            cause=f"{operation.id} {one.response.status}",
+        )
+
+
+def _status_fits(one: Occasion, operation: Operation) -> bool:
+    status, context = one.response.status, one.context
+    if status in _ANY_REQUEST or operation.declared(status) is not None:
+        return True
+    if status == _OK and operation.declared(_NO_CONTENT) is not None:
+        return True  # a robot may send 200 instead of 204
+    if status == _NOT_ACCEPTABLE:
+        return context.accept not in {None, "*/*"}
+    if context.plain and not operation.parameters:
+        return False
+    if status in _ODD_REQUEST:
+        return True
+    # Invalid input may be refused with any 4xx (contract, fine print); 404 only where a value is in the path.
+    has_input = bool(one.request.body or operation.parameters or operation.bodies)
+    elsewhere = status == _NO_METHOD or (status == _NOT_FOUND and not operation.parameter("path"))
+    refused = has_input and _ERROR <= status < _SERVER_ERROR and not elsewhere
+    return refused and not (status != _NOT_FOUND and context.usual and one.is_valid)
+
+
+def body(one: Occasion) -> Iterator[Case]:
+    """Judge the body of a success by the schema of its operation."""
+    operation, answer = one.operation, one.response
+    content = operation.declared(answer.status) if operation and answer.ok and not one.context.is_head else None
+    if operation is None or not content:
+        return
+    media_type = answer.media_type
+    if not answer.body:
+        # Only GET must return a body: the response to a PUT need not repeat what it accepted.
+        if operation.method == "GET" and answer.status != _NO_CONTENT:
+            yield one.case("http/declared-body", False, f"a body as {' or '.join(content)}", "no body")  # noqa: FBT003
+        elif media_type in content and answer.status != _NO_CONTENT:
+            # It says that there is a document, and a client that asked for one reads it.
+            yield from _shape(one, operation, content[media_type])
+        return
+    yield one.case(
+        "http/declared-body",
+        media_type in content,
+        f"a body as {' or '.join(content)}",
+        f"a body as {media_type}" if media_type else "a body without Content-Type",
+        cause=f"{operation.id} {media_type}",
+    )
+    if media_type in content:
+        yield from _shape(one, operation, content[media_type])
+
+
+def _shape(one: Occasion, operation: Operation, schema: Schema) -> Iterator[Case]:
+    media_type = one.response.media_type
+    if is_json(media_type):
+        id_, kind = "http/declared-body", "JSON"
+    elif is_xml(media_type):
+        id_, kind = "rest-formats/xml", "XML"
+    elif media_type == "text/plain" and operation.shape is not None:
+        id_, kind, schema = "rest-formats/text", "YAML", operation.shape
+    else:
+        return
+    try:
+        problem = shape_of(schema).problem(read(media_type, one.response.body, schema))
+        fault = f"a body in which {problem}" if problem else ""
+    except PatternError:
+        return  # other checks tell that the schema cannot be judged
+    except UnreadableError as error:
+        fault = str(error)
+    cause = f"{operation.id} {kind} {fault.split(':', 1)[0]}"
+    yield one.case(id_, not fault, f"{kind} that is valid by the schema of {operation.id}", fault, cause=cause)
+
+
+def negotiation(one: Occasion) -> Iterator[Case]:
+    """Judge the format of a successful read by Accept, and Vary where there are several."""
+    operation, answer, context = one.operation, one.response, one.context
+    if operation is None or operation.method != "GET" or not answer.ok or not operation.formats:
+        return
+    if answer.media_type and context.usual:
+        # A format that q=0 rules out breaks another rule than a format that Accept does not name.
+        ruled_out = "q=0" in (context.accept or "").lower().replace(" ", "")
+        yield one.case(
+            "http/q-zero" if ruled_out else "http/not-acceptable",
+            quality(answer.media_type, context.accept) > 0,
+            f"an acceptable format or status 406 when Accept is {context.accept}",
+            f"status {answer.status} with {answer.media_type}",
+            cause="not acceptable",
+        )
+    if len(operation.formats) > 1 and not context.is_head:
+        vary = (answer.header("vary") or "").lower()
+        names_accept = "*" in vary or "accept" in [name.strip() for name in vary.split(",")]
+        found = f"Vary: {answer.header('vary')}" if vary else "no header field Vary"
+        yield one.case("rest-formats/vary", names_accept, "Vary: Accept", found)

@@ -1,0 +1,66 @@
+"""What an exchange is good for: computed once, from its bytes and the description, for all checkers of REST."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from conformance.api.rest.request_context import RequestContext
+from conformance.api.rest.validity import VALID, Validity, validity
+from conformance.contract.pack import Contract
+from conformance.documents.openapi import Operation
+from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.case import Case
+
+
+@dataclass(frozen=True)
+class Occasion:
+    """One exchange with the REST interface of a device.
+
+    Attributes:
+        contract: by which it is judged.
+        exchange: request and response.
+        context: what the contract says about the request.
+    """
+
+    contract: Contract
+    exchange: Exchange
+    context: RequestContext
+
+    @property
+    def request(self) -> Request:
+        """The request."""
+        return self.exchange.request
+
+    @property
+    def response(self) -> Response:
+        """The response."""
+        return self.exchange.response
+
+    @property
+    def operation(self) -> Operation | None:
+        """The operation that it is for, or None."""
+        return self.context.operation
+
+    @cached_property
+    def validity(self) -> Validity:
+        """What the contract says of parameters and body."""
+        request = self.request
+        return validity(self.contract, request.method, self.context.target, request.media_type, request.body)
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether the contract allows the request, so that nothing in it is a reason to refuse it."""
+        return self.validity.verdict == VALID
+
+    def case(
+        self,
+        requirement: str,
+        holds: bool,  # noqa: FBT001 - reads as a sentence: one.case(id, status < 500, ...)
+        expected: str,
+        found: str = "",
+        *,
+        cause: str = "",
+    ) -> Case:
+        """Return a case of a requirement; the arguments are as in Case."""
+        return Case(holds, self.exchange, expected, found, cause, requirement=requirement)

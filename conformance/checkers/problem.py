@@ -1,0 +1,108 @@
+"""The form of an error response: problem details (RFC 9457), and nothing of the program's inside."""
+
+import re
+from collections.abc import Iterator
+
+from conformance.api.rest.problem import JSON, XML, members_of
+from conformance.checkers.occasion import Occasion
+from conformance.documents.representation import UnreadableError, parse_xml
+from conformance.documents.resources import inside_prefix, is_normal
+from conformance.documents.traceback import inside_shown
+from conformance.transport.exchange import Response
+from conformance.verdict.case import Case
+
+# Methods that every server knows; a request with another one may never reach a resource.
+_STANDARD_METHODS = frozenset({"GET", "HEAD", "PUT", "POST", "DELETE", "OPTIONS", "PATCH"})
+_NAMESPACE = "urn:ietf:rfc:7807"
+# Statuses that servers, proxies and gateways send before a resource sees the request; and 401, which has its field.
+_TRANSPORT = frozenset({401, 407, 408, 411, 413, 414, 417, 421, 426, 429, 431})
+# What servers refuse in a path, because they and the application may read it differently: an encoded slash
+# (Apache), backslash, percent, control character, a parameter (Tomcat, Jetty, Spring's firewall).
+_AMBIGUOUS = re.compile(r"%(?:2f|5c|25|7f|[01][0-9a-f])|[;\\]", re.IGNORECASE)
+# The characters of a target (RFC 3986 3.3, 3.4); a target with any other one is malformed (RFC 9112 3.2).
+_TARGET = re.compile(r"(?:[A-Za-z0-9._~!$&'()*+,;=:@/?-]|%[0-9A-Fa-f]{2})*")
+_ERROR, _NOT_ACCEPTABLE, _SERVER_ERROR, _UNAVAILABLE = 400, 406, 500, 503
+
+
+def inside(one: Occasion) -> Iterator[Case]:
+    """Judge that an error shows nothing of the program."""
+    if one.response.status >= _ERROR:
+        shown = inside_shown(one.exchange)
+        expected, found = "an error that shows nothing of the program", f"{shown!r} in the response"
+        yield one.case("http/no-traceback", not shown, expected, found, cause="traceback")
+
+
+def form(one: Occasion) -> Iterator[Case]:
+    """Judge one response of 400 and above."""
+    status, context = one.response.status, one.context
+    if status < _ERROR or status in _TRANSPORT or not context.usual:
+        return
+    if status >= _SERVER_ERROR and (status != _UNAVAILABLE or context.operation is None):
+        return
+    media_type = one.response.media_type
+    if context.is_head and not media_type:
+        return
+    found = f"status {status} {f'as {media_type}' if media_type else 'without Content-Type'}"
+    if _by_server(one):
+        yield one.case(
+            "http/problem-type-server",
+            media_type in {JSON, XML},
+            f"an error as {JSON}, also where the web server generates it",
+            found,
+            cause=f"{status} {media_type}",
+        )
+        return
+    allowed = [JSON, *([XML] if context.names_xml or status == _NOT_ACCEPTABLE else [])]
+    yield one.case(
+        "http/problem-type",
+        media_type in allowed,
+        f"an error as {' or '.join(allowed)}",
+        found,
+        cause=f"{media_type} {context.operation.id if context.operation else 'elsewhere'}",
+    )
+    if context.likes_xml > context.likes_json and status != _NOT_ACCEPTABLE:
+        fault = "" if context.is_head or media_type != XML else _xml_fault(one.response)
+        yield one.case(
+            "rest-formats/problem-xml",
+            media_type == XML and not fault,
+            f"an error as {XML} when Accept prefers XML",
+            fault or found,
+            cause=fault or media_type,
+        )
+    if not context.is_head and media_type in {JSON, XML}:
+        yield _status(one)
+
+
+def _by_server(one: Occasion) -> bool:
+    """Return whether a server may have responded before any resource saw the request (contract, errors)."""
+    path = one.context.target.split("?", 1)[0]
+    return (
+        one.request.method not in _STANDARD_METHODS
+        or not is_normal(path)
+        or bool(_AMBIGUOUS.search(path))
+        or not _TARGET.fullmatch(one.context.target)
+        or not inside_prefix(one.contract, path)
+        or (one.response.status == _NOT_ACCEPTABLE and not one.response.body)
+    )
+
+
+def _xml_fault(answer: Response) -> str:
+    try:
+        root = parse_xml(answer.body)
+    except UnreadableError as error:
+        return str(error)
+    return "" if root.tag == f"{{{_NAMESPACE}}}problem" else f"the root element {root.tag}"
+
+
+def _status(one: Occasion) -> Case:
+    status, members = one.response.status, members_of(one.response)
+    stated = None if members is None else members.get("status")
+    missing = stated is None and members is not None
+    found = "a problem that cannot be read" if members is None else f"a problem whose status is {stated!r}"
+    return one.case(
+        "http/problem-status",
+        stated == status and not isinstance(stated, bool),
+        f"a problem whose status is that of the response, {status}",
+        "a problem without status" if missing else found,
+        cause="missing" if missing else type(stated).__name__,
+    )

@@ -1,0 +1,52 @@
+"""All checkers of REST, over the exchanges of a run one after another."""
+
+from collections.abc import Iterable, Iterator
+from typing import Final
+
+from conformance.api.rest.request_context import RequestContext
+from conformance.checkers import conditional, content, declared, fields, problem, refusals
+from conformance.checkers.occasion import Occasion
+from conformance.contract.pack import Contract
+from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
+from conformance.verdict.case import Case
+
+# Those that judge any response; those that judge what the description may say of it.
+_ANY: Final = (fields.framing, fields.content_type, fields.once, fields.date, fields.formats)
+_DOCUMENTS: Final = (
+    content.json, content.charset, problem.inside, problem.form, refusals.allow, refusals.challenge,
+    declared.server_error, declared.status, declared.body, declared.negotiation,
+)  # fmt: skip
+
+
+class RestCheckers:
+    """Judges each exchange with a REST interface, whoever sent it.
+
+    Args:
+        contract: by which it is judged.
+        base_url: of the interface.
+        elsewhere: URLs below it that belong to other interfaces.
+    """
+
+    def __init__(self, contract: Contract, base_url: str, elsewhere: Iterable[str] = ()) -> None:
+        self._contract, self._base_url = contract, base_url
+        self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
+        self._conditional = conditional.Conditional()
+
+    def __call__(self, attempt: Attempt) -> Iterator[Case]:
+        """Yield the cases of one exchange; none if it went to another interface."""
+        if attempt.request.url.split("?", 1)[0] in self._elsewhere:
+            return
+        context = RequestContext.of(self._contract, self._base_url, attempt.request)
+        if context is None:
+            return
+        if isinstance(attempt, Unanswered):
+            # A malformed request may be answered in any way.
+            if context.usual and attempt.kind is NoAnswer.MALFORMED:
+                yield Case(False, attempt, fields.WELL_FRAMED, attempt.problem, requirement="http/framing")  # noqa: FBT003
+            return
+        one = Occasion(self._contract, attempt, context)
+        for check in _ANY:
+            yield from check(one)
+        yield from self._conditional(one)
+        for check in () if context.is_own_of(attempt.response) else _DOCUMENTS:
+            yield from check(one)

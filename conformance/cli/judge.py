@@ -1,0 +1,116 @@
+"""``roaas judge``: judge a stored run again, without the device."""
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from conformance.cli.stored_contract import contract_of
+from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.result_command import CommandResult, ResultCommand
+from conformance.commandline.terminal import inert
+from conformance.engine.stored_result import MALFORMED, StoredResultError, not_well_made, read_result
+from conformance.statement.statement import StatementError, empty_statement, load_statement
+from conformance.verdict.finding import counted
+
+if TYPE_CHECKING:
+    from conformance.engine.judging import Judged
+    from conformance.verdict.verdicts import Verdict
+
+_FAIL = "fail"
+_BROKEN = frozenset({_FAIL, "warn"})
+
+
+@click.command(cls=ResultCommand)
+@click.argument("result", type=click.Path(exists=True, path_type=Path))
+@click.argument("requirement", required=False)
+@click.option(
+    "--statement",
+    "statement_file",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="The robot's statement, as it is now: limits and the motion map that the run was judged by.",
+)
+@click.option(
+    "--contract",
+    "pack",
+    metavar="PACK",
+    help="Folder of the contract pack, if the result's pack is not installed; its code is run.",
+)
+def judge(result: Path, requirement: str | None, statement_file: Path | None, pack: str | None) -> CommandResult:
+    """Judge again what a run sent and saw, by this version's rules. Nothing is sent.
+
+    RESULT is a result.json, or its folder, with the history of the run; also that of a run that was killed.
+    REQUIREMENT is an id such as http/date; by default all. Only what the history shows is judged: a requirement that
+    needs an experiment keeps its verdict of the run, and is not told.
+
+    Exit code: 0 all that was judged holds, 1 something fails, 2 usage, 4 nothing could be judged.
+    """
+    folder = result if result.is_dir() else result.parent
+    try:
+        document = read_result(result / "result.json" if result.is_dir() else result)
+        judged = _judged(document, folder, statement_file, pack)
+    except (StoredResultError, StatementError) as error:
+        raise click.UsageError(str(error)) from error
+    except MALFORMED as error:
+        raise click.UsageError(str(not_well_made(result, error))) from error
+    before = {one["id"]: one for one in document["requirements"]}
+    chosen = judged.verdicts
+    if requirement:
+        known = {alias: id_ for id_, one in before.items() for alias in one.get("aliases", ())}
+        chosen = tuple(one for one in chosen if one.requirement.id == known.get(requirement, requirement))
+    for one in chosen:
+        then = str(before.get(one.requirement.id, {}).get("verdict", "not judged"))
+        if requirement or one.value in _BROKEN or then in _BROKEN:
+            click.echo(f"{one.value}: {one.requirement.id} ({counted(one.evidence.cases, 'case')}{_then(one, then)})")
+            for finding in one.evidence.findings.values():
+                click.echo(f"  {inert(finding.text)}")
+    click.echo(_summary(judged, chosen))
+    for fault in judged.faults:
+        click.echo(inert(fault), err=True)
+    if not chosen:
+        return CommandResult(ExitCode.INCONCLUSIVE)
+    return CommandResult(ExitCode.FAILED if any(one.value == _FAIL for one in chosen) else ExitCode.PASSED)
+
+
+def _then(one: "Verdict", then: str) -> str:
+    """Return how the run had judged, where that differs."""
+    if one.value == then:
+        return ""
+    alone = then in _BROKEN and one.value not in _BROKEN
+    return f"; in the run: {inert(then)}{', by what only the device can show again' if alone else ''}"
+
+
+def _summary(judged: "Judged", chosen: tuple["Verdict", ...]) -> str:
+    told = f"{counted(judged.requests, 'request')} in the history{'' if judged.ended else ', which was cut short'}"
+    if not chosen:
+        return f"nothing judged: {told}, and none of them and no trace shows it"
+    values = Counter(str(one.value) for one in chosen)
+    cases = sum(one.evidence.cases for one in chosen)
+    kinds = ", ".join(f"{number} {value}" for value, number in sorted(values.items()))
+    return f"{kinds}, of {counted(len(chosen), 'requirement')} that this run shows ({counted(cases, 'case')}; {told})"
+
+
+def _judged(document: dict[str, Any], folder: Path, statement_file: Path | None, pack: str | None) -> "Judged":
+    """Judge what is in the folder.
+
+    Raises:
+        click.UsageError: the contract is not at hand, or the history or the traces cannot be read.
+        StatementError: the statement is invalid.
+    """
+    # Imported here, so that --help stays quick.
+    from conformance.engine.judging import judge_stored  # noqa: PLC0415
+    from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
+    from conformance.history.reading import HistoryError  # noqa: PLC0415
+    from conformance.scenarios.stored import TracesError  # noqa: PLC0415
+    from conformance.verdict.run import Run  # noqa: PLC0415
+
+    contract = contract_of(document, pack, folder)
+    if contract is None:
+        raise click.UsageError("the result is by a contract that is not at hand: name its pack with --contract")
+    statement = load_statement(statement_file, contract) if statement_file else empty_statement(contract)
+    run = Run(statement, contract, claims=tuple(contract.classes), allow_motion=True)
+    try:
+        return judge_stored(RobotUnderTest(run), document["target"], folder)
+    except (HistoryError, TracesError) as error:
+        raise click.UsageError(str(error)) from error

@@ -1,0 +1,143 @@
+"""``roaas judge``: judge what a run left, its history and its traces, by the present rules, without the device."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from conformance.api.rest.interface import RestInterface
+from conformance.api.soap.address import split
+from conformance.api.soap.service import SoapService
+from conformance.checkers.rest import RestCheckers
+from conformance.checkers.soap import SoapCheckers, answers_of
+from conformance.contract.interfaces import Interface
+from conformance.engine.certification import draw_verdicts
+from conformance.engine.planning import collected
+from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.history.events import Ended, Sent, Span, Withdrawn
+from conformance.history.reading import read_history
+from conformance.history.writing import HISTORY_NAME
+from conformance.scenarios.rule import Rule, record
+from conformance.scenarios.scenario import Scenario
+from conformance.scenarios.stored import TRACES_NAME, read_traces
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import Attempt, Exchange, Listener
+from conformance.transport.parallel import is_busy
+from conformance.transport.passage import Heard
+from conformance.verdict.case import Checker
+from conformance.verdict.evidence import Judge
+from conformance.verdict.observers import Observers
+from conformance.verdict.verdicts import Verdict
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What came of it.
+
+    Attributes:
+        verdicts: those with a case, in the ledger's order.
+        requests: the requests in the history.
+        ended: whether the history is whole: the run was not killed.
+        faults: what could not be judged, because of an error of the suite.
+    """
+
+    verdicts: tuple[Verdict, ...]
+    requests: int
+    ended: bool
+    faults: tuple[str, ...]
+
+
+def judge_stored(robot: RobotUnderTest, target: Mapping[str, Any], folder: Path) -> Judged:
+    """Judge the history and the traces in a result's folder; at least one of them has to be there.
+
+    Args:
+        robot: with statement and contract; it is not asked.
+        target: the addresses of the run, as in result.json.
+        folder: of the result.
+
+    Raises:
+        HistoryError, TracesError: one of the files cannot be read, or neither is there.
+    """
+    run, requests, ended = robot.run, 0, True
+    there = {name for name in (HISTORY_NAME, TRACES_NAME) if (folder / name).exists()}
+    if HISTORY_NAME in there or not there:
+        requests, ended = _judge_history(robot, target, folder / HISTORY_NAME)
+    if TRACES_NAME in there:
+        _judge_traces(robot, folder)
+    for evidence in run.judge.evidence.values():
+        # A part that takes an experiment is the run's affair.
+        evidence.parts = {part: cases for part, cases in evidence.parts.items() if cases}
+    verdicts, _ = draw_verdicts(run)
+    judged = tuple(one for one in verdicts if one.evidence.cases)
+    return Judged(judged, requests, ended, tuple(run.judge.faults))
+
+
+def _judge_history(robot: RobotUnderTest, target: Mapping[str, Any], path: Path) -> tuple[int, bool]:
+    """Judge each exchange as in the run; return how many requests there are, and whether the run ended."""
+    events, judge = list(read_history(path)), robot.run.judge
+    withdrawn = {event.id for event in events if isinstance(event, Withdrawn)}
+    listeners, requests = list(_listeners(robot, target)), 0
+    for event in events:
+        if isinstance(event, Span):
+            judge.begin(event.name)
+        elif isinstance(event, Sent):
+            requests += 1
+            outcome = None if event.id in withdrawn else event.outcome
+            if outcome is not None and _is_heard(event, outcome):
+                _tell(judge, listeners, outcome)
+    return requests, bool(events) and isinstance(events[-1], Ended)
+
+
+def _is_heard(event: Sent, outcome: Attempt) -> bool:
+    return event.heard is Heard.ALWAYS or (event.heard is Heard.UNLESS_BUSY and not is_busy(outcome))
+
+
+def _tell(judge: Judge, listeners: list[Listener], outcome: Attempt) -> None:
+    judge.sent(outcome.request)
+    for listener in listeners:
+        if isinstance(outcome, Exchange):
+            listener.answered(outcome)
+        else:
+            listener.unanswered(outcome)
+
+
+def _listeners(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[Listener]:
+    """Yield what judges the exchanges of a run, whichever check sent them."""
+    run, services = robot.run, list(_services(robot, target))
+    checkers: list[Checker] = []
+    if rest := target.get("rest"):
+        api = RestInterface(run, HttpClient(str(rest), Connection()))
+        yield from api.device.observers(api)
+        checkers.append(RestCheckers(run.contract, api.client.base_url, [one.endpoint for one in services]))
+    if services:
+        checkers.append(SoapCheckers({one.endpoint: answers_of(one.contract) for one in services}))
+    yield Observers(run.judge, checkers)
+
+
+def _services(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[SoapService]:
+    """Yield the SOAP services of a contract that names them, as the run had them."""
+    contract = robot.run.contract
+    for name, path in (
+        (Interface.PUBLISHERS, contract.publishers_path),
+        (Interface.SUBSCRIBERS, contract.subscribers_path),
+    ):
+        if path and (endpoint := target.get(f"{name}_endpoint")):
+            base, below = split(str(endpoint))
+            yield SoapService(name, HttpClient(base, Connection()), below, contract_wsdl_path=path)
+
+
+def _judge_traces(robot: RobotUnderTest, folder: Path) -> None:
+    """Judge the traces of scenarios by the contract's rules."""
+    rules: list[tuple[Rule, Scenario]] = []
+    for item in collected(robot):
+        mark = item.get_closest_marker("rule")
+        if mark is not None:
+            rules.append(mark.args)
+    recordings = read_traces(folder / TRACES_NAME, [scenario for _, scenario in rules])
+    run = robot.run
+    moves = run.statement.motion_map
+    known: dict[str, Any] = {"run": run, "statement": run.statement, "effort": run.effort, "motion": moves}
+    for rule, scenario in rules:
+        recording = recordings.played.get(scenario.name)
+        if recording is not None and (moves or "motion" not in rule.fixtures):
+            record(run.judge, rule.requirement, rule.outcomes(recording.trace, known.__getitem__))

@@ -1,0 +1,119 @@
+"""`roaas judge`: a stored run is judged as it was judged, also where it was cut short, and nothing is sent."""
+
+import asyncio
+import itertools
+import json
+import signal
+import subprocess
+import sys
+
+import pytest
+from aiohttp import web
+from processes import ended
+from small_device import certified, described, reading, small_device
+
+from conformance.history.reading import read_history
+from conformance.history.writing import HISTORY_NAME, HistoryWriter
+from conformance.transport.exchange import Request, Response
+from conformance.transport.passage import Heard, Passage
+
+_STATE = {"type": "object", "required": ["on"], "properties": {"on": {"type": "boolean"}}}
+# What the rules for every response say of this device.
+_WRONG = {"http/date-format": "fail", "http/json-unique-names": "warn"}
+
+
+@pytest.fixture(name="run", scope="module")
+def _run(tmp_path_factory):
+    """Certify a device that is wrong in one response of three; return the folder and what the run said."""
+    out, turns = tmp_path_factory.mktemp("run") / "out", itertools.count(1)
+
+    async def state(_):
+        is_wrong = next(turns) % 3 == 0
+        headers = {"Last-Modified": "yesterday"} if is_wrong else {}
+        body = b'{"on": true, "on": false}' if is_wrong else b'{"on": true}'
+        return web.Response(body=body, content_type="application/json", headers=headers)
+
+    with small_device(described({"/state": reading(_STATE)}), {"/state": {"GET": state}}) as url:
+        done = certified(url, out)
+    return out, done
+
+
+def _judged(out, *arguments):
+    done = ended(sys.executable, "-m", "roaas", "judge", out, *arguments)
+    assert "Traceback" not in done.stderr, done.stderr
+    return done.returncode, done.stdout
+
+
+def _line(text, requirement):
+    return next(line for line in text.splitlines() if f": {requirement} (" in line)
+
+
+def test_verdicts_cases_and_causes_are_those_of_the_run(run):
+    out, done = run
+    before = {one["id"]: one for one in done.result["requirements"]}
+    code, text = _judged(out)
+    assert code == 1, text
+    for id_, value in _WRONG.items():
+        one = before[id_]
+        assert one["verdict"] == value, done.text
+        assert _line(text, id_).startswith(f"{value}: {id_} ({one['cases']} case"), (text, one)
+        for failure in one["failures"]:
+            assert failure["message"].split(". Expected")[0] in text
+    assert f"{done.result['requests']} requests in the history" in text.replace(",", "")
+
+
+def test_one_requirement_is_told_by_its_id(run):
+    code, text = _judged(run[0], "http/field-once")
+    assert (code, text.splitlines()[0].startswith("pass: http/field-once (")) == (0, True)
+    code, text = _judged(run[0], "http/head-no-body")
+    assert (code, text.startswith("nothing judged: ")) == (4, True)
+
+
+def test_a_run_that_was_killed_is_judged_up_to_then(tmp_path):
+    turns = itertools.count(1)
+
+    async def state(_):
+        if next(turns) == 60:
+            process.send_signal(signal.SIGKILL)
+        await asyncio.sleep(0.02)  # so that a good part of the history is written
+        return web.json_response({"on": True}, headers={"Last-Modified": "yesterday"})
+
+    with small_device(described({"/state": reading(_STATE)}), {"/state": {"GET": state}}) as url:
+        command = [sys.executable, "-m", "roaas", "certify", f"{url}/openapi.json", "--out", tmp_path / "out"]
+        with subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+            assert process.wait(120) == -signal.SIGKILL
+    code, text = _judged(tmp_path / "out")
+    assert (code, "fail: http/date-format" in text, "which was cut short" in text) == (1, True, True), text
+
+
+def _stored(out, passages, *, withdrawn=()):
+    writer = HistoryWriter(out, "1", "2026-11-28T00:00:00.000000Z")
+    numbers = [writer.record(one) for one in passages]
+    for number in withdrawn:
+        writer.withdraw(numbers[number])
+    writer.close()
+
+
+def test_what_no_check_listened_to_is_not_judged(run, tmp_path):
+    out, done = run
+    (tmp_path / "description").symlink_to(out / "description")
+    (tmp_path / "result.json").write_text(json.dumps(done.result))
+    request = Request("GET", f"{done.result['target']['rest']}/state", (("Host", "a"), ("Accept", "*/*")))
+    wrong, busy = (
+        Response(status, (("Last-Modified", "yesterday"),), b"", 1.0, received_s=1.0) for status in (200, 503)
+    )
+
+    def passage(response, heard=Heard.ALWAYS):
+        return Passage(request, 1, 1, 1, 1.0, 1.0, 1.0, 10.0, response, heard=heard)
+
+    for passages, withdrawn, expected in (
+        ([passage(wrong)], (), 1),
+        ([passage(wrong)], (0,), 4),
+        ([passage(wrong, Heard.NEVER)], (), 4),
+        ([passage(busy, Heard.UNLESS_BUSY)], (), 4),
+        ([passage(wrong, Heard.UNLESS_BUSY)], (), 1),
+    ):
+        _stored(tmp_path, passages, withdrawn=withdrawn)
+        assert len(list(read_history(tmp_path / HISTORY_NAME))) == 2 + len(passages) + len(withdrawn)
+        code, text = _judged(tmp_path, "http/date-format")
+        assert code == expected, (passages, text)
