@@ -1,10 +1,11 @@
 """Whether a robot rests and a result is there, however and whenever a run ends.
 
 ``python benchmarks/endings.py --robot reference --moments 30`` certifies the robot again and again with --allow-motion,
-and ends each run at a moment inside it: by SIGINT, SIGTERM, SIGHUP, closed pipes, its parent's death, or kill -9. For
-every second moment it waits until it has seen the robot moving a random number of times (``SEEN_S`` apart), for the
-others until the run has sent a random number of requests. Three runs of five are whole, the others claim only the
-class whose checks move the robot. Exit code 0: at rest with a readable result after all of them; 1 otherwise.
+and interrupts each run at a moment inside it: by SIGINT, SIGTERM, SIGHUP, its parent's death, or kill -9. After each
+five of these, stdout and stderr of one more run are closed, which must not end it. For every second moment it waits
+until it has seen the robot moving a random number of times (``SEEN_S`` apart), for the others until the run has sent a
+random number of requests. Three runs of five are whole, the others claim only the class whose checks move the robot.
+Exit code 0: at rest with a readable result after all of them, and no closed run interrupted; 1 otherwise.
 """
 
 import argparse
@@ -24,7 +25,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
 from programs import machine, started
@@ -37,7 +38,8 @@ sys.path[:0] = [str(Path(__file__).parents[1] / "tests" / folder) for folder in 
 from moving_device import DESCRIPTION, MAP, Mover  # noqa: E402 - found by the path above
 from small_device import small_device  # noqa: E402 - as above
 
-HOWS = ("SIGINT", "SIGTERM", "SIGHUP", "closed pipes", "parent killed", "kill -9")
+CLOSED = "closed pipes"
+HOWS = ("SIGINT", "SIGTERM", "SIGHUP", "parent killed", "kill -9", CLOSED)
 SEEN_S = 0.02
 _CERTIFY = (sys.executable, "-m", "roaas", "certify", "--allow-motion", "--effort", "quick", "--out")
 _PARENT = "import subprocess, sys; p = subprocess.Popen(sys.argv[1:]); print(p.pid, flush=True); p.wait()"
@@ -100,12 +102,13 @@ class Small:
 
 
 class Ended(NamedTuple):
-    """How one run was ended and what was left: whether it was inside the run, and whether the robot moved then."""
+    """How one run was ended and what was left: whether the robot moved then, and whether the run is incomplete."""
 
     inside: bool
     moved: bool
     rests: bool
     readable: bool
+    interrupted: bool
     requests: int
     seen: int
 
@@ -129,12 +132,14 @@ def run_once(robot: Reference | Small, how: str, options: tuple[str, ...], out: 
         inside = process.poll() is None
         if inside and how.startswith("SIG"):
             process.send_signal(signal.Signals[how])
-        elif inside and how != "closed pipes":
+        elif inside and how != CLOSED:
             process.kill()
         process.stdout.close()
         while _lives(process, pid):
             time.sleep(0.1)
-    return Ended(inside, moving, _comes_to_rest(robot), _is_readable(out), robot.requests - before, seen)
+    rests, result = _comes_to_rest(robot), _result(out)
+    interrupted = inside and result.get("interrupted", True)
+    return Ended(inside, moving, rests, bool(result), interrupted, robot.requests - before, seen)
 
 
 def _lives(process: subprocess.Popen[bytes], pid: int) -> bool:
@@ -155,10 +160,11 @@ def _comes_to_rest(robot: Reference | Small) -> bool:
     return not moves
 
 
-def _is_readable(out: Path) -> bool:
+def _result(out: Path) -> dict[str, Any]:
+    """Return the result; {} if there is none that can be read."""
     with contextlib.suppress(ReportError):
-        return bool(read_result(out / "result.json"))
-    return False
+        return read_result(out / "result.json")
+    return {}
 
 
 @contextlib.contextmanager
@@ -188,23 +194,26 @@ def main() -> int:
         usual = {kind: run_once(robot, "", more, Path(name, kind)) for kind, more in kinds.items()}
         for kind, run in usual.items():
             print(f"{kind}, not ended: {run.requests} requests, seen moving {run.seen} times, {machine()}", flush=True)
-        for number in range(chosen.moments):
+        for number in range(chosen.moments * len(HOWS) // (len(HOWS) - 1)):
             how, turn = HOWS[number % len(HOWS)], number // len(HOWS)
             kind = list(kinds)[turn // 2 % 2]
             what = "seen" if (number + turn) % 2 else "requests"
             most = getattr(usual[kind], what)
-            end = Ended(*[False] * 4, 0, 0)
-            while not end.inside:  # a run may be shorter than the one before
+            end = Ended(*[False] * 5, 0, 0)
+            while not (end.inside if how == CLOSED else end.interrupted):  # a run may be shorter than the one before
                 moment = chance.randint(1, most)
                 end = run_once(robot, how, kinds[kind], Path(name, f"out{number}"), **{what: moment})
             ends.append(end)
             where = f"{moment} of {most} {'requests' if what == 'requests' else 'times that it was seen moving'}"
             left = f"at rest {end.rests}, readable {end.readable}, moving when hit {end.moved}"
+            left += f", interrupted {end.interrupted}" * (how == CLOSED)
             print(f"{number + 1} {how}, {kind}, after {where}: {left}", flush=True)
-    rests, readable, moved = (sum(getattr(end, of) for end in ends) for of in ("rests", "readable", "moved"))
+    names = ("rests", "readable", "moved", "interrupted")
+    rests, readable, moved, interrupted = (sum(getattr(end, name) for end in ends) for name in names)
     count = len(ends)
-    print(f"at rest {rests} of {count}, readable {readable} of {count}, moving when hit {moved}")
-    return int(not rests == readable == count)
+    print(f"interrupted {interrupted} of {count}, moving when hit {moved}")
+    print(f"at rest {rests} of {count}, readable {readable} of {count}")
+    return int(not (rests == readable == count and interrupted == chosen.moments))
 
 
 if __name__ == "__main__":
