@@ -107,7 +107,7 @@ def echoing_device(user: str = "", password: str = "", token: str = "") -> Itera
 
     def guarded(answer: Any) -> Any:
         async def handle(request: web.Request) -> web.StreamResponse:
-            if user and not _authenticated(request, user, password):
+            if user and not authenticated(request, user, password):
                 challenge = 'Digest realm="lab", nonce="dcd98b7102dd", qop="auth", algorithm=MD5'
                 return web.json_response(
                     {"error": _sent(request, b"")}, status=401, headers={"WWW-Authenticate": challenge}
@@ -133,7 +133,7 @@ def echoing_device(user: str = "", password: str = "", token: str = "") -> Itera
         yield url
 
 
-def _authenticated(request: web.Request, user: str, password: str) -> bool:
+def authenticated(request: web.Request, user: str, password: str) -> bool:
     given = dict(re.findall(r'(\w+)="?([^",]+)', request.headers.get("Authorization", "")))
     if "response" not in given:
         return False

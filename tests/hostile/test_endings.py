@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from aiohttp import web
+from echoing_device import authenticated
 from moving_device import DESCRIPTION, MAP, Mover
 from processes import ended
 from small_device import REFUSED, answers, described, error, reading, small_device
@@ -275,6 +276,33 @@ def test_a_guard_stops_the_device_unless_that_is_done(told, tmp_path):
     server.server_close()
     assert len(server.stops) >= told.stops
     assert {*server.stops} == ({("/v", b"0")} if told.stops else set())
+
+
+def test_a_guard_answers_the_challenges_of_a_device_that_takes_each_once():
+    stops, nonces = [], []
+
+    async def stop(request):
+        if authenticated(request, "operator", "s3cret") and nonces and nonces[-1] in request.headers["Authorization"]:
+            stops.append(await request.read())
+        else:
+            nonces.append(f"n{len(nonces)}x")
+            challenge = f'Digest realm="lab", nonce="{nonces[-1]}", qop="auth,auth-int", opaque="o"'
+            return web.Response(status=401, headers={"WWW-Authenticate": challenge})
+        nonces.append("used")
+        return web.Response(status=204)
+
+    with small_device({}, {"/stop": {"POST": stop}}) as url:
+        request = b"POST /stop HTTP/1.1\r\nHost: x\r\nAuthorization: Digest old\r\nContent-Length: 1\r\n\r\n0"
+        told = {
+            "host": "127.0.0.1",
+            "port": int(url.rpartition(":")[2]),
+            "tls": None,
+            "request": base64.b64encode(request).decode(),
+            "digest": ["operator:s3cret", sys.path],
+        }
+        given = json.dumps({"stops": [told], "login": None, "for_s": 60, "deadline_s": 10}) + "\n"
+        ended(sys.executable, "-I", "-S", _GUARD, input=given, check=True)
+    assert stops == [b"0"] * 3
 
 
 def _load(folder: Path, url: str) -> subprocess.Popen[str]:

@@ -153,8 +153,9 @@ def _told_of(draft: Draft) -> dict[str, Any]:
     }
 
 
-def _digest_user(draft: Draft) -> str | None:
-    """Return the user and the password with which the process answers the challenges to a request, if it may."""
+def _digest_user(draft: Draft) -> tuple[str, list[str]] | None:
+    """Return with what the process answers the challenges to a request, if it may: user:password, and our modules."""
     connection = draft.client.connection
     users = (one.secret for one in connection.credentials.items if one.kind is Kind.DIGEST)
-    return next(users, None) if connection.may_authorize(draft.client.base_url) else None
+    user = next(users, None) if connection.may_authorize(draft.client.base_url) else None
+    return None if user is None else (user, sys.path)

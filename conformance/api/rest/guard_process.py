@@ -1,8 +1,11 @@
 """Stop a device when the process that moved it has ended: ``python -I -S guard_process.py``.
 
 Standard input has a JSON document in each line; the newest says how the device is stopped. The line ``done`` ends this
-process. When standard input ends without it, the stops are sent. The suite is not imported: this starts in hundredths
-of a second, and takes little memory.
+process. When standard input ends without it, the stops are sent. The suite is not imported before a device sends a
+challenge of digest authentication: this starts in hundredths of a second, and takes little memory.
+
+Over 150 lines because a device may demand TLS, a client certificate, a new login or the answer to a challenge before it
+takes a stop, and because a stop that came too early, or that the device did not take, is sent again.
 """
 
 from __future__ import annotations
@@ -37,8 +40,6 @@ _LONGEST_HEAD = 65_536
 _REFUSALS = frozenset({401, 403, 407, 423, 428})
 _LONGEST_LOGIN = 1 << 20
 _UNAUTHORIZED = 401
-# The hashes of digest authentication that the suite's client knows (RFC 7616 6.1).
-_HASHES = {"MD5": "md5", "SHA": "sha1", "SHA-256": "sha256", "SHA-512": "sha512"}
 
 
 @contextlib.contextmanager
@@ -80,43 +81,21 @@ def _response(stop: dict[str, Any], contexts: Contexts, deadline_s: float) -> tu
 
 
 def _answer(stop: dict[str, Any], head: str) -> bool:
-    """Put the answer to a challenge (RFC 7616 3.4) into a stop; return whether there is one that can be answered."""
-    import hashlib  # noqa: PLC0415 - they are seldom needed, and take longer than everything else here
-    import re  # noqa: PLC0415
+    """Put the answer to a challenge of digest authentication into a stop; return whether there is one."""
+    pair, sys.path[:] = stop["digest"]
+    import re  # noqa: PLC0415 - they are seldom needed, and take longer than everything else here
 
-    offers = ", ".join(re.findall(r"(?im)^www-authenticate:(.*)$", head))
-    for offer in re.split(r"(?i)\bdigest\s+", offers)[1:]:
-        pairs = re.findall(r'([\w-]+)\s*=\s*(?:"([^"]*)"|([^\s,"]+))', offer)
-        given = {name.lower(): quoted or plain for name, quoted, plain in pairs}
-        algorithm = given.get("algorithm", "MD5")
-        name = _HASHES.get(algorithm.upper().removesuffix("-SESS"))
-        qop = [one for one in given.get("qop", "").split(",") if one.strip() == "auth"]
-        if name is None or not {"realm", "nonce"} <= given.keys() or ("qop" in given and not qop):
-            continue
+    from conformance.transport.digest import DigestUser  # noqa: PLC0415 - as above
 
-        def hashed(*texts: str, name: str = name) -> str:
-            return hashlib.new(name, ":".join(texts).encode(), usedforsecurity=False).hexdigest()
-
-        before, blank, body = base64.b64decode(stop["request"]).partition(b"\r\n\r\n")
-        start, *fields = before.split(b"\r\n")
-        method, target = start.decode("latin-1").split(" ")[:2]
-        user, _, password = stop["digest"].partition(":")
-        nonce, cnonce = given["nonce"], os.urandom(8).hex()
-        secret = hashed(user, given["realm"], password)
-        if algorithm.upper().endswith("-SESS"):
-            secret = hashed(secret, nonce, cnonce)
-        use = ("00000001", cnonce, "auth") if qop else ()
-        words = {"username": user, "realm": given["realm"], "nonce": nonce, "uri": target}
-        words |= {"response": hashed(secret, nonce, *use, hashed(method, target))}
-        words |= {key: given[key] for key in ("opaque",) if key in given}
-        field = ", ".join(f'{key}="{value}"' for key, value in words.items())
-        field += f", algorithm={algorithm}" if "algorithm" in given else ""
-        field += f', qop=auth, nc={use[0]}, cnonce="{cnonce}"' if use else ""
-        fields = [one for one in fields if not one.lower().startswith(b"authorization:")]
-        request = b"\r\n".join([start, f"Authorization: Digest {field}".encode(), *fields]) + blank + body
-        stop["request"] = base64.b64encode(request).decode()
-        return True
-    return False
+    user = DigestUser(pair)
+    if not user.learn(re.findall(r"(?im)^(www-authenticate):(.*)$", head)):
+        return False
+    before, blank, body = base64.b64decode(stop["request"]).partition(b"\r\n\r\n")
+    start, *fields = before.split(b"\r\n")
+    field = f"Authorization: {user.answer(*start.decode('latin-1').split(' ')[:2])}".encode()
+    fields = [one for one in fields if not one.lower().startswith(b"authorization:")]
+    stop["request"] = base64.b64encode(b"\r\n".join([start, field, *fields]) + blank + body).decode()
+    return True
 
 
 def _log_in(told: dict[str, Any], contexts: Contexts) -> None:
