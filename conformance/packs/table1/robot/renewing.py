@@ -71,6 +71,10 @@ class Renewing:
         connection = self._robot.rest.connection
         connection.sent += len(self.commands)
         connection.note("PUT")
+        # Not while they are sent: to judge takes time, and the next one has its moment.
+        for command in self.commands:
+            for listener in connection.listeners:
+                listener.answered(command.exchange)
 
     @property
     def is_crowded(self) -> bool:

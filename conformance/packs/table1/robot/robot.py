@@ -22,6 +22,7 @@ from conformance.packs.table1.robot.message_shapes import GOAL, ODOMETRY, TWIST,
 from conformance.packs.table1.statement import said_of
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
+from conformance.transport.passage import Heard
 
 POSE: Final = "/robot/pose/"
 VELOCITY: Final = "/robot/velocity/"
@@ -134,9 +135,9 @@ class Robot:
         self.watchfulness = 0.5 if api.run.effort.name == "quick" else 1.0
 
     def apart(self) -> Robot:
-        """Return the robot for another thread, with connections of its own and without listeners; to be closed."""
+        """Return the robot for another thread, with its own connections, to be closed; the caller tells listeners."""
         other = copy(self)
-        settings = self.rest.connection.unheard(request_rate=None, resent=0)
+        settings = self.rest.connection.unheard(heard=Heard.ALWAYS, request_rate=None, resent=0)
         other.rest = HttpClient(self.rest.base_url, settings)
         return other
 

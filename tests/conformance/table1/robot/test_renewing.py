@@ -18,6 +18,7 @@ from conformance.packs.table1.robot.robot import LINEAR, Robot, Velocity
 from conformance.packs.table1.robot.robot import STILL as STILL_VELOCITY
 from conformance.packs.table1.statement import Statement
 from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import Listener
 from conformance.verdict.run import Run
 
 _HOLD_S, _SLOW_S = 0.4, 0.15
@@ -99,6 +100,19 @@ def test_a_velocity_is_held_while_something_else_is_read(body, drive):
     with drive.held(_WANTED):
         assert any(body.puts > 3 for _ in poll_for(drive.clock, 0.02, 10.0))
     assert sum(one.renewal for one in drive.trace.commands) == body.puts - 1
+
+
+def test_each_renewal_is_told_when_they_are_over(body, drive):
+    told = []
+
+    class Listens(Listener):
+        def answered(self, exchange):
+            told.append(exchange.request.method)
+
+    drive.robot.rest.connection.listeners.append(Listens())
+    with drive.held(_WANTED):
+        assert any(body.puts > 3 for _ in poll_for(drive.clock, 0.02, 10.0))
+    assert told.count("PUT") == body.puts
 
 
 def test_rest_needs_no_renewal(body, drive):
