@@ -65,6 +65,12 @@ _WORDS = {"fail": "still there", "warn": "still there", "pass": "gone"}
     metavar="S",
     help="Deadline of one request.  [default: 10]",
 )
+@click.option(
+    "--minutes",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="MIN",
+    help="Time for all requests.  [default: 30; less for few recorded requests]",
+)
 def replay(  # noqa: C901 - one branch for each way to judge
     result: Path,
     requirement: str | None,
@@ -76,6 +82,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
     trusted: tuple[str, ...],
     ca_file: str | None,
     timeout_s: float | None,
+    minutes: float | None,
     **certificate: str | None,
 ) -> CommandResult:
     """Send the requests of findings again, in order, and report whether each failure occurs again.
@@ -107,7 +114,8 @@ def replay(  # noqa: C901 - one branch for each way to judge
             raise click.UsageError(f"{result} has no finding" + (f" of {requirement}" if requirement else ""))
         if statement_file:
             place, requirements = (folder, pack), {id_ for id_, _ in chosen}
-            return _judge_again(document, place, statement_file, given, requirements, allow_motion=allow_motion)
+            allowed = {"allow_motion": allow_motion, "minutes": minutes}
+            return _judge_again(document, place, statement_file, given, requirements, allowed)
         # The contract at hand judges what was judged by it.
         contract = contract_of(document, pack, folder)
         rest = document["target"].get("rest") if contract else None
@@ -118,7 +126,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
             raise click.UsageError("these requests may move the robot: add --allow-motion, or name one that only reads")
         if connection.token or connection.certificate:
             _check_addresses([failure for _, failure in chosen], trusted)
-        replayed, unstopped = replay_and_stop(chosen, document, connection, contract)
+        replayed, unstopped = replay_and_stop(chosen, document, connection, contract, minutes)
     except MALFORMED as error:
         raise click.UsageError(str(not_well_made(result, error))) from error
     click.secho(warning({"stop_undelivered": unstopped}), fg="red", nl=False)
@@ -158,8 +166,7 @@ def _judge_again(
     statement_file: Path,
     given: dict[str, Any],
     requirements: set[str],
-    *,
-    allow_motion: bool,
+    allowed: dict[str, Any],
 ) -> CommandResult:
     from conformance.documents.description import DescriptionError  # noqa: PLC0415
     from conformance.engine.replay import judged_by_checks  # noqa: PLC0415
@@ -179,12 +186,7 @@ def _judge_again(
         where = msgspec.structs.replace(statement.endpoints, **given)
         statement = msgspec.structs.replace(statement, endpoints=where)
         judged = judged_by_checks(
-            contract,
-            statement,
-            requirements,
-            allow_motion=allow_motion,
-            seed=document["seed"],
-            effort=document["effort"],
+            contract, statement, requirements, seed=document["seed"], effort=document["effort"], **allowed
         )
     except UnreachableError as error:
         click.echo(f"cannot tell: the device does not respond: {inert(str(error))}")

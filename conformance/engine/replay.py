@@ -35,6 +35,7 @@ from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request,
 from conformance.verdict.effort import Effort
 from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
+from conformance.verdict.time_limit import TimeLimit
 
 # A pause between two requests is kept, as what is judged may be what comes after it; never longer than this, s.
 _LONGEST_PAUSE_S = 10.0
@@ -134,6 +135,7 @@ def replay_and_stop(
     result: Mapping[str, Any],
     connection: Connection,
     contract: Contract | None,
+    minutes: float | None = None,
 ) -> tuple[list[Replayed], str]:
     """Send several findings' requests again, and then stop the robot if they may have moved it.
 
@@ -144,6 +146,7 @@ def replay_and_stop(
         result: the result.
         connection: settings for the robot's clients.
         contract: the contract that judged, or None.
+        minutes: for how long requests are sent at most, min; None: as `longest_s` returns.
 
     Returns:
         What came of each, and why the robot may still move, or an empty text.
@@ -152,7 +155,7 @@ def replay_and_stop(
         ValueError, KeyError, TypeError: the result is malformed.
     """
     rest, found, unstopped = result["target"].get("rest"), [], ""
-    until = time.monotonic() + longest_s(chosen)
+    until = time.monotonic() + (longest_s(chosen) if minutes is None else 60 * minutes)
     stop: _Stop | None = None
     try:
         for id_, failure in chosen:
@@ -216,6 +219,7 @@ def judged_by_checks(
     allow_motion: bool,
     seed: int,
     effort: str,
+    minutes: float | None = None,
 ) -> dict[str, Any]:
     """Run the checks of some requirements on a robot.
 
@@ -226,6 +230,7 @@ def judged_by_checks(
         allow_motion: whether the robot may be moved.
         seed: seed of everything random, as in the recorded run.
         effort: effort of the recorded run.
+        minutes: for how long the checks send requests at most, min; None: half an hour.
 
     Returns:
         The content of a result.json with these requirements.
@@ -244,6 +249,7 @@ def judged_by_checks(
         allow_motion=allow_motion,
         seed=seed,
         effort=Effort(effort),
+        limit=TimeLimit(minutes or _MOST_S / 60),
     )
     with tempfile.TemporaryDirectory() as folder:
         certification = certify(RobotUnderTest(run, connection_of(statement.endpoints)), Path(folder))
@@ -282,14 +288,7 @@ def _still_there(
 
 
 def _observed_to_fail(contract: Contract, base_url: str, requirement: str, exchange: Exchange) -> bool:
-    """Return whether the REST observers, which judge single responses, fail a requirement for this exchange.
-
-    Args:
-        contract: the contract.
-        base_url: base URL of the robot's REST interface.
-        requirement: id of the requirement.
-        exchange: any exchange; one with another interface fails nothing.
-    """
+    """Return whether the REST observers, which judge single responses, fail a requirement for this exchange."""
     run = Run(empty_statement(contract), contract)
     with closing(HttpClient(base_url, Connection())) as client:
         api = RestInterface(run, client)

@@ -5,9 +5,17 @@ import subprocess
 import sys
 import threading
 
+import msgspec
 import pytest
 from aiohttp import web
 from small_device import REFUSED, answers, described, error, small_device
+
+from conformance.engine.describing import described_contract
+from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import Calls, empty_statement
+from conformance.transport.client import Connection
+from conformance.verdict.run import Run
 
 _ARM = {"name": "arm", "in": "path", "required": True, "schema": {"type": "string", "enum": ["left", "right"]}}
 _SPEED = {"type": "object", "properties": {"speed": {"enum": [1, 2]}}, "required": ["speed"]}
@@ -104,3 +112,37 @@ auth = {{ login = "POST /login", token = "/tokens/0", send_as = "bearer" }}
             said, _ = process.communicate(timeout=120)
             assert device.at_rest.wait(60), said
     assert "the robot may still move" not in said
+
+
+@pytest.mark.parametrize(("status", "at_rest"), [(200, 409), (400, 404), (409, 200), (422, 204)])
+def test_a_drive_that_moves_although_the_device_refused_it_is_stopped(status, at_rest, tmp_path):
+    """The newest drives that were refused are stopped as well; a device that did not move refuses these stops."""
+    moving, stops = set[str](), []
+
+    async def drive(request):
+        moving.add(request.match_info["arm"])
+        return error(status, "no") if status >= 400 else web.json_response({})
+
+    async def stop(request):
+        stops.append(arm := request.match_info["arm"])
+        if arm not in moving:
+            return error(at_rest, "it does not move") if at_rest >= 400 else web.Response(status=at_rest)
+        moving.discard(arm)
+        return web.json_response({})
+
+    routes = {"/arms/{arm}/speed": {"POST": drive}, "/arms/{arm}/stop": {"POST": stop}}
+    with small_device(_Arms.description, routes) as url:
+        contract, where, _ = described_contract(
+            f"{url}/openapi.json", (), None, Endpoints(), Connection(), tmp_path, moves=True
+        )
+        statement = msgspec.structs.replace(empty_statement(contract), endpoints=where, calls=Calls(("*",)))
+        run = Run(statement, contract, allow_motion=True, stop_s=0.5)
+        robot = RobotUnderTest(run, Connection())
+        robot.connect()
+        for arm in "left", "right":
+            robot.rest.client.send("POST", f"/arms/{arm}/speed")
+        robot.is_at_rest = False
+        robot.leave_at_rest()
+    assert moving == set()
+    assert {"left", "right"} <= {*stops}
+    assert run.stop_undelivered == ""

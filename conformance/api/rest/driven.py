@@ -22,12 +22,15 @@ from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener
 # As many values of one name are remembered, and as many requests are made of them for one stop.
 _MOST: Final = 64
 _REFUSED: Final = range(400, 500)
+# Of the values that a device refused, as many are remembered.
+_MOST_REFUSED: Final = 8
 
 
 class Driven(Listener):
     """The values in the requests that may have moved the device, by the names that its stops have for them.
 
-    A value counts from before its request is sent until a response with 4xx shows that nothing was moved by it.
+    A value counts from before its request is sent until a response with 4xx says that nothing was moved by it. As a
+    broken device moves all the same, the newest of these values are named to the stops as well, after the others.
 
     Args:
         contract: the description.
@@ -44,6 +47,7 @@ class Driven(Listener):
         self._names = {name for stop in stops for names, _, _ in _places(stop) for name in names}
         # By name and value, whether a response has shown that the device takes the value.
         self._values: dict[str, dict[Any, bool]] = defaultdict(dict)
+        self._refused: dict[str, dict[Any, None]] = defaultdict(dict)
 
     def sends(self, method: str, url: str) -> None:
         """Note the values in a request that is sent now."""
@@ -74,6 +78,11 @@ class Driven(Listener):
         for name, value in self._named(request.method, request.url, request.body):
             if self._values[name].get(value) is False:
                 del self._values[name][value]
+            refused = self._refused[name]
+            refused.pop(value, None)
+            refused[value] = None
+            if len(refused) > _MOST_REFUSED:
+                del refused[next(iter(refused))]
 
     def _note(self, method: str, url: str, body: bytes, *, taken: bool) -> None:
         for name, value in self._named(method, url, body):
@@ -102,15 +111,17 @@ class Driven(Listener):
             named += [(plain_name(name), one) for name, one in value.items() if isinstance(one, str | int)]
         yield from ((name, one) for name, one in named if name in self._names)
 
-    def named_by(self, stop: Operation) -> list[list[tuple[str, str, Any]]]:
+    def named_by(self, stop: Operation, *, refused: bool = False) -> list[list[tuple[str, str, Any]]]:
         """Return for all that the run may have moved by which values a stop names it, the newest first.
 
         A value is given with its place and its name there: path, query or body. The list is empty if the stop names
-        nothing that was moved.
+        nothing that was moved. It may have values that the device refused, if these are asked for.
         """
         known = []
         for names, schema, (where, called) in _places(stop):
-            texts = (text for name in names for text in self._values[name])
+            texts = (
+                text for name in names for text in (*self._values[name], *(self._refused[name] if refused else ()))
+            )
             values = dict.fromkeys(value for text in texts for value in _fitting(schema, text))
             if values:
                 known.append([(where, called, value) for value in reversed(values)])

@@ -162,8 +162,12 @@ def _send(api: RestInterface, operation: Operation) -> str:
     problem, accepted, open_ = f"no request to {operation.label} could be made", False, ""
     names_one = operation.method == "DELETE" or bool(operation.parameters)
     usual = usual_inputs(operation, api.values or Values())
-    driven = [_naming(usual[0], values) for values in api.driven.named_by(operation)] if api.driven is not None else []
-    for inputs in [*driven, *(one for one in usual if one not in driven)]:
+    driven, refused = (
+        [_naming(usual[0], values) for values in api.driven.named_by(operation, refused=which)] if api.driven else []
+        for which in (False, True)
+    )
+    known = [*driven, *(one for one in usual if one not in driven)]
+    for inputs in [*known, *(one for one in refused if one not in known)]:
         if time.monotonic() > until:
             break
         moved = inputs in driven
@@ -180,6 +184,8 @@ def _send(api: RestInterface, operation: Operation) -> str:
             open_ = open_ or (problem if moved else "")
             continue
         until += exchange.response.elapsed_ms / 1000  # a device that responds is sent each of them
+        if inputs not in known:
+            continue  # to a good device it names nothing
         accepted |= exchange.response.ok or (names_one and exchange.response.status in _OVER)
         problem = f"{operation.label} got {exchange.came}"
         status = exchange.response.status

@@ -1,5 +1,6 @@
 """``roaas replay`` sends a finding's requests again, in order, and says whether it is still there."""
 
+import asyncio
 import base64
 import json
 import threading
@@ -7,7 +8,9 @@ import time
 import zlib
 
 import pytest
+from aiohttp import web
 from click.testing import CliRunner
+from small_device import described, reading, small_device
 from toy_server import Handler, server_of
 
 from conformance.contract.pack import Contract
@@ -231,6 +234,29 @@ def test_a_replay_ends_when_its_time_is_over(at_s):
     assert (came.outcome, came.why.startswith("the time of the replay was over before ")) == (Outcome.UNKNOWN, True)
     assert len(device.asked) < 500
     assert time.monotonic() - began < 20
+
+
+def test_checks_that_run_again_end_when_their_time_is_over(tmp_path):
+    asked = []
+
+    async def slow(request):
+        asked.append(request.path)
+        await asyncio.sleep(0.3)
+        return web.json_response({})
+
+    paths = [f"/parts/{number}" for number in range(40)]
+    described_paths = described({path: reading({"type": "object"}) for path in paths})
+    with small_device(described_paths, {path: {"GET": slow} for path in paths}) as url:
+        (tmp_path / "robot.toml").write_text(f'[api]\nopenapi = "{url}/openapi.json"\n', encoding="utf-8")
+        failure = {"number": 1, "message": "no", "response": None, "sequence": []}
+        found = [{"id": "description/body-schema", "failures": [failure]}]
+        _written(tmp_path, found, target={"rest": url}, seed=0, effort="standard")
+        began = time.monotonic()
+        came = _replay(str(tmp_path), "--statement", str(tmp_path / "robot.toml"), "--minutes", "0.05")
+    assert came.exit_code == 4, came.output
+    assert came.output.startswith("not judged: description/body-schema: not seen: the time of --minutes 0.05 was over")
+    assert len(asked) < 40, "each of the operations is sent several requests"
+    assert time.monotonic() - began < 60
 
 
 def test_the_time_of_a_replay_grows_with_its_requests_and_has_an_end():

@@ -67,7 +67,7 @@ def test_a_stop_names_all_that_was_moved(path, stop, sent, stops, tmp_path):
     assert _stops(driven, operation) == stops
 
 
-def test_what_was_refused_is_not_stopped_and_what_was_not_answered_is(tmp_path):
+def test_what_was_refused_is_stopped_last_and_what_was_not_answered_is(tmp_path):
     driven, operation = _driven(tmp_path, _operation(_parameter("arm", "path")), "/arms/{arm}/stop")
     for arm, status in (("lost", None), ("taken", 200), ("unknown", 404), ("taken", 409), ("broken", 500)):
         request = Request("POST", f"{_BASE}/arms/{arm}/speed")
@@ -77,6 +77,8 @@ def test_what_was_refused_is_not_stopped_and_what_was_not_answered_is(tmp_path):
     driven.sends("GET", f"{_BASE}/arms/read/speed")
     driven.sends("POST", f"{_BASE}/arms/stopped/stop")
     assert {*_stops(driven, operation)} == {"lost", "taken", "broken"}
+    with_refused = driven.named_by(operation, refused=True)
+    assert [value for ((_, _, value),) in with_refused] == ["unknown", "broken", "taken", "lost"]
 
 
 def test_thousands_of_values_cost_a_bounded_number_of_stops(tmp_path):
