@@ -108,8 +108,10 @@ def stopped_by_a_new_client(robot: Served, verify: ssl.SSLContext) -> float:
     """Stop the robot and cancel its goal on new connections; return the seconds that this took."""
     began = time.monotonic()
     with httpx.Client(verify=verify, timeout=60, headers={"Authorization": f"Bearer {TOKEN}"}) as client:
-        assert client.put(f"{robot.rest}/robot/velocity/", json=REST).status_code == 200
-        assert client.delete(f"{robot.rest}/robot/navigation/action/goal/").status_code in {204, 404, 409}
+        stopped = client.put(f"{robot.rest}/robot/velocity/", json=REST)
+        assert stopped.status_code == 200, stopped.text
+        cancelled = client.delete(f"{robot.rest}/robot/navigation/action/goal/")
+        assert cancelled.status_code in {204, 404, 409}, cancelled.text
     return time.monotonic() - began
 
 

@@ -12,12 +12,12 @@ import pytest
 from network import Network
 
 HERE = Path(__file__).parent
-#: Comes up while the master does, waits for its options, and gives its master up sooner than one would.
+#: Comes up while the master does, and waits for its options; {0}: for how many seconds its master may be silent.
 NODE = """
 import sys
 from loadtests import node
 from loadtests.measuring import worker
-worker.MASTER_SILENT_S = 2.5
+worker.MASTER_SILENT_S = {0}
 node.main(sys.stdin.readline().split())
 """
 
@@ -46,8 +46,8 @@ def worker(network):
     """Start workers on the workers' machine; they join when they are told where, see `join`."""
     with ExitStack() as stack:
 
-        def start(*, own_clock=False):
-            command = (*network.on("workers", own_clock=own_clock), sys.executable, "-c", NODE)
+        def start(*, own_clock=False, silent_s=60):
+            command = (*network.on("workers", own_clock=own_clock), sys.executable, "-c", NODE.format(silent_s))
             return stack.enter_context(running(*command, stdin=subprocess.PIPE, stderr=subprocess.PIPE))
 
         yield start
@@ -144,7 +144,7 @@ def test_nothing_is_lost_in_silence_over_a_slow_network(network, worker, begin, 
 
 
 def test_workers_outlive_no_master_and_leave_what_they_recorded(worker, begin, wait_for, tmp_path):
-    remote = worker(own_clock=True)
+    remote = worker(own_clock=True, silent_s=8)
     process, finish, join = begin("--rate 80 --duration 60 --warmup 0.2 --processes 1 --expect-workers 2")
     join(remote)
     for _ in range(2):

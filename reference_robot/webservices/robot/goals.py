@@ -161,11 +161,14 @@ class Goals:
     async def cancel(self) -> None:
         """Cancel the active goal of any client, and a goal that is being sent; do not wait for other requests.
 
+        While it is unknown whether there is a goal, cancel all that the navigation may have.
+
         Raises:
             Problem: 404 if there is no goal, 409 if the robot refuses to cancel it, 503 if the robot does not respond.
         """
-        current, own, sending = self.current(), self._own, self._sending
-        if current is None and not sending:
+        is_unknown, own, sending = self._subscribers.ros.hangs(), self._own, self._sending
+        current = None if is_unknown else self.current()
+        if current is None and not (sending or is_unknown):
             self.followed()  # raises the Problem 404
         self._cancels += 1
         # Cancel all goals: another goal may have displaced the known one a moment ago.

@@ -53,14 +53,16 @@ class Velocity:
 
         Raises:
             Problem: 422 for a value beyond the limits or a component that a differential drive cannot actuate, 409
-                while a goal is active, 503 if no robot subscribes to velocities.
+                while a goal is active, 503 if no robot subscribes to velocities, or if it is unknown whether a goal is
+                active and the velocity is not zero.
         """
         self._check_limits(twist)
-        if self._goal_is_active():
+        is_moving = any(value for part in twist.values() for value in part.values())
+        if self._gives_way_to_goal(is_moving=is_moving):
             raise Problem(409, "the robot follows a goal; cancel it before setting a velocity")
         await self._robot_found()
         self._commanded, self._commanded_at = twist, time.monotonic()
-        if any(value for part in twist.values() for value in part.values()):
+        if is_moving:
             self._watchdog.renew()
         else:
             self._watchdog.release()
@@ -87,12 +89,17 @@ class Velocity:
 
     def _stop(self) -> None:
         """Publish zero velocity, unless the robot follows a goal: then the navigation controls the velocity."""
+        if not self._gives_way_to_goal(is_moving=False):
+            self._publishers.publish_velocity(Twist())
+
+    def _gives_way_to_goal(self, *, is_moving: bool) -> bool:
+        """Return whether a goal is active. While that is unknown, stopping is safe, and moving raises the Problem."""
         try:
-            if self._goal_is_active():
-                return
+            return self._goal_is_active()
         except Problem:
-            pass  # the robot's state is unknown: stopping is safe
-        self._publishers.publish_velocity(Twist())
+            if is_moving:
+                raise
+            return False
 
     def _check_limits(self, twist: dict[str, Any]) -> None:
         web = self._settings

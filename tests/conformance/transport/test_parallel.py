@@ -35,8 +35,8 @@ class Heard(Listener):
 
 @pytest.fixture
 def client():
-    connection = Connection(timeout_s=5.0, listeners=[Heard()])
-    to_server = server_of(Together, all_here=threading.Barrier(CLIENTS, timeout=5.0))
+    connection = Connection(timeout_s=60.0, listeners=[Heard()])
+    to_server = server_of(Together, all_here=threading.Barrier(CLIENTS, timeout=60.0))
     with to_server as server, closing(HttpClient(server.url, connection)) as client:
         yield client
 

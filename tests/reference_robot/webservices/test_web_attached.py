@@ -1,5 +1,6 @@
 """In front of a robot that is not ours: Nav2's nodes in processes of their own, which others use as well."""
 
+import asyncio
 import subprocess
 import sys
 import threading
@@ -10,15 +11,19 @@ from pathlib import Path
 
 import pytest
 from web_messages import delivery_path, fault_of, goal, query_envelope, twist
-from web_robot import RosProcess, Served, eventually, problem, ros_environment, running_robot
+from web_robot import ForeignRobot, RosProcess, Served, eventually, problem, ros_environment, running_robot
 
 from conformance.packs.table1.delivery import EXAMPLE
 from reference_robot import ros
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
+from reference_robot.webservices.configuration import WebSettings
+from reference_robot.webservices.nodes.calls import RosCalls
+from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.robot.goals import Goals
+from reference_robot.webservices.robot.velocity import Velocity
 
 POSE, VELOCITY, GOAL, HEALTH = "/robot/pose/", "/robot/velocity/", "/robot/navigation/action/goal/", "/robot/health/"
 PLAN = "/robot/navigation/service/plan?x=1&y=2"
@@ -277,3 +282,29 @@ def test_a_ros_thread_that_hangs_is_noticed(domain_id, monkeypatch):
         assert unknown.value.status == 503
         go_on.set()
         eventually(lambda: not runtime.hangs())
+
+
+def test_a_robot_whose_ros_thread_hangs_is_stopped(domain_id, monkeypatch):
+    """A busy machine lets the thread seem to hang; an operator's stop must not wait for it."""
+    monkeypatch.setattr(ros, "HUNG_S", 0.5)
+    names, go_on = RosNames(), threading.Event()
+    with RosRuntime(domain_id) as runtime, ForeignRobot(domain_id, "Twist") as robot:
+        publishers, subscribers = RobotPublishersNode(runtime, names), RobotSubscribersNode(runtime, names)
+        calls = RosCalls(publishers.node.executor, 60.0)
+        goals = Goals(publishers, subscribers, calls, navigator=None, frames=names.frames)
+        velocity = Velocity(publishers, None, WebSettings(), goals.is_active)
+        runtime.start()
+        eventually(publishers.find_velocity_subscribers)
+        eventually(publishers.navigation_is_served)
+        subscribers.node.executor.create_task(lambda: go_on.wait(60))
+        eventually(runtime.hangs)
+        with pytest.raises(Problem, match="the goal is unknown"):
+            asyncio.run(velocity.command(twist(x=0.1)))
+        asyncio.run(velocity.command(twist(x=0.0)))
+        assert robot.next("velocity")["x"] == 0.0
+
+        async def cancel() -> None:
+            asyncio.get_running_loop().call_later(0.1, go_on.set)
+            await goals.cancel()
+
+        asyncio.run(cancel())
