@@ -119,7 +119,10 @@ def certify(
 def _unfinished(robot: RobotUnderTest, started: Started, command: str, notes: Iterable[str]) -> dict[str, Any]:
     """Return the content of result.json for a run that has not ended, which remains if the process is killed."""
     run = replace(robot.run, interrupted=True, aborted="the run has not ended")
-    told = [*notes, "The run has not ended: it is under way, or it was killed."]
+    told = [
+        *notes,
+        "The run has not ended: it is under way, or it was killed; then roaas judge tells what it had found.",
+    ]
     verdicts, causes = draw_verdicts(run)
     classes = _deciding(verdicts, run.claims, run.beside)
     same = RobotUnderTest(run, Connection())

@@ -14,7 +14,7 @@ from urllib.parse import parse_qsl
 from conformance.api.call_rules import CallRules
 from conformance.api.rest.branches import branches_in, branches_of
 from conformance.api.rest.left_behind import LeftBehind
-from conformance.api.rest.needs import need_of
+from conformance.api.rest.statuses import need_of
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.documents.resources import matching, resource_at

@@ -1,10 +1,13 @@
-"""Whether a request was refused, accepted or cut off, by the status of its response."""
+"""Whether a request was refused, accepted or cut off, by the status of its response, and what it would have needed."""
 
 from collections.abc import Callable, Collection
 from http import HTTPStatus
 from typing import Final
 
 from conformance.contract.sizes import LIMIT_OCTETS
+from conformance.documents.json_schema import Schema
+from conformance.documents.openapi import Operation
+from conformance.documents.representation import flat
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Unanswered
 
 #: By these a server says that it, or one behind it, has failed; 503 says that it cannot now, 501 that it never can.
@@ -20,6 +23,26 @@ _TRIES = 3
 #: RFC 4918 11.3, RFC 6585 3).
 REFUSALS: Final = frozenset({401, 403, 407, 423, 428})
 _NO_REFUSALS = frozenset({401, 405, 406, 408, 429})
+# What an operation needs that was never answered 2xx.
+_VALUES: Final = "values that the device knows"
+_CREDENTIALS: Final = "credentials that may do this"
+_OF_STATUS: Final = {
+    400: _VALUES,
+    401: _CREDENTIALS,
+    403: _CREDENTIALS,
+    404: _VALUES,
+    407: _CREDENTIALS,
+    409: "another state of the device",
+    410: _VALUES,
+    412: "a condition that holds, such as the present ETag in If-Match",
+    415: _VALUES,
+    422: _VALUES,
+    423: "a lock or lease that another client may hold",
+    428: "a condition, such as the present ETag in If-Match",
+    429: "a device that is less busy",
+    503: "a device that is less busy",
+    507: "room on the device",
+}
 
 
 def held_text(labels: Collection[str], statuses: Collection[int]) -> str:
@@ -62,3 +85,29 @@ def is_cut_off(attempt: Attempt) -> bool:
     if isinstance(attempt, Unanswered):
         return attempt.kind is NoAnswer.CLOSED
     return attempt.response.status == HTTPStatus.BAD_GATEWAY
+
+
+def need_of(operation: Operation, status: int) -> tuple[str, list[str]]:
+    """Return what an operation needs to succeed, as a noun phrase, and the names of the values that may help.
+
+    Args:
+        operation: it never answered 2xx.
+        status: that of its usual request.
+    """
+    need = _OF_STATUS.get(status, "")
+    in_path = [item.name for item in operation.parameter("path")]
+    if need != _VALUES:
+        # Another thing of the same kind may be in the right state.
+        return need, in_path if status in HELD else []
+    required = [item.name for item in operation.parameters if item.required and item.where != "path"]
+    members = [name for body in operation.bodies.values() for name in _members(body.schema)]
+    names = in_path if in_path and status in {404, 410} else [*in_path, *required, *members]
+    names = list(dict.fromkeys(names))
+    return (f"{need}: {', '.join(names)}" if names else ""), names
+
+
+def _members(schema: Schema) -> list[str]:
+    """Return the members of an object that are required."""
+    whole = flat(schema)
+    required = whole.get("required", ())
+    return [name for name in whole.get("properties", {}) if name in required]

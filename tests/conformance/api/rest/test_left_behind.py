@@ -5,7 +5,7 @@ import json
 import pytest
 
 from conformance.api.rest.left_behind import LeftBehind
-from conformance.api.rest.needs import need_of
+from conformance.api.rest.statuses import need_of
 from conformance.documents.openapi import read_operations
 from conformance.transport.exchange import Exchange, Request, Response
 
