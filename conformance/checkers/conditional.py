@@ -19,42 +19,42 @@ class Conditional:
         self._tags: dict[str, set[str]] = {}
         self._dated: set[str] = set()
 
-    def __call__(self, one: Occasion) -> Iterator[Case]:
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
-        url, answer = one.request.url, one.response
+        url, answer = occasion.request.url, occasion.response
         # What comes with 304 may be what the client itself has sent.
         if answer.status != HTTPStatus.NOT_MODIFIED:
             self._tags.setdefault(url, set()).update(_TAG.findall(answer.header("etag") or ""))
             if answer.header("last-modified") is not None:
                 self._dated.add(url)
-        asked = {name.lower(): value for name, value in one.request.headers}
-        yield from self._not_modified(one, asked)
+        asked = {name.lower(): value for name, value in occasion.request.headers}
+        yield from self._not_modified(occasion, asked)
         if "range" in asked or answer.status == HTTPStatus.PARTIAL_CONTENT:
-            yield _range(one, asked)
+            yield _range(occasion, asked)
 
-    def _not_modified(self, one: Occasion, asked: dict[str, str]) -> Iterator[Case]:
-        id_, is_unchanged = "http/preconditions", one.response.status == HTTPStatus.NOT_MODIFIED
+    def _not_modified(self, occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
+        id_, is_unchanged = "http/preconditions", occasion.response.status == HTTPStatus.NOT_MODIFIED
         tags = _TAG.findall(asked.get("if-none-match", ""))
         if tags and asked["if-none-match"].strip() != "*":
             expected = "another status than 304 when the robot never sent the entity tag"
-            has_sent = not self._tags.get(one.request.url, set()).isdisjoint(tags)
-            yield one.case(id_, has_sent or not is_unchanged, expected)
+            has_sent = not self._tags.get(occasion.request.url, set()).isdisjoint(tags)
+            yield occasion.case(id_, has_sent or not is_unchanged, expected)
         elif "if-modified-since" in asked and "if-none-match" not in asked:
             # Where a robot says when something was changed, by whatever clock, that may have been longer ago.
             expected = "another status than 304 when the resource has no Last-Modified"
-            yield one.case(id_, not is_unchanged or one.request.url in self._dated, expected)
+            yield occasion.case(id_, not is_unchanged or occasion.request.url in self._dated, expected)
         elif is_unchanged and "if-none-match" not in asked:
-            yield one.case(id_, False, "another status than 304 for a request without a condition")  # noqa: FBT003
+            yield occasion.case(id_, False, "another status than 304 for a request without a condition")  # noqa: FBT003
 
 
-def _range(one: Occasion, asked: dict[str, str]) -> Case:
+def _range(occasion: Occasion, asked: dict[str, str]) -> Case:
     """Judge a request for a part: the response is the whole, or 206 with its Content-Range."""
-    answer = one.response
+    answer = occasion.response
     # A server may send less than was asked for, or more, and then says so (RFC 9110 15.3.7).
     part = _PART.match(answer.header("content-range") or "")
     fits = part is not None and len(answer.body) == int(part["last"]) - int(part["first"]) + 1
-    fits |= one.context.is_head or answer.media_type == "multipart/byteranges"
-    return one.case(
+    fits |= occasion.context.is_head or answer.media_type == "multipart/byteranges"
+    return occasion.case(
         "http/range",
         answer.status != HTTPStatus.PARTIAL_CONTENT or ("range" in asked and fits),
         "another status than 206, or a part that was asked for, and the header field Content-Range that fits it",

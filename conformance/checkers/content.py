@@ -12,25 +12,25 @@ from conformance.verdict.case import Case
 _CHARSET = re.compile(r"""charset\s*=\s*["']?([^\s;"']+)""", re.IGNORECASE)
 
 
-def json(one: Occasion) -> Iterator[Case]:
+def json(occasion: Occasion) -> Iterator[Case]:
     """Judge the text of a JSON document."""
-    answer = one.response
-    if not answer.body or one.context.is_head or not is_json(answer.media_type):
+    answer = occasion.response
+    if not answer.body or occasion.context.is_head or not is_json(answer.media_type):
         return
     text = read_json(answer.body)
     expected, found = "JSON with finite numbers", f"the number {text.non_finite}"
-    yield one.case("http/json-finite", not text.non_finite, expected, found, cause="non-finite")
-    yield one.case("http/json-encoding", not text.encoding, "UTF-8 without a BOM", text.encoding)
+    yield occasion.case("http/json-finite", not text.non_finite, expected, found, cause="non-finite")
+    yield occasion.case("http/json-encoding", not text.encoding, "UTF-8 without a BOM", text.encoding)
     found = f"the name {text.twice!r} twice in one object"
-    yield one.case("http/json-unique-names", not text.twice, "each name once in an object", found)
+    yield occasion.case("http/json-unique-names", not text.twice, "each name once in an object", found)
 
 
-def charset(one: Occasion) -> Iterator[Case]:
+def charset(occasion: Occasion) -> Iterator[Case]:
     """Judge whether XML and plain text are in the charset that Content-Type names."""
-    answer = one.response
+    answer = occasion.response
     if answer.body and (is_xml(answer.media_type) or answer.media_type == "text/plain"):
         wrong = _other_charset(answer)
-        yield one.case("rest-formats/charset", not wrong, "content in the charset that Content-Type names", wrong)
+        yield occasion.case("rest-formats/charset", not wrong, "content in the charset that Content-Type names", wrong)
 
 
 def _other_charset(answer: Response) -> str:

@@ -20,38 +20,38 @@ _ODD_REQUEST = frozenset({400, 408, 411, 413, 414, 415, 417, 431})
 _OK, _NO_CONTENT, _ERROR, _NOT_FOUND, _NO_METHOD, _NOT_ACCEPTABLE, _SERVER_ERROR = 200, 204, 400, 404, 405, 406, 500
 
 
-def server_error(one: Occasion) -> Iterator[Case]:
+def server_error(occasion: Occasion) -> Iterator[Case]:
     """Judge a 5xx response: it is wrong for an invalid request, and undeclared for a valid one."""
-    status = one.response.status
-    if one.operation is None or status < _ERROR or not one.context.usual or is_cut_off(one.exchange):
+    status = occasion.response.status
+    if occasion.operation is None or status < _ERROR or not occasion.context.usual or is_cut_off(occasion.exchange):
         return
-    said, crashed, retry = one.validity, status >= _SERVER_ERROR, ""
+    said, crashed, retry = occasion.validity, status >= _SERVER_ERROR, ""
     if status == HTTPStatus.SERVICE_UNAVAILABLE:
-        crashed, retry = one.response.header("retry-after") is None, " without Retry-After"
-    operation = said.operation.id if said.operation else one.request.method
+        crashed, retry = occasion.response.header("retry-after") is None, " without Retry-After"
+    operation = said.operation.id if said.operation else occasion.request.method
     for verdict, id_, expected in (
         (INVALID, "http/no-server-error", f"a status below 500 for invalid input ({said.why})"),
         (VALID, "http/declared-status", f"a status that the contract declares for {operation}"),
     ):
         if said.verdict == verdict and (crashed or verdict == INVALID):
-            yield one.case(id_, not crashed, expected, f"status {status}{retry}", cause=f"{status} {operation}")
+            yield occasion.case(id_, not crashed, expected, f"status {status}{retry}", cause=f"{status} {operation}")
 
 
-def status(one: Occasion) -> Iterator[Case]:
+def status(occasion: Occasion) -> Iterator[Case]:
     """Judge the status of a response below 500."""
-    operation = one.operation
-    if operation is not None and one.response.status < _SERVER_ERROR:
-        yield one.case(
+    operation = occasion.operation
+    if operation is not None and occasion.response.status < _SERVER_ERROR:
+        yield occasion.case(
             "http/declared-status",
-            _status_fits(one, operation),
+            _status_fits(occasion, operation),
             f"a status that the contract declares for {operation.id}: {', '.join(operation.responses)}",
-            f"status {one.response.status}",
-            cause=f"{operation.id} {one.response.status}",
+            f"status {occasion.response.status}",
+            cause=f"{operation.id} {occasion.response.status}",
         )
 
 
-def _status_fits(one: Occasion, operation: Operation) -> bool:
-    status, context = one.response.status, one.context
+def _status_fits(occasion: Occasion, operation: Operation) -> bool:
+    status, context = occasion.response.status, occasion.context
     if status in _ANY_REQUEST or operation.declared(status) is not None:
         return True
     if status == _OK and operation.declared(_NO_CONTENT) is not None:
@@ -63,28 +63,28 @@ def _status_fits(one: Occasion, operation: Operation) -> bool:
     if status in _ODD_REQUEST:
         return True
     # Invalid input may be refused with any 4xx (contract, fine print); 404 only where a value is in the path.
-    has_input = bool(one.request.body or operation.parameters or operation.bodies)
+    has_input = bool(occasion.request.body or operation.parameters or operation.bodies)
     elsewhere = status == _NO_METHOD or (status == _NOT_FOUND and not operation.parameter("path"))
     refused = has_input and _ERROR <= status < _SERVER_ERROR and not elsewhere
-    return refused and not (status != _NOT_FOUND and context.usual and one.is_valid)
+    return refused and not (status != _NOT_FOUND and context.usual and occasion.is_valid)
 
 
-def body(one: Occasion) -> Iterator[Case]:
+def body(occasion: Occasion) -> Iterator[Case]:
     """Judge the body of a success by the schema of its operation."""
-    operation, answer = one.operation, one.response
-    content = operation.declared(answer.status) if operation and answer.ok and not one.context.is_head else None
+    operation, answer = occasion.operation, occasion.response
+    content = operation.declared(answer.status) if operation and answer.ok and not occasion.context.is_head else None
     if operation is None or not content:
         return
     media_type = answer.media_type
     if not answer.body:
         # Only GET must return a body: the response to a PUT need not repeat what it accepted.
         if operation.method == "GET" and answer.status != _NO_CONTENT:
-            yield one.case("http/declared-body", False, f"a body as {' or '.join(content)}", "no body")  # noqa: FBT003
+            yield occasion.case("http/declared-body", False, f"a body as {' or '.join(content)}", "no body")  # noqa: FBT003
         elif media_type in content and answer.status != _NO_CONTENT:
             # It says that there is a document, and a client that asked for one reads it.
-            yield from _shape(one, operation, content[media_type])
+            yield from _shape(occasion, operation, content[media_type])
         return
-    yield one.case(
+    yield occasion.case(
         "http/declared-body",
         media_type in content,
         f"a body as {' or '.join(content)}",
@@ -92,11 +92,11 @@ def body(one: Occasion) -> Iterator[Case]:
         cause=f"{operation.id} {media_type}",
     )
     if media_type in content:
-        yield from _shape(one, operation, content[media_type])
+        yield from _shape(occasion, operation, content[media_type])
 
 
-def _shape(one: Occasion, operation: Operation, schema: Schema) -> Iterator[Case]:
-    media_type = one.response.media_type
+def _shape(occasion: Occasion, operation: Operation, schema: Schema) -> Iterator[Case]:
+    media_type = occasion.response.media_type
     if is_json(media_type):
         id_, kind = "http/declared-body", "JSON"
     elif is_xml(media_type):
@@ -106,25 +106,25 @@ def _shape(one: Occasion, operation: Operation, schema: Schema) -> Iterator[Case
     else:
         return
     try:
-        problem = shape_of(schema).problem(read(media_type, one.response.body, schema))
+        problem = shape_of(schema).problem(read(media_type, occasion.response.body, schema))
         fault = f"a body in which {problem}" if problem else ""
     except PatternError:
         return  # other checks tell that the schema cannot be judged
     except UnreadableError as error:
         fault = str(error)
     cause = f"{operation.id} {kind} {fault.split(':', 1)[0]}"
-    yield one.case(id_, not fault, f"{kind} that is valid by the schema of {operation.id}", fault, cause=cause)
+    yield occasion.case(id_, not fault, f"{kind} that is valid by the schema of {operation.id}", fault, cause=cause)
 
 
-def negotiation(one: Occasion) -> Iterator[Case]:
+def negotiation(occasion: Occasion) -> Iterator[Case]:
     """Judge the format of a successful read by Accept, and Vary where there are several."""
-    operation, answer, context = one.operation, one.response, one.context
+    operation, answer, context = occasion.operation, occasion.response, occasion.context
     if operation is None or operation.method != "GET" or not answer.ok or not operation.formats:
         return
     if answer.media_type and context.usual:
         # A format that q=0 rules out breaks another rule than a format that Accept does not name.
         ruled_out = "q=0" in (context.accept or "").lower().replace(" ", "")
-        yield one.case(
+        yield occasion.case(
             "http/q-zero" if ruled_out else "http/not-acceptable",
             quality(answer.media_type, context.accept) > 0,
             f"an acceptable format or status 406 when Accept is {context.accept}",
@@ -135,4 +135,4 @@ def negotiation(one: Occasion) -> Iterator[Case]:
         vary = (answer.header("vary") or "").lower()
         names_accept = "*" in vary or "accept" in [name.strip() for name in vary.split(",")]
         found = f"Vary: {answer.header('vary')}" if vary else "no header field Vary"
-        yield one.case("rest-formats/vary", names_accept, "Vary: Accept", found)
+        yield occasion.case("rest-formats/vary", names_accept, "Vary: Accept", found)

@@ -26,51 +26,51 @@ _OF_PARSERS = frozenset({400, 413, 414, 431})
 _ENTITY_TAG = re.compile(r'(?:W/)?"[\x21\x23-\x7e\x80-\xff]*"')
 
 
-def framing(one: Occasion) -> Iterator[Case]:
+def framing(occasion: Occasion) -> Iterator[Case]:
     """Judge that a response has one length (RFC 9112 6.2): of two, readers may take either one."""
-    answer = one.response
+    answer = occasion.response
     both = answer.header("transfer-encoding") is not None and answer.header("content-length") is not None
     found = "Content-Length beside Transfer-Encoding"
-    yield one.case("http/framing", not both, WELL_FRAMED, found, cause="two lengths")
+    yield occasion.case("http/framing", not both, WELL_FRAMED, found, cause="two lengths")
 
 
-def content_type(one: Occasion) -> Iterator[Case]:
+def content_type(occasion: Occasion) -> Iterator[Case]:
     """Judge that a body has a media type (RFC 9110 8.3)."""
-    answer = one.response
+    answer = occasion.response
     if answer.body:
         named = answer.header("content-type")
         found = f"{f'Content-Type: {named}' if named else 'no Content-Type'} with a body of {len(answer.body)} bytes"
         expected = "a Content-Type header field with a media type"
-        yield one.case("http/content-type", "/" in answer.media_type, expected, found)
+        yield occasion.case("http/content-type", "/" in answer.media_type, expected, found)
 
 
-def once(one: Occasion) -> Iterator[Case]:
+def once(occasion: Occasion) -> Iterator[Case]:
     """Judge that no field is there twice whose value is no list (RFC 9110 5.3)."""
-    twice = one.response.repeated(*_SINGLE)
+    twice = occasion.response.repeated(*_SINGLE)
     expected = "no header twice, unless its value is a list"
-    yield one.case("http/field-once", not twice, expected, f"{twice} several times")
+    yield occasion.case("http/field-once", not twice, expected, f"{twice} several times")
 
 
-def date(one: Occasion) -> Iterator[Case]:
+def date(occasion: Occasion) -> Iterator[Case]:
     """Judge Date, which RFC 9110 6.6.1 leaves 5xx free to omit."""
-    by_server = one.contract.described and one.response.status in _OF_PARSERS
-    if one.response.status < HTTPStatus.INTERNAL_SERVER_ERROR and one.request.raw is None and not by_server:
-        said = one.response.header("date")
+    by_server = occasion.contract.described and occasion.response.status in _OF_PARSERS
+    if occasion.response.status < HTTPStatus.INTERNAL_SERVER_ERROR and occasion.request.raw is None and not by_server:
+        said = occasion.response.header("date")
         found = "no header field Date" if said is None else f"Date: {said}"
-        yield one.case("http/date", _is_date(said), "Date with the time of the response", found)
+        yield occasion.case("http/date", _is_date(said), "Date with the time of the response", found)
 
 
-def formats(one: Occasion) -> Iterator[Case]:
+def formats(occasion: Occasion) -> Iterator[Case]:
     """Judge the form of times and entity tags."""
-    for name, value in one.response.headers:
+    for name, value in occasion.response.headers:
         if name.lower() in _TIMES:
             expected, found = f"{name} in the format Sun, 06 Nov 1994 08:49:37 GMT", f"{name}: {value}"
             holds = _IMF_FIXDATE.fullmatch(value.strip()) is not None
-            yield one.case("http/date-format", holds, expected, found, cause=name.lower())
+            yield occasion.case("http/date-format", holds, expected, found, cause=name.lower())
         elif name.lower() == "etag":
             holds = _ENTITY_TAG.fullmatch(value.strip()) is not None
             expected = 'ETag with a tag in double quotes, such as "a1" or W/"a1"'
-            yield one.case("http/etag-format", holds, expected, f"ETag: {value}", cause="etag")
+            yield occasion.case("http/etag-format", holds, expected, f"ETag: {value}", cause="etag")
 
 
 @lru_cache(maxsize=64)

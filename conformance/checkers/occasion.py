@@ -56,7 +56,7 @@ class Occasion:
     def case(
         self,
         requirement: str,
-        holds: bool,  # noqa: FBT001 - reads as a sentence: one.case(id, status < 500, ...)
+        holds: bool,  # noqa: FBT001 - reads as a sentence: occasion.case(id, status < 500, ...)
         expected: str,
         found: str = "",
         *,

@@ -24,27 +24,27 @@ _TARGET = re.compile(r"(?:[A-Za-z0-9._~!$&'()*+,;=:@/?-]|%[0-9A-Fa-f]{2})*")
 _ERROR, _NOT_ACCEPTABLE, _SERVER_ERROR, _UNAVAILABLE = 400, 406, 500, 503
 
 
-def inside(one: Occasion) -> Iterator[Case]:
+def inside(occasion: Occasion) -> Iterator[Case]:
     """Judge that an error shows nothing of the program."""
-    if one.response.status >= _ERROR:
-        shown = inside_shown(one.exchange)
+    if occasion.response.status >= _ERROR:
+        shown = inside_shown(occasion.exchange)
         expected, found = "an error that shows nothing of the program", f"{shown!r} in the response"
-        yield one.case("http/no-traceback", not shown, expected, found, cause="traceback")
+        yield occasion.case("http/no-traceback", not shown, expected, found, cause="traceback")
 
 
-def form(one: Occasion) -> Iterator[Case]:
+def form(occasion: Occasion) -> Iterator[Case]:
     """Judge one response of 400 and above."""
-    status, context = one.response.status, one.context
+    status, context = occasion.response.status, occasion.context
     if status < _ERROR or status in _TRANSPORT or not context.usual:
         return
     if status >= _SERVER_ERROR and (status != _UNAVAILABLE or context.operation is None):
         return
-    media_type = one.response.media_type
+    media_type = occasion.response.media_type
     if context.is_head and not media_type:
         return
     found = f"status {status} {f'as {media_type}' if media_type else 'without Content-Type'}"
-    if _by_server(one):
-        yield one.case(
+    if _by_server(occasion):
+        yield occasion.case(
             "http/problem-type-server",
             media_type in {JSON, XML},
             f"an error as {JSON}, also where the web server generates it",
@@ -53,7 +53,7 @@ def form(one: Occasion) -> Iterator[Case]:
         )
         return
     allowed = [JSON, *([XML] if context.names_xml or status == _NOT_ACCEPTABLE else [])]
-    yield one.case(
+    yield occasion.case(
         "http/problem-type",
         media_type in allowed,
         f"an error as {' or '.join(allowed)}",
@@ -61,8 +61,8 @@ def form(one: Occasion) -> Iterator[Case]:
         cause=f"{media_type} {context.operation.id if context.operation else 'elsewhere'}",
     )
     if context.likes_xml > context.likes_json and status != _NOT_ACCEPTABLE:
-        fault = "" if context.is_head or media_type != XML else _xml_fault(one.response)
-        yield one.case(
+        fault = "" if context.is_head or media_type != XML else _xml_fault(occasion.response)
+        yield occasion.case(
             "rest-formats/problem-xml",
             media_type == XML and not fault,
             f"an error as {XML} when Accept prefers XML",
@@ -70,19 +70,19 @@ def form(one: Occasion) -> Iterator[Case]:
             cause=fault or media_type,
         )
     if not context.is_head and media_type in {JSON, XML}:
-        yield _status(one)
+        yield _status(occasion)
 
 
-def _by_server(one: Occasion) -> bool:
+def _by_server(occasion: Occasion) -> bool:
     """Return whether a server may have responded before any resource saw the request (contract, errors)."""
-    path = one.context.target.split("?", 1)[0]
+    path = occasion.context.target.split("?", 1)[0]
     return (
-        one.request.method not in _STANDARD_METHODS
+        occasion.request.method not in _STANDARD_METHODS
         or not is_normal(path)
         or bool(_AMBIGUOUS.search(path))
-        or not _TARGET.fullmatch(one.context.target)
-        or not inside_prefix(one.contract, path)
-        or (one.response.status == _NOT_ACCEPTABLE and not one.response.body)
+        or not _TARGET.fullmatch(occasion.context.target)
+        or not inside_prefix(occasion.contract, path)
+        or (occasion.response.status == _NOT_ACCEPTABLE and not occasion.response.body)
     )
 
 
@@ -94,12 +94,12 @@ def _xml_fault(answer: Response) -> str:
     return "" if root.tag == f"{{{_NAMESPACE}}}problem" else f"the root element {root.tag}"
 
 
-def _status(one: Occasion) -> Case:
-    status, members = one.response.status, members_of(one.response)
+def _status(occasion: Occasion) -> Case:
+    status, members = occasion.response.status, members_of(occasion.response)
     stated = None if members is None else members.get("status")
     missing = stated is None and members is not None
     found = "a problem that cannot be read" if members is None else f"a problem whose status is {stated!r}"
-    return one.case(
+    return occasion.case(
         "http/problem-status",
         stated == status and not isinstance(stated, bool),
         f"a problem whose status is that of the response, {status}",

@@ -12,21 +12,26 @@ _OF_SERVERS = frozenset({"TRACE", "CONNECT"})
 _ALWAYS_ALLOWED = frozenset({"HEAD", "OPTIONS", "TRACE"})
 
 
-def allow(one: Occasion) -> Iterator[Case]:
+def allow(occasion: Occasion) -> Iterator[Case]:
     """Judge Allow where a device refuses a method that its description does not have."""
-    method, is_refused = one.request.method, one.response.status == HTTPStatus.METHOD_NOT_ALLOWED
-    is_own = one.contract.described and one.context.usual and one.operation is None and method not in _OF_SERVERS
+    method, is_refused = occasion.request.method, occasion.response.status == HTTPStatus.METHOD_NOT_ALLOWED
+    is_own = (
+        occasion.contract.described
+        and occasion.context.usual
+        and occasion.operation is None
+        and method not in _OF_SERVERS
+    )
     if not (is_refused and is_own):
         return
-    resource = resource_at(one.contract, one.context.target.split("?", 1)[0])
+    resource = resource_at(occasion.contract, occasion.context.target.split("?", 1)[0])
     if resource is None:
         return
-    said = one.response.header("allow")
-    yield one.case("http/allow", said is not None, "the header field Allow", "no header field Allow")
+    said = occasion.response.header("allow")
+    yield occasion.case("http/allow", said is not None, "the header field Allow", "no header field Allow")
     if said is None:
         return
     named, wanted = {name.strip() for name in said.split(",")}, set(resource.methods) - _ALWAYS_ALLOWED
-    yield one.case(
+    yield occasion.case(
         "http/allow-agrees",
         wanted <= named and method not in named,
         f"Allow: {', '.join(sorted(wanted))} (others may stand beside them, but none that got 405)",
@@ -35,9 +40,9 @@ def allow(one: Occasion) -> Iterator[Case]:
     )
 
 
-def challenge(one: Occasion) -> Iterator[Case]:
+def challenge(occasion: Occasion) -> Iterator[Case]:
     """Judge that 401 names the credentials that are wanted (RFC 9110 15.5.2)."""
-    if one.response.status == HTTPStatus.UNAUTHORIZED:
-        there = one.response.header("www-authenticate") is not None
+    if occasion.response.status == HTTPStatus.UNAUTHORIZED:
+        there = occasion.response.header("www-authenticate") is not None
         name = "WWW-Authenticate"
-        yield one.case("http/authentication", there, f"the header field {name}", f"no header field {name}")
+        yield occasion.case("http/authentication", there, f"the header field {name}", f"no header field {name}")

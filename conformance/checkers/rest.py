@@ -44,9 +44,9 @@ class RestCheckers:
             if context.usual and attempt.kind is NoAnswer.MALFORMED:
                 yield Case(False, attempt, fields.WELL_FRAMED, attempt.problem, requirement="http/framing")  # noqa: FBT003
             return
-        one = Occasion(self._contract, attempt, context)
+        occasion = Occasion(self._contract, attempt, context)
         for check in _ANY:
-            yield from check(one)
-        yield from self._conditional(one)
+            yield from check(occasion)
+        yield from self._conditional(occasion)
         for check in () if context.is_own_of(attempt.response) else _DOCUMENTS:
-            yield from check(one)
+            yield from check(occasion)
