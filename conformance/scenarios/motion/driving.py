@@ -39,7 +39,10 @@ def with_room(mapped: MappedDevice, choices: Sequence[Mapping[str, float]], last
     here = mapped.where()
     away = {name: span for name, span in begin.items() if not span[0] <= here[name] <= span[1]}
     if away and mapped.motion.goto is not None:
-        mapped.go("room for a drive", {**here, **{name: sum(span) / 2 for name, span in away.items()}})
+        # A drive that a slow link let run on may have taken another axis beyond its limits, where no move may lead.
+        wanted = {**here, **{name: sum(span) / 2 for name, span in away.items()}}
+        axes = mapped.motion.state.axes
+        mapped.go("room for a drive", {name: axes[name].within(value) for name, value in wanted.items()})
         mapped.come_to_rest()
     else:
         for axis, span in away.items():

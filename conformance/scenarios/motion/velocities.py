@@ -9,7 +9,7 @@ from typing import Final
 from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import MappedDevice, Position
 from conformance.scenarios.motion.moves import TRIES, beyond, recorded
-from conformance.scenarios.motion.trace import SEVERAL, Command, Drive, Reading
+from conformance.scenarios.motion.trace import SEVERAL, Command, Drive, Reading, longest_s
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.verdict.effort import Effort
@@ -28,6 +28,8 @@ _KEPT: Final = 3
 _KEPT_S: Final = 0.1
 # After the time to rest it is watched for so long, s.
 _REST_S: Final = 0.5
+# And by at most so many readings more.
+_MORE: Final = 50
 # The speed is learned from so many readings.
 _NOTED: Final = 50
 
@@ -197,6 +199,12 @@ def _ended(
         return len(late) > 2 * SEVERAL and mapped.room.is_over([speeds], late, 0.0)
 
     after += mapped.watch(rests_at + _REST_S, seen_enough)
+    # Where a reading took long, only those count that come as much later: several of them show whether it rests.
+    for _ in range(_MORE):
+        counted = [one for one in after if one.sent >= rests_at + longest_s([*drive.readings, *after])]
+        if len(counted) >= 2 * SEVERAL or seen_enough(after):
+            break
+        after.append(mapped.read())
     if end is None:
         mapped.stop()
     return replace(drive, end=end, after=tuple(after), refused=answer)

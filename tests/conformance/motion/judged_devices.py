@@ -8,6 +8,8 @@ from processes import ended
 from serving_apps import serving_app
 
 QUICK = MAP.replace("seconds = 0.5", "seconds = 0.25").replace("speed = 4", "speed = 8")
+#: So often a right device is judged at most.
+RUNS = 5
 #: The same without what is tried beyond limits, and without what a move says and how it is stopped.
 MOVES = QUICK[: QUICK.index("[motion.action]")].replace('beyond_limits = "refused"\n', "")
 
@@ -26,10 +28,22 @@ def judged_by_map(serving, motion, tmp_path, api='openapi = "{url}/openapi.json"
     return done, {one["id"]: one["verdict"] for one in result["requirements"] if one["id"].startswith("motion/")}
 
 
-def not_passed(judged):
-    """Return what a run did not pass, without what a busy machine kept it from judging."""
-    assert judged["motion/reaches"] == "pass", judged
-    return {id_ for id_, verdict in judged.items() if verdict not in {"pass", "error"}}
+def passed_but(missing, judge):
+    """Check that a right device passes all but what its map does not declare; return the last run's command.
+
+    A busy machine may keep a run from judging something, and never makes it fail: what was not judged is judged again.
+    """
+    left = None
+    for _ in range(RUNS):
+        done, judged = judge()
+        assert judged, done.stdout + done.stderr
+        assert not {"fail", "warn"} & set(judged.values()), done.stdout
+        not_passed = {id_.removeprefix("motion/") for id_, verdict in judged.items() if verdict != "pass"}
+        left = not_passed if left is None else left & not_passed
+        if left == missing:
+            break
+    assert left == missing, done.stdout
+    return done
 
 
 def of_arm(arm, tmp_path, motion=QUICK):

@@ -3,8 +3,12 @@
 import dome
 import pytest
 import rover
-from simulated import RULES, cases_of, played
+from simulated import RULES, Api, cases_of, map_of, played
 
+from conformance.observe.clock import SimulatedClock
+from conformance.scenarios.motion.binding import SoapBinding
+from conformance.scenarios.motion.driving import with_room
+from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.motion.trace import Drive
 
 
@@ -68,3 +72,13 @@ def test_a_drive_ends_before_the_limits(name, takes_s, places):
         room = 1e-6 if "clamped" in toml else given["motion"].tolerance(axis)
         assert axes[axis].limits[0] - room <= min(one[axis] for one in places)
         assert max(one[axis] for one in places) <= axes[axis].limits[1] + room
+
+
+def test_a_device_that_is_beyond_a_limit_of_another_axis_is_brought_to_where_there_is_room():
+    clock = SimulatedClock()
+    body = dome.Body(dome.LIMITS, clock.now, clock.sleep)
+    body.start = body.target = {"pan": 0.95, "tilt": 0.52}
+    api = Api(dome.Dome(body), clock, lambda: 0.002)
+    mapped = MappedDevice(api, map_of(dome.MAP), clock, SoapBinding(api, dome.messages_of()))
+    assert with_room(mapped, [{"pan": 0.5}], 0.7) == [{"pan": 0.5}]
+    assert mapped.where()["tilt"] == pytest.approx(0.5)

@@ -2,15 +2,15 @@
 
 import rover
 from body import Body
-from judged_devices import judged_by_map, not_passed
+from judged_devices import judged_by_map, passed_but
 from rover import Rover, serving_rover
 
 
 def test_a_right_rover_that_clamps_and_takes_one_move_at_a_time_is_not_blamed(tmp_path):
-    done, judged = judged_by_map(serving_rover(Rover(Body(rover.LIMITS, noise=0.004))), rover.MAP, tmp_path)
     undeclared = {"unauthorised-still", "action-runs", "action-succeeds", "action-canceled"}
-    missing = {f"motion/{name}" for name in undeclared}
-    assert not_passed(judged) == missing, done.stdout
+    done = passed_but(
+        undeclared, lambda: judged_by_map(serving_rover(Rover(Body(rover.LIMITS, noise=0.004))), rover.MAP, tmp_path)
+    )
     calls = (
         "Calls 4, because the motion map names it: PUT /goal/{x}/{y}, DELETE /goal, PUT /velocity, PUT /gripper/{state}"
     )
