@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 from conformance.api.rest.inputs import FORM, MULTIPART, NOTHING, Inputs, body_verdict, parameter_verdict
-from conformance.api.rest.samples import fits, sample
+from conformance.api.rest.samples import alike_and_apart, fits, sample
 from conformance.api.rest.validity import INVALID
 from conformance.api.rest.variations import DEPTH, LONG, UNKNOWN, Kind, Steps, Variation, place_of, shown, with_member
 from conformance.documents.json_schema import Schema, kinds_of
@@ -131,6 +131,8 @@ def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:
         items = schema.get("items")
         one = sample(items if isinstance(items, dict) else {})
         yield [copy.deepcopy(one) for _ in range(schema["minItems"] - 1)], "with fewer items than its minItems"
+    if schema.get("uniqueItems") is True and (alike := alike_and_apart(schema)[0]):
+        yield alike, "with equal items, although they are to be unique"
 
 
 def _beyond_texts(schema: Schema) -> Iterator[tuple[Any, str]]:

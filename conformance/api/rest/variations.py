@@ -13,7 +13,7 @@ from enum import StrEnum
 from typing import Any, Final
 
 from conformance.api.rest.inputs import NOTHING, Inputs, parameter_verdict, whole_body
-from conformance.api.rest.samples import fits, sample
+from conformance.api.rest.samples import alike_and_apart, fits, sample
 from conformance.api.rest.validity import VALID
 from conformance.api.rest.values import Values
 from conformance.documents.json_schema import Schema, kinds_of
@@ -134,6 +134,8 @@ def _bounds(schema: Schema) -> Iterator[Any]:
     for key in ("minimum", "maximum"):
         if isinstance(schema.get(key), int | float) and not isinstance(schema.get(key), bool):
             yield schema[key]
+    if "array" in kinds_of(schema) and (apart := alike_and_apart(schema)[1]):
+        yield apart  # what stands between items shows from the second one on
     if "pattern" in schema or "format" in schema or "enum" in schema:
         return
     for key in ("minLength", "maxLength"):
