@@ -119,7 +119,7 @@ def small_device(
 
     thread = threading.Thread(target=run, daemon=True)
     thread.start()
-    assert started.wait(10)
+    assert started.wait(60)
     yield f"{'https' if tls else 'http'}://127.0.0.1:{ports[0]}"
     loop.call_soon_threadsafe(loop.stop)
     thread.join(10)

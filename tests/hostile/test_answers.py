@@ -50,7 +50,7 @@ def test_the_clients_of_the_suite_end(number: int, *, endless: bool) -> None:
 
 def test_what_follows_a_response_is_never_the_response_to_the_next_request() -> None:
     with answering() as port:
-        client = HttpClient(f"http://127.0.0.1:{port}", Connection(timeout_s=5))
+        client = HttpClient(f"http://127.0.0.1:{port}", Connection(timeout_s=60))
         two = _NAMES.index("two responses for one")
 
         statuses = [client.send("GET", f"/{two}").response.status for _ in range(4)]
@@ -61,7 +61,7 @@ def test_what_follows_a_response_is_never_the_response_to_the_next_request() -> 
 def test_interim_responses_before_the_final_one_are_read() -> None:
     good = b"HTTP/1.1 103 Early Hints\r\n\r\n" * 90 + b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nok"
     with answering({"interim": good}) as port:
-        client = HttpClient(f"http://127.0.0.1:{port}", Connection(timeout_s=5))
+        client = HttpClient(f"http://127.0.0.1:{port}", Connection(timeout_s=60))
 
         assert client.send("GET", "/0").response.body == b"ok"
         request = head(client, "GET", "/0")

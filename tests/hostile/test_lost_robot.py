@@ -113,7 +113,7 @@ def driven(robot: RobotUnderTest, speeds: dict[str, float]) -> None:
 
 def where(url: str) -> float:
     """Return where a cart is."""
-    with urllib.request.urlopen(f"{url}/state", timeout=5) as answer:  # noqa: S310 - http
+    with urllib.request.urlopen(f"{url}/state", timeout=60) as answer:  # noqa: S310 - http
         x: float = json.load(answer)["x"]
     return x
 

@@ -236,7 +236,7 @@ def test_ports_in_use(toy, load, option):
 def test_the_closed_model_and_the_histograms_while_they_grow(toy, load, wait_for, free_port):
     process, finish = load.begin(f"--rest {toy().url} --users 2 --duration 3 --warmup 0.2 --metrics-port {free_port}")
     wait_for(process, r"[1-9]\d* requests answered")
-    with urllib.request.urlopen(f"http://127.0.0.1:{free_port}/metrics", timeout=5) as answer:
+    with urllib.request.urlopen(f"http://127.0.0.1:{free_port}/metrics", timeout=60) as answer:
         text = answer.read().decode()
     run = finish()
     counted = re.findall(

@@ -25,7 +25,7 @@ def device(started):
 
 
 def calls(url):
-    with urllib.request.urlopen(f"{url}/calls", timeout=5) as answer:  # noqa: S310 -- http
+    with urllib.request.urlopen(f"{url}/calls", timeout=60) as answer:  # noqa: S310 -- http
         return json.load(answer)
 
 
@@ -202,7 +202,7 @@ def driven(device, load, tmp_path):
 
 
 def where(url):
-    with urllib.request.urlopen(f"{url}/where", timeout=5) as answer:  # noqa: S310 -- http
+    with urllib.request.urlopen(f"{url}/where", timeout=60) as answer:  # noqa: S310 -- http
         return json.load(answer)
 
 

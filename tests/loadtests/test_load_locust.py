@@ -95,7 +95,7 @@ def test_the_web_ui_shows_the_runs_numbers(toy, load, free_port):
     counts = []
     for line in process.stderr:
         if re.search(r"[1-9]\d* requests answered", line):
-            with urllib.request.urlopen(f"http://127.0.0.1:{free_port}/stats/requests", timeout=5) as answer:
+            with urllib.request.urlopen(f"http://127.0.0.1:{free_port}/stats/requests", timeout=60) as answer:
                 entries = {entry["name"]: entry for entry in json.load(answer)["stats"]}
             counts.append(entries.get("pose rest wire", {"num_requests": 0})["num_requests"])
     assert finish().code in {0, 4}

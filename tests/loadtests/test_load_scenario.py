@@ -45,7 +45,7 @@ def scenario(tmp_path):
 
 
 def calls(url):
-    with urllib.request.urlopen(f"{url}/calls", timeout=5) as answer:  # noqa: S310 -- http
+    with urllib.request.urlopen(f"{url}/calls", timeout=60) as answer:  # noqa: S310 -- http
         return json.load(answer)
 
 

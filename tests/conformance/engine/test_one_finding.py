@@ -122,7 +122,7 @@ def test_requests_that_are_dropped_again_and_again_on_a_busy_connection_are_one_
     with server_of(_Dropping) as server:
         statement = type(empty_statement(contract))(endpoints=Endpoints(rest=server.url))
         run = Run(statement=statement, contract=contract, claims=("http",), effort=Effort("quick"))
-        document = certify(RobotUnderTest(run, Connection(timeout_s=2)), tmp_path, progress=None).document
+        document = certify(RobotUnderTest(run, Connection(timeout_s=60)), tmp_path, progress=None).document
     assert {item["id"]: item["verdict"] for item in document["requirements"]}["http/many-requests"] == "fail"
     (failure,) = (one for item in document["requirements"] for one in item["failures"] if "many" in item["id"])
     assert "the server closed 3 times without a response" in failure["message"]

@@ -77,11 +77,11 @@ def test_a_whole_run_without_permission_sends_nothing_that_acts(robot, tmp_path,
         rest=rest.url,
         publishers_endpoint=f"{soap.url}/turtlesim_publisher_ws",
         subscribers_endpoint=f"{soap.url}{_READS}",
-        timeout_s=5.0,
+        timeout_s=60.0,
     )
     statement = msgspec.structs.replace(empty_statement(contract), endpoints=where)
     run = Run(statement=statement, contract=contract, claims=tuple(contract.classes), effort=Effort("quick"))
-    tested = RobotUnderTest(run, Connection(timeout_s=5.0))
+    tested = RobotUnderTest(run, Connection(timeout_s=60.0))
     stopped = []
     take_slot = Connection.take_slot
 

@@ -55,7 +55,7 @@ def test_nothing_passes_in_an_outage():
 @pytest.fixture
 def target():
     with socket.create_server(("127.0.0.1", 0)) as server:
-        server.settimeout(10)
+        server.settimeout(60)
         yield server
 
 
@@ -64,7 +64,7 @@ def ends(target):
     """Both ends of one connection over a link."""
     with linked(QUICK, 1, target.getsockname()) as (address,), socket.create_connection(address, timeout=30) as client:
         robot, _ = target.accept()
-        robot.settimeout(10)
+        robot.settimeout(60)
         with robot:
             yield client, robot
 

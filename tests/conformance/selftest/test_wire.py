@@ -15,8 +15,8 @@ GET = Request("rest", "GET", "/", fields=[("Host", "a")])
 def pair():
     ours, theirs = socket.socketpair()
     with ours, theirs:
-        ours.settimeout(5)
-        theirs.settimeout(5)
+        ours.settimeout(60)
+        theirs.settimeout(60)
         yield ClientConnection(ours, "rest"), theirs
 
 

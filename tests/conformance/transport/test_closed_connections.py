@@ -37,21 +37,21 @@ def _answers_one_of_a_kind(connection: socket.socket) -> None:
 
 @pytest.mark.parametrize("method", ["POST", "PATCH", "PUT", "GET"])
 def test_a_server_that_closes_after_an_answer_is_asked_again(listening, method):
-    connection = Connection(timeout_s=5, resends=True)
+    connection = Connection(timeout_s=60, resends=True)
     client = HttpClient(listening(_answers_one), connection)
     assert [client.send(method, "/").response.status for _ in range(3)] == [500] * 3
     assert connection.resent == 1
 
 
 def test_what_may_act_twice_is_not_sent_again_unless_the_run_allows_it(listening):
-    client = HttpClient(listening(_answers_one), Connection(timeout_s=5))
+    client = HttpClient(listening(_answers_one), Connection(timeout_s=60))
     client.send("POST", "/")
     with pytest.raises(NoAnswerError):
         client.send("POST", "/")
 
 
 def test_a_request_that_a_new_connection_does_not_answer_either_is_told_twice(listening):
-    client = HttpClient(listening(_answers_one_of_a_kind), Connection(timeout_s=5, resends=True))
+    client = HttpClient(listening(_answers_one_of_a_kind), Connection(timeout_s=60, resends=True))
     client.send("POST", "/")
     with pytest.raises(NoAnswerError, match="2 of 2 times") as closed:
         client.send("POST", "/poison")
@@ -68,7 +68,7 @@ def test_a_server_that_is_gone_after_a_request_has_closed_its_connection():
             server.close()
 
     server = socket.create_server(("127.0.0.1", 0))
-    client = HttpClient(f"http://127.0.0.1:{server.getsockname()[1]}", Connection(timeout_s=5))
+    client = HttpClient(f"http://127.0.0.1:{server.getsockname()[1]}", Connection(timeout_s=60))
     thread = threading.Thread(target=serve)
     thread.start()
     client.send("GET", "/")

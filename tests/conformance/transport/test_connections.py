@@ -57,7 +57,7 @@ def test_a_connection_that_the_server_has_ended_is_not_used_again(asking):
     for turn in range(6):
         assert client.send("GET", "/").response.status == 200
         if turn % 2:
-            assert server.ended.acquire(timeout=5)
+            assert server.ended.acquire(timeout=60)
     # None of them was sent on a closed connection and then once more.
     assert (server.opened, client.connection.sent) == (3, 6)
 
@@ -68,7 +68,7 @@ def test_what_is_asked_for_on_its_own_connection_leaves_none_open(asking, closes
     client.send("GET", "/", fresh=closes == "its request")
     if closes == "the client":
         client.close()
-    assert server.ended.acquire(timeout=5)
+    assert server.ended.acquire(timeout=60)
     assert client.send("GET", "/").response.status == 200
     assert server.opened == 2
 
@@ -106,7 +106,7 @@ class _Stale(Handler):
 
 @pytest.fixture
 def stale():
-    with server_of(_Stale, seen=[]) as server, closing(HttpClient(server.url, Connection(timeout_s=2))) as client:
+    with server_of(_Stale, seen=[]) as server, closing(HttpClient(server.url, Connection(timeout_s=60))) as client:
         yield server, client
 
 

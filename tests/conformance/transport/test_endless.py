@@ -71,7 +71,7 @@ def test_an_endless_body_is_a_response(url, path, cut):
     response = _get(url, path)
     assert (response.status, bool(response.cut)) == (200, cut)
     assert len(response.body) < 6_000_000
-    assert time.monotonic() - started < 10
+    assert time.monotonic() - started < 60
 
 
 @pytest.mark.parametrize(

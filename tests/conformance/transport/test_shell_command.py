@@ -47,7 +47,7 @@ def device(listening):
 def _run(command, shell="sh"):
     assert "\n" not in command
     environment = {**os.environ, **_SECRETS}
-    subprocess.run([shell, "-c", command], check=True, timeout=20, capture_output=True, env=environment)
+    subprocess.run([shell, "-c", command], check=True, timeout=120, capture_output=True, env=environment)
 
 
 def _shown(octets):

@@ -75,7 +75,7 @@ def test_a_challenge_of_digest_authentication_is_answered_once_for_all_connectio
 
 
 def refusals(port):
-    with urllib.request.urlopen(f"http://127.0.0.1:{port}/calls", timeout=5) as answer:
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/calls", timeout=60) as answer:
         return json.load(answer).get("refused", 0)
 
 

@@ -43,7 +43,7 @@ def test_messages_of_a_websocket_come_with_their_age():
     def send(client):
         for _ in range(20):
             client.send(json.dumps({"header": {"stamp": {"sec": int(time.time()), "nanosec": 0}}}))
-        client.recv(timeout=5)
+        client.recv(timeout=60)
 
     with serve(send, "127.0.0.1", 0) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -160,9 +160,9 @@ def test_what_a_rosbridge_refuses_is_said(answer, told, free_port):
     asked = []
 
     def refuse(client):
-        asked.append(json.loads(client.recv(timeout=5)))
+        asked.append(json.loads(client.recv(timeout=60)))
         client.send(answer)
-        client.recv(timeout=5)
+        client.recv(timeout=60)
 
     with serve(refuse, "127.0.0.1", 0) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()

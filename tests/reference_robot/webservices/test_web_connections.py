@@ -35,7 +35,7 @@ def test_half_a_request_is_given_up(served):
         time.sleep(0.5)  # half of the deadline that the fixture sets
         assert [name for name, connection in waiting.items() if is_readable(connection)] == []
         for name, connection in waiting.items():
-            connection.settimeout(10)
+            connection.settimeout(60)
             answer = b""
             with contextlib.suppress(ConnectionResetError):
                 while received := connection.recv(65536):
@@ -103,7 +103,7 @@ def test_500_connections_at_once(served):
     with contextlib.ExitStack() as stack:
         connections = [stack.enter_context(served.connection()) for _ in range(500)]
         for connection in connections:
-            connection.settimeout(20)
+            connection.settimeout(60)
             connection.sendall(request)
         assert all(connection.recv(100).startswith(b"HTTP/1.1 200 ") for connection in connections)
 

@@ -61,7 +61,7 @@ class Served:
 
     def connection(self, *, soap: bool = False) -> socket.socket:
         where = urlsplit(self.publishers if soap else self.rest)
-        return socket.create_connection((where.hostname, where.port), timeout=2)
+        return socket.create_connection((where.hostname, where.port), timeout=20)
 
 
 class RosProcess:
