@@ -52,7 +52,7 @@ _BEHIND = "nginx before "
 #: Lets a run send POST /distance, which changes nothing.
 CALL = ("--call", "POST /distance")
 _EFFORTS, _SEEDS = ("quick", "standard"), (1, 2, 3)
-_LISTENS_S = 30.0
+_LISTENS_S = 60.0
 
 
 @contextlib.contextmanager

@@ -91,7 +91,7 @@ def test_an_interrupted_fleet_ends_its_runs_and_keeps_what_it_has(tmp_path, list
     )
     assert "first: started" in process.stderr.readline()
     listed = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-    until = time.monotonic() + 30
+    until = time.monotonic() + 60
     while not (children := listed.read_text().split()):
         assert time.monotonic() < until
     process.send_signal(number)
