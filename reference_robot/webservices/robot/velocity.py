@@ -16,7 +16,7 @@ from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.watchdog import VelocityWatchdog
 
 _DISCOVERY: Final = 1.0  # seconds to wait for a robot's subscription
-_DISCOVERY_STEP: Final = 0.02
+_STEP: Final = 0.02
 
 
 class Velocity:
@@ -64,10 +64,13 @@ class Velocity:
         self._commanded, self._commanded_at = twist, time.monotonic()
         if is_moving:
             self._watchdog.renew()
-        else:
+        give_up = time.monotonic() + (0.0 if is_moving else self._settings.deadline)
+        while not self._publishers.publish_velocity(message_from(shape_of(Twist), twist)):
+            if time.monotonic() >= give_up:
+                raise not_yet("the robot does not receive velocity commands fast enough")
+            await asyncio.sleep(_STEP)  # a loaded machine delays the middleware; a stop is sent again
+        if not is_moving:
             self._watchdog.release()
-        if not self._publishers.publish_velocity(message_from(shape_of(Twist), twist)):
-            raise not_yet("the robot does not receive velocity commands fast enough")
 
     async def command_linear(self, linear: dict[str, float]) -> None:
         """Publish a velocity with a new linear part and the angular part that is in force.
@@ -87,10 +90,12 @@ class Velocity:
         self._watchdog.close()
         self._publishers.await_velocity_taken()
 
-    def _stop(self) -> None:
-        """Publish zero velocity, unless the robot follows a goal: then the navigation controls the velocity."""
-        if not self._gives_way_to_goal(is_moving=False):
-            self._publishers.publish_velocity(Twist())
+    def _stop(self) -> bool:
+        """Publish zero velocity, unless the robot follows a goal: then the navigation controls the velocity.
+
+        Return False if publishing failed.
+        """
+        return self._gives_way_to_goal(is_moving=False) or self._publishers.publish_velocity(Twist())
 
     def _gives_way_to_goal(self, *, is_moving: bool) -> bool:
         """Return whether a goal is active. While that is unknown, stopping is safe, and moving raises the Problem."""
@@ -128,4 +133,4 @@ class Velocity:
         while not self._publishers.find_velocity_subscribers():
             if time.monotonic() > give_up:
                 raise not_yet("no robot on the ROS graph subscribes to velocity commands")
-            await asyncio.sleep(_DISCOVERY_STEP)
+            await asyncio.sleep(_STEP)

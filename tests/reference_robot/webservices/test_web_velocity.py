@@ -1,8 +1,14 @@
 """PUT velocity: what reaches cmd_vel, and what is refused and does not."""
 
+import asyncio
+
 import pytest
 from web_messages import goal, twist
 from web_robot import ForeignRobot, eventually, problem, running_robot
+
+from reference_robot.webservices.configuration import WebSettings
+from reference_robot.webservices.representation.problems import Problem
+from reference_robot.webservices.robot.velocity import Velocity
 
 VELOCITY = "/robot/velocity/"
 LINEAR = "/robot/velocity/linear/"
@@ -105,3 +111,52 @@ def test_without_a_robot_commands_are_not_accepted(domain_id):
             problem(answer, 503)
         for path in ("/robot/app/delivery/", "/robot/sensors/", "/robot/navigation/services/"):
             assert served.call("GET", path).json() == []
+
+
+class BusyMiddleware:
+    """Middleware that does not accept the second message and the two after it in time, as on a loaded machine."""
+
+    def __init__(self):
+        self.sent = []
+        self.accepted = asyncio.Event()
+
+    def find_velocity_subscribers(self):
+        return True
+
+    def publish_velocity(self, message):
+        self.sent.append(message.linear.x)
+        if len(self.sent) == 5:
+            self.accepted.set()
+        return len(self.sent) not in {2, 3, 4}
+
+    def await_velocity_taken(self):
+        """Do nothing."""
+
+
+@pytest.mark.parametrize("ended_by", ["client", "watchdog", "end of the process"])
+def test_a_stop_that_the_middleware_does_not_accept_is_sent_again(ended_by):
+    middleware = BusyMiddleware()
+    velocity = Velocity(middleware, None, WebSettings(hold=0.05 if ended_by == "watchdog" else 60.0), lambda: False)
+
+    async def drive_and_stop():
+        await velocity.command(twist(x=0.1))
+        if ended_by == "client":
+            await velocity.command(twist(x=0.0))
+        if ended_by == "watchdog":
+            await asyncio.wait_for(middleware.accepted.wait(), 60)
+
+    asyncio.run(drive_and_stop())
+    if ended_by == "end of the process":
+        velocity.close()
+    assert middleware.sent == [0.1, 0.0, 0.0, 0.0, 0.0]
+
+
+def test_a_velocity_that_the_middleware_does_not_accept_is_503():
+    velocity = Velocity(BusyMiddleware(), None, WebSettings(), lambda: False)
+
+    async def drive():
+        await velocity.command(twist(x=0.1))
+        await velocity.command(twist(x=0.2))
+
+    with pytest.raises(Problem, match="fast enough"):
+        asyncio.run(drive())
