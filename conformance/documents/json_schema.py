@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import re
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache, cached_property, lru_cache, partial
@@ -38,6 +39,11 @@ _UNEVALUATED: Final = frozenset({"unevaluatedProperties", "unevaluatedItems"})
 _MOST_TOGETHER: Final = 30
 # Schemas of so many nodes are kept compiled, in nearly 1 kB each.
 _MOST_KEPT: Final = 100_000
+# So many judgements of parts of values are remembered, of parts that have at most so many octets as JSON.
+_MOST_JUDGED: Final = 20_000
+_LONGEST_JUDGED: Final = 10_000
+# References that lead to a violation in one value: alternatives that refer to each other multiply.
+_MOST_FOLLOWED: Final = 1_000
 _LAZY: Final[list[tuple[Schema, str]]] = []
 _LAZY_NUMBERS: Final[dict[tuple[int, str], int]] = {}
 _VALUES: Final = frozenset({"example", "examples", "default", "enum", "const"})
@@ -306,6 +312,7 @@ def _naming() -> Any:
 
     types = Draft202012Validator.TYPE_CHECKER.redefine("number", lambda _, value: is_number(value))
     keywords = {
+        "$ref": _followed,
         "pattern": _pattern,
         "patternProperties": _members,
         "additionalProperties": _further,
@@ -313,6 +320,36 @@ def _naming() -> Any:
     }
     # jsonschema gives extend() no types.
     return cast("Any", extend)(Draft202012Validator, validators=keywords, type_checker=types)
+
+
+class _Followed(threading.local):
+    """How many references have been followed for the present value."""
+
+    count = 0
+
+
+_FOLLOWED: Final = _Followed()
+
+
+class _TooManyError(Exception):
+    """Raised where a value would take too many references to be judged one by one."""
+
+
+def _followed(validator: Any, reference: str, instance: Any, schema: Schema) -> Iterator[ValidationError]:
+    """Find the violations behind a reference, unless too many references led to some in this value.
+
+    Raises:
+        _TooManyError: they did.
+    """
+    from jsonschema import Draft202012Validator  # noqa: PLC0415 - as above
+
+    uri = f"{_SCHEME}/{reference.removeprefix('#/$defs/')}" if reference.startswith("#/$defs/") else ""
+    if uri and _surely_holds(uri, instance):
+        return
+    _FOLLOWED.count += 1
+    if _FOLLOWED.count > _MOST_FOLLOWED:
+        raise _TooManyError
+    yield from Draft202012Validator.VALIDATORS["$ref"](validator, reference, instance, schema)
 
 
 def _pattern(_: Any, pattern: str, instance: Any, __: Schema) -> Iterator[ValidationError]:
@@ -535,13 +572,18 @@ def _nodes_in(value: Any) -> int:
 
 
 class Shape:
-    """A schema without references, for validating values. Numbers must be finite doubles."""
+    """A schema without references, for validating values. Numbers must be finite doubles.
+
+    Attributes:
+        schema: as given.
+        is_exact: whether jsonschema-rs allows what the schema allows, and no more.
+    """
 
     def __init__(self, schema: Schema) -> None:
         self.schema = schema
         self._quick = validator_of(schema, _holds_by)
         # By such names, jsonschema-rs allows too much.
-        self._is_exact = _are_plain(_patterns_in(_compiled_of(schema), names=True))
+        self.is_exact = _are_plain(_patterns_in(_compiled_of(schema), names=True))
 
     def problem(self, value: Any, where: str = "") -> str:
         """Return the first violation in ``value``, with its place below ``where``; empty if the value is valid."""
@@ -551,25 +593,30 @@ class Shape:
             error = self._first_error(value)
         except RecursionError:
             return "the value is nested too deeply"
+        except _TooManyError:
+            return f"{where or 'the value'} fits none of the alternatives"
         return _described(error, where) if error is not None else ""
 
     def holds(self, value: Any) -> bool:
         """Return whether ``value`` has no problem: quicker, because the problem is not looked for."""
         try:
-            return self._passes(value) or bool(self._validator.is_valid(value))
+            return self._passes(value) or self._is_valid(value)
         except RecursionError:
             return False
 
     def holds_within(self, value: Any) -> bool:
         """Return the same for a part of a value whose numbers are finite."""
-        return bool(self._quick.is_valid(value) if self._is_exact else self._validator.is_valid(value))
+        return bool(self._quick.is_valid(value)) if self.is_exact else self._is_valid(value)
 
     def broken_rule(self, value: Any) -> tuple[str, bool]:
         """Return the violated schema keyword, and True if ``value`` itself violates it, and not only a member.
 
         For a valid value, return an empty keyword and False.
         """
-        error = self._first_error(value)
+        try:
+            error = self._first_error(value)
+        except _TooManyError:
+            return "anyOf", True
         return ("", False) if error is None else (str(error.validator), not error.absolute_path)
 
     @cached_property
@@ -579,15 +626,23 @@ class Shape:
         # With a registry of one's own, jsonschema fetches nothing.
         return _naming()(bundled(self.schema), registry=REGISTRY)
 
+    def _is_valid(self, value: Any) -> bool:
+        _FOLLOWED.count = 0
+        try:
+            return bool(self._validator.is_valid(value))
+        except _TooManyError:
+            return False
+
     def _first_error(self, value: Any) -> ValidationError | None:
         from jsonschema.exceptions import best_match  # noqa: PLC0415 - as above
 
+        _FOLLOWED.count = 0
         error: ValidationError | None = best_match(self._validator.iter_errors(value))
         return error
 
     def _passes(self, value: Any) -> bool:
         try:
-            return self._is_exact and bool(self._quick.is_valid(value)) and _all_finite(value)
+            return self.is_exact and bool(self._quick.is_valid(value)) and _all_finite(value)
         except (ValueError, TypeError, OverflowError):
             return False  # a number that it does not take (an Infinity): the other one judges that
 
@@ -617,9 +672,33 @@ def shape_of(schema: Schema) -> Shape:
     return _SHAPES.of(schema)
 
 
-def _holds_by(uri: str, value: Any) -> bool:
+_JUDGED: Final[dict[tuple[str, bytes], bool]] = {}
+
+
+def _surely_holds(uri: str, value: Any) -> bool:
+    """Return whether a value is valid by a lazy reference, as far as jsonschema-rs can tell."""
     schema = referred(uri)
-    return shape_of(schema).holds_within(value) if isinstance(schema, dict) else schema is not False
+    is_exact = isinstance(schema, dict) and shape_of(schema).is_exact
+    return is_exact and _all_finite(value) and _holds_by(uri, value)
+
+
+def _holds_by(uri: str, value: Any) -> bool:
+    """Judge a part of a value by a lazy reference, once: alternatives that refer to each other ask again and again."""
+    schema = referred(uri)
+    if not isinstance(schema, dict):
+        return schema is not False
+    try:
+        text = _encode(value)
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        return shape_of(schema).holds_within(value)
+    found = _JUDGED.get((uri, text))
+    if found is None:
+        found = shape_of(schema).holds_within(value)
+        if len(text) <= _LONGEST_JUDGED:
+            if len(_JUDGED) >= _MOST_JUDGED:
+                _JUDGED.clear()
+            _JUDGED[uri, text] = found
+    return found
 
 
 def numbers_in(value: Any) -> Iterator[float]:

@@ -15,6 +15,8 @@ from conformance.documents.json_schema import Schema, UnresolvedError, pointed
 _MOST_AT_ONCE: Final = 5_000
 # The smallest value of a schema may have so many parts: members, items and characters.
 _LARGEST: Final = 1_000_000
+# An enum may have so many values: each is a request of its own where it is sent.
+_MOST_VALUES: Final = 50_000
 # So many references may follow each other, and so often schemas are looked at again.
 _DEEPEST: Final = 60
 _MOST_STEPS: Final = 50_000
@@ -67,6 +69,10 @@ class Growth:
         if self._size(schema, [])[0] > _LARGEST:
             self._sizes[id(schema)] = 1
             return f"its smallest value has more than {_LARGEST:,} parts"
+        if len(values := _list(schema, "enum")) > _MOST_VALUES:
+            return f"an enum of {len(values):,} values; the limit is {_MOST_VALUES:,}"
+        if (longest := max(map(_characters, [*values, schema.get("const")]), default=0)) > _LARGEST:
+            return f"a value of {longest:,} characters in enum or const; the limit is {_LARGEST:,}"
         names = schema.get("patternProperties")
         patterns = [schema.get("pattern"), *(names if isinstance(names, dict) else ())]
         return next(filter(None, (self._pattern_fault(one) for one in patterns if isinstance(one, str))), "")
@@ -175,6 +181,16 @@ class Growth:
 def _number(schema: Schema, word: str) -> int:
     found = schema.get(word)
     return int(found) if isinstance(found, int | float) and found > 0 else 0
+
+
+def _characters(value: Any) -> int:
+    """Return how many characters the texts in a value have, up to a little more than the limit."""
+    waiting, total = [value], 0
+    while waiting and total <= _LARGEST:
+        part = waiting.pop()
+        total += len(part) if isinstance(part, str) else 1
+        waiting += part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
+    return total
 
 
 def _list(schema: Schema, word: str) -> list[Any]:

@@ -9,7 +9,7 @@ from small_device import described, reading
 
 from conformance.contract.document_text import parsed
 from conformance.documents.description import Description, DescriptionError, read_description
-from conformance.documents.json_schema import shape_of
+from conformance.documents.json_schema import Shape, modern, resolved, shape_of
 from conformance.documents.openapi import read_operations
 from conformance.documents.value_formats import has_formats
 
@@ -61,6 +61,9 @@ UNJUDGED: dict[str, tuple[Any, dict[str, Any], str]] = {
     "minProperties": ({"type": "object", "minProperties": 10**7}, {}, "smallest value"),
     "quantifiers": ({"type": "string", "pattern": "^(a{1000}){1000}$"}, {}, "nested quantifiers"),
     "quantifiers of names": ({"patternProperties": {"(((a{99}){99}){99})": {}}}, {}, "nested quantifiers"),
+    "an enum of many": ({"enum": list(range(60_000))}, {}, "an enum of 60,000 values"),
+    "a long text in an enum": ({"enum": ["a", "a" * 2_000_000]}, {}, "a value of 2,000,000 characters in enum"),
+    "a long text deep in a const": ({"const": [{"a": "a" * 2_000_000}]}, {}, "a value of 2,000,002 characters"),
     "a long pattern": ({"pattern": "a|" * 200_000}, {}, "a pattern of 400,000 characters"),
     "many patterns": (
         {"anyOf": [{"pattern": f"a{{99999}}b{{{i}}}"} for i in range(100)]}, {}, "the patterns of the document",
@@ -92,6 +95,28 @@ def test_a_schema_beyond_the_budget_is_left_out_with_a_reason(name: str) -> None
     found = _read(json.dumps(document))
 
     assert any(reason in line for line in found.unread), found.unread[:3]
+    assert time.process_time() - started < 8
+
+
+def _kind(number: int) -> dict[str, Any]:
+    members = {"kind": {"const": f"s{number}"}, "child": _ref(0), "a": {"type": "integer"}}
+    return {"type": "object", "required": ["kind"], "properties": members}
+
+
+@pytest.mark.parametrize("key", ["oneOf", "anyOf"])
+def test_alternatives_that_all_refer_to_each_other_are_judged(key: str) -> None:
+    kinds = {f"s{i}": _kind(i) for i in range(1, 301)}
+    document = {"components": {"schemas": {"s0": {key: [_ref(i) for i in range(1, 301)]}, **kinds}}}
+    shape = Shape(modern(resolved(document, _ref(0))))
+    right: dict[str, Any] = {"kind": "s300", "a": 1}
+    wrong: dict[str, Any] = {"kind": "s300", "a": "1"}
+    for number in range(1, 6):
+        right, wrong = ({"kind": f"s{number}", "child": value} for value in (right, wrong))
+    started = time.process_time()
+
+    assert (shape.problem(right), shape.holds(right), shape.holds(wrong)) == ("", True, False)
+    assert shape.problem(wrong)
+
     assert time.process_time() - started < 8
 
 
