@@ -35,6 +35,7 @@ class AnsweringConnection(asyncio.Protocol, ABC):
     Attributes:
         since: The time of the client's last step, by ``time.perf_counter``.
         allowed: Seconds that its next step may take; infinity while the robot works on a response.
+        answered: The time of its last response; minus infinity before the first.
         is_known: Whether a request of the client has passed the access check.
     """
 
@@ -52,6 +53,7 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         "_unread",
         "_waiting",
         "allowed",
+        "answered",
         "is_known",
         "since",
     )
@@ -62,6 +64,7 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         self._transport: asyncio.Transport
         self.since = perf_counter()
         self.allowed = NEVER
+        self.answered = -NEVER
         self.is_known = False
         self._has_begun = False  # a request is being received
         # The requests that have been received, and the end of the connection
@@ -201,6 +204,7 @@ class AnsweringConnection(asyncio.Protocol, ABC):
                 b"" if request.method == "HEAD" else response.body,
             )
         )
+        self.answered = now
         self._port.answered(request.began, now)
         if not keep_alive:
             self._leave()

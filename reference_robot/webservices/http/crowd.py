@@ -26,10 +26,12 @@ class Client(Protocol):
     Attributes:
         since: The time of the client's last step, such as connecting or its last response, by ``time.perf_counter``.
         allowed: Seconds that its next step may take; infinity while the robot works on a response.
+        answered: The time of its last response, by the same clock; minus infinity before the first.
         is_known: Whether a request of the client has passed the access check.
     """
 
     since: float
+    answered: float
     allowed: float
     is_known: bool
 
@@ -126,4 +128,4 @@ class Crowd:
 
 
 def _only_waits(client: Client, now: float) -> bool:
-    return client.allowed < NEVER and not (client.is_known and now - client.since < _IN_USE)
+    return client.allowed < NEVER and not (client.is_known and now - client.answered < _IN_USE)

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from conformance.commandline.secret_file import warn_if_shared
 from reference_robot.webservices.http.connection import HttpConnection
+from reference_robot.webservices.http.crowd import NEVER
 from reference_robot.webservices.http.port import Port
 
 _SHUTDOWN: Final = 2.0  # seconds for the client's close_notify
@@ -85,6 +86,7 @@ class _Handshake:
     """A TLS handshake, which has a place among the connections of the port; a slow or failed one closes the socket."""
 
     is_known = False
+    answered = -NEVER
 
     def __init__(self, port: Port, client: socket.socket) -> None:
         self._port = port

@@ -13,6 +13,7 @@ from reference_robot.webservices.http.proxies import TrustedProxies
 class Waiting:
     def __init__(self, since, allowed=60.0, *, is_known=False):
         self.since, self.allowed, self.is_known, self.is_gone = since, allowed, is_known, False
+        self.answered = since
 
     def give_way(self):
         self.is_gone = True
@@ -45,6 +46,14 @@ def test_who_gives_way(guarded, clients, address, gone):
     assert crowd.has_place_for(address, 10.0) == (gone is not None)
 
     assert [number for number, client in enumerate(waiting) if client.is_gone] == ([] if gone is None else [gone])
+
+
+def test_half_a_request_gives_way_however_new_it_is():
+    crowd, half = Crowd(1, 1, is_guarded=False), Waiting(9.9, is_known=True)
+    half.answered = -math.inf
+    crowd.add(half, "a")
+    assert crowd.has_place_for("a", 10.0)
+    assert half.is_gone
 
 
 def test_an_address_beyond_its_share_loses_its_own_connections():
