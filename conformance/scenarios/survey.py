@@ -22,6 +22,7 @@ from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.statuses import HELD
+from conformance.api.rest.things import collection_of
 from conformance.api.rest.validity import UNCLEAR, Validity, validity
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import (
@@ -366,7 +367,8 @@ class Surveyor:
             return
         by_label = {item.label: item for item in operations}
         for operation in operations:
-            maker = by_label.get(f"POST {operation.template.rpartition('/')[0]}")
+            collection = collection_of(operation.template)
+            maker = by_label.get(f"POST {collection}") or by_label.get(f"POST {collection}/")
             if operation.method != "DELETE" or maker is None or not operation.parameter("path"):
                 continue
             until = time.monotonic() + self.api.run.effort.budget_s

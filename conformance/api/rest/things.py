@@ -1,0 +1,176 @@
+"""Things of a collection: their paths in a description, what identifies them, and whether they read as written."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Iterator
+from datetime import UTC, datetime
+from typing import Any, Final
+
+from conformance.api.rest.references import refers, singular
+from conformance.api.rest.samples import FORMATS, alike_and_apart, fits
+from conformance.api.rest.values import IDS
+from conformance.documents.json_schema import Schema, is_number, kinds_of
+from conformance.documents.json_text import shown
+from conformance.documents.openapi import Operation
+from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
+
+# Ends of the names of path parameters that a member with another name may give, such as ``id`` for ``item_pk``.
+_NUMBERED: Final = ("id", "uuid", "guid", "pk", "key", "number")
+# Members that a device sets itself, or hides, by the end of their plain names.
+_OWN: Final = re.compile(
+    r"(?:id|pk|url|href|status|state|version|revision|etag|created|updated|modified|changed|timestamp|time|at|on|by"
+    r"|owner|author|user|password|secret|token|pin|key)$"
+)
+# Formats of texts that are the same in every spelling but for case and punctuation.
+_COMPARED: Final = frozenset({"", "email", "uuid", "hostname", "date", "date-time"})
+_NEAR: Final = {"rel_tol": 0.02, "abs_tol": 0.01}
+_SECOND: Final = 1.0
+
+
+def collection_of(template: str) -> str:
+    """Return the path of the collection that an item's path is in, without a slash at its end; empty if it is none."""
+    before, _, last = template.rstrip("/").rpartition("/")
+    return before if re.fullmatch(r"\{[^{}]+\}", last) else ""
+
+
+def identified(value: Any, item: Operation) -> tuple[str, Any]:
+    """Return the member of a representation that identifies it in an item's path, and its value; else nothing."""
+    parameter = item.parameter("path")[-1]
+    plain, thing = plain_name(parameter.name), singular(collection_of(item.template).rpartition("/")[2])
+    names = [plain]
+    if plain.endswith(_NUMBERED) or plain == thing:
+        names += [*IDS[:2], "pk", f"{thing}id", *IDS[2:]]
+    members = {plain_name(name): (name, one) for name, one in represented(value, names).items()}
+    found = [members[name] for name in names if name in members]
+    usable = (one for one in found if isinstance(one[1], str | int) and fits(parameter.schema, one[1]))
+    return next(usable, ("", None))
+
+
+def represented(value: Any, names: Collection[str]) -> dict[str, Any]:
+    """Return the object of a response that has the most members of these plain names: the body, or one inside it."""
+    found = [value] if isinstance(value, dict) else []
+    found += [one for one in value.values() if isinstance(one, dict)] if found else []
+    found += [one for inner in found[1:] for one in inner.values() if isinstance(one, dict)]
+    return max(found, key=lambda one: len({plain_name(name) for name in one} & set(names)), default={})
+
+
+def listed(value: Any) -> list[Any] | None:
+    """Return the items of a list: the body, or its only list, in an envelope too; None if there are none or several."""
+    for _ in range(2):
+        if isinstance(value, list):
+            return value
+        inner = list(value.values()) if isinstance(value, dict) else []
+        lists = [one for one in inner if isinstance(one, list)]
+        objects = [one for one in inner if isinstance(one, dict)]
+        if len(lists) > 1 or not (lists or objects):
+            return None
+        value = lists[0] if lists else objects[0]
+    return value if isinstance(value, list) else None
+
+
+def another(schema: Schema, body: dict[str, Any], turn: int, collections: frozenset[str]) -> dict[str, Any]:
+    """Return a body with another value of each member that the client may choose, as far as the schema allows it."""
+    changed = dict(body)
+    for name, part in flat(schema).get("properties", {}).items():
+        if name in body and not _is_devices(name, part, collections):
+            for value in _others(part, body[name], turn, collections):
+                if value != body[name] and fits(part, value) and fits(schema, {**changed, name: value}):
+                    changed[name] = value
+                    break
+    return changed
+
+
+def _others(schema: Schema, value: Any, turn: int, collections: frozenset[str]) -> Iterator[Any]:
+    """Yield other values of a member, another one first in each turn."""
+    given = flat(schema)
+    kinds, form = kinds_of(schema), str(given.get("format", ""))
+    found: list[Any] = list(given.get("enum", ()))
+    if isinstance(value, dict):
+        found = [another(schema, value, turn, collections)]
+    elif isinstance(value, list):
+        found = [alike_and_apart(schema)[1]]
+    elif not found and isinstance(value, bool):
+        found = [not value]
+    elif not found and is_number(value) and kinds & {"number", "integer"}:
+        bounds = [given[key] for key in ("maximum", "minimum") if is_number(given.get(key))]
+        middle = [sum(bounds) // 2] if len(bounds) > 1 else [value + turn + 1]
+        found = [*bounds, *middle]
+    elif not found and isinstance(value, str) and "pattern" not in given:
+        dated = FORMATS.get(form, "").replace("-01-31", f"-02-{turn % 20 + 1:02}").replace("someone@", f"one{turn}@")
+        found = [dated] if form else [f"roaas {turn}", f"r{turn}"]
+    begin = turn % len(found) if found else 0
+    yield from (*found[begin:], *found[:begin])
+
+
+def differences(
+    sent: dict[str, Any], seen: dict[str, Any], schema: Schema, answer: Schema | None, collections: frozenset[str]
+) -> Iterator[str]:
+    """Yield each member that reads in another way than it was written, as a noun phrase.
+
+    Members that the device sets or hides by their name or mark, that the response does not have, and that are
+    normalized (case, space, rounding) are left out.
+    """
+    parts = flat(schema).get("properties", {})
+    shared = _parts(answer or {}, sent)
+    for name, value in sent.items():
+        part, other = parts.get(name), seen.get(name)
+        if part is None or name not in seen or _is_devices(name, part, collections):
+            continue
+        if (shared and name not in shared) or _is_devices(name, shared.get(name, {}), collections):
+            continue
+        if isinstance(value, dict) and isinstance(other, dict):
+            yield from (f"{one} in {name}" for one in differences(value, other, part, shared.get(name), collections))
+        elif not _alike(value, other, flat(part)):
+            yield f"{shown(other)} as {name} instead of {shown(value)}"
+
+
+def _parts(schema: Schema, names: Collection[str]) -> dict[str, Any]:
+    """Return the properties of the part of a response's schema that has the most of these names."""
+    outer = flat(schema).get("properties", {})
+    inner = [flat(one).get("properties", {}) for one in outer.values() if isinstance(one, dict)]
+    inner += [flat(one).get("properties", {}) for part in inner for one in part.values() if isinstance(one, dict)]
+    return max([outer, *inner], key=lambda one: len(set(one) & set(names)))
+
+
+def _is_devices(name: str, part: Any, collections: frozenset[str]) -> bool:
+    """Return whether a member is the device's: it sets, hides or checks it."""
+    given = flat(part) if isinstance(part, dict) else {}
+    marked = given.get("readOnly") or given.get("writeOnly") or given.get("format") in {"password", "byte", "binary"}
+    return bool(marked or "const" in given or _OWN.search(plain_name(name)) or refers(name, given, collections))
+
+
+def _alike(value: Any, other: Any, schema: Schema) -> bool:  # noqa: PLR0911 - one for each type
+    if isinstance(value, list) and isinstance(other, list):
+        plain = not any(isinstance(one, list | dict) for one in (*value, *other))
+        return not plain or sorted(map(_letters, value)) == sorted(map(_letters, other))
+    if isinstance(value, list | dict) or isinstance(other, list | dict):
+        return True
+    if is_number(value):
+        try:
+            near = {} if isinstance(value, int) and "number" not in kinds_of(schema) else _NEAR
+            return math.isclose(value, float(other), **near)
+        except (TypeError, ValueError):
+            return other is not None
+    if isinstance(value, str) and str(schema.get("format", "")) not in _COMPARED:
+        return True
+    if schema.get("format") == "date-time" and isinstance(other, str):
+        one, two = _instant(value), _instant(other)
+        return one is None or two is None or abs((one - two).total_seconds()) <= _SECOND
+    return _letters(value) == _letters(other)
+
+
+def _letters(value: Any) -> str:
+    """Return a scalar as text without case, space and punctuation."""
+    text = "" if value is None else str(value)
+    return "".join(one for one in text.casefold() if one.isalnum())
+
+
+def _instant(text: str) -> datetime | None:
+    try:
+        found = datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    return found if found.tzinfo else found.replace(tzinfo=UTC)

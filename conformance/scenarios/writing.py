@@ -1,0 +1,127 @@
+"""Write to a thing by PUT or PATCH, and read it until it shows what was written."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from conformance.api.rest.inputs import usual_inputs, whole_body, written
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.samples import fits
+from conformance.api.rest.things import another, differences, represented
+from conformance.api.rest.values import Values
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation, is_json
+from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
+from conformance.observe.polling import Patience
+from conformance.transport.exchange import Exchange
+
+# A device that writes later has so long, s; and it is read so often meanwhile.
+_SETTLES_S: Final = 3.0
+_PAUSE_S: Final = 0.2
+# What differs in the last so many reads is on its way, as a valve that moves is.
+_LAST: Final = 5
+_ACCEPTED: Final = 202
+
+
+@dataclass(frozen=True)
+class Write:
+    """One write, and the last read after it.
+
+    Attributes:
+        operation, read: labels of the operations.
+        sent: the request that wrote.
+        found: the GET after it.
+        other: what reads in another way than it was written, as noun phrases.
+    """
+
+    operation: str
+    read: str
+    sent: Exchange
+    found: Exchange
+    other: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Writer:
+    """Sends requests to things of a described API."""
+
+    api: RestInterface
+    values: Values
+
+    def send(self, operation: Operation, path: str = "", body: Any = None) -> Exchange:
+        """Send an operation's usual request, to another path or with another JSON body if they are given."""
+        inputs = usual_inputs(operation, self.values)[0]
+        inputs = inputs if body is None else replace(inputs, body=body)
+        request = written(operation, inputs)
+        query = request.target.partition("?")[1:]
+        return (replace(request, target=path + "".join(query)) if path else request).send(self.api)
+
+    def bodies(self, operation: Operation, turn: int, now: dict[str, Any] | None = None) -> list[dict[str, Any]]:
+        """Return JSON objects to send with an operation: with other values in each turn, then the usual one.
+
+        Args:
+            operation: takes JSON, or has no body that is tried.
+            turn: number of the write.
+            now: what the thing reads now; its members are in the body as far as the schema has them.
+        """
+        usual = usual_inputs(operation, self.values)[0]
+        if not is_json(usual.media_type) or not isinstance(usual.body, dict):
+            return []
+        schema = operation.bodies[usual.media_type].schema
+        whole = whole_body(operation, self.values)[1]
+        base = usual.body if operation.method == "PATCH" or not isinstance(whole, dict) else whole
+        base = base if base and fits(schema, base) else whole if isinstance(whole, dict) else usual.body
+        parts = flat(schema).get("properties", {})
+        present = {name: one for name, one in (now or {}).items() if name in parts and not parts[name].get("readOnly")}
+        full = {**base, **{name: one for name, one in present.items() if fits(parts[name], one)}}
+        first = full if fits(schema, full) else base
+        return [another(schema, first, turn, self.values.collections), first, usual.body]
+
+    def until(self, read: Callable[[], Exchange], holds: Callable[[Exchange], bool]) -> Exchange:
+        """Return the first read for which something holds, or the last one after a few seconds."""
+        patience = Patience(self.api.client.connection.pace, _SETTLES_S)
+        while True:
+            exchange = read()
+            if holds(exchange) or patience.over:
+                return exchange
+            time.sleep(_PAUSE_S)
+
+    def read_back(self, operation: Operation, read: Operation, path: str, sent: Exchange) -> Write:
+        """Read a thing until it shows what a request has written."""
+        seen: list[tuple[str, ...]] = []
+
+        def holds(exchange: Exchange) -> bool:
+            seen.append(self.differing(operation, read, sent, exchange))
+            return not seen[-1]
+
+        found = self.until(lambda: self.send(read, path), holds)
+        settled = set(seen[-1]).intersection(*seen[-_LAST:])
+        return Write(operation.label, read.label, sent, found, tuple(one for one in seen[-1] if one in settled))
+
+    def differing(self, operation: Operation, read: Operation, sent: Exchange, found: Exchange) -> tuple[str, ...]:
+        """Return what differs between the content of a request and a response; none if they cannot be compared."""
+        body, media_type = read_json(sent.request.body).value, sent.request.media_type
+        if not isinstance(body, dict) or not found.response.ok or media_type not in operation.bodies:
+            return ()
+        now = members(found, body)
+        return tuple(differences(body, now, operation.bodies[media_type].schema, read.shape, self.values.collections))
+
+    def change(self, operation: Operation, read: Operation, path: str, turn: int) -> Write | None:
+        """Write other values to a thing, and read them back; None if the device does not accept them, or only later."""
+        before = self.send(read, path)
+        for body in self.bodies(operation, turn, members(before, ())) if before.response.ok else ():
+            sent = self.send(operation, path, body)
+            if sent.response.ok:
+                is_later = sent.response.status == _ACCEPTED
+                return None if is_later else self.read_back(operation, read, path, sent)
+        return None
+
+
+def members(exchange: Exchange, names: Any) -> dict[str, Any]:
+    """Return the members of the thing in a JSON response; names: those that it probably has."""
+    value = read_json(exchange.response.body).value if is_json(exchange.response.media_type) else None
+    return represented(value, {plain_name(name) for name in names})
