@@ -8,6 +8,7 @@ from http import HTTPStatus
 from typing import Any, Final
 from urllib.parse import unquote, urlsplit
 
+from conformance.api.rest.things import collection_of
 from conformance.api.rest.values import IDS
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
@@ -30,7 +31,7 @@ class LeftBehind:
 
     def __init__(self, operations: Iterable[Operation], base_url: str) -> None:
         self._base_url = base_url
-        self._collections = {one.template.rpartition("/{")[0] for one in operations if one.template.endswith("}")}
+        self._collections = {collection_of(one.template) for one in operations} - {""}
         self._created: dict[str, tuple[str, str]] = {}
         self._changed: dict[str, tuple[str, bytes | None]] = {}
         self._deleted: dict[str, str] = {}
@@ -56,7 +57,7 @@ class LeftBehind:
             if not ours:
                 self._deleted[path] = operation.label
         elif made:
-            self._created[made] = operation.label, unquote(made.rpartition("/")[2])
+            self._created[made] = operation.label, unquote(made.rstrip("/").rpartition("/")[2])
         elif operation.method in {"PUT", "PATCH"}:
             before = self._read.pop(path, None)
             self._changed.setdefault(path, (operation.label, before))
@@ -84,7 +85,7 @@ class LeftBehind:
         value: Any = read_json(answer.body).value if is_json(answer.media_type) else None
         members = value if isinstance(value, dict) else {}
         id_ = next((members[name] for name in IDS if isinstance(members.get(name), str | int)), None)
-        return "" if id_ is None else f"{path.rstrip('/')}/{id_}"
+        return "" if id_ is None else f"{path.rstrip('/')}/{id_}{'/' if path.endswith('/') else ''}"
 
     def document(self) -> dict[str, Any]:
         """Return what was left behind, for result.json, with lines for readers; empty if nothing was."""

@@ -1,5 +1,7 @@
 """Things that are created, written and deleted: no right device is blamed, in whatever shape, and faults are found."""
 
+import asyncio
+
 import pytest
 from aiohttp import web
 from small_device import REFUSED, answers, certified, described, error, small_device
@@ -14,7 +16,7 @@ _WRITTEN = {
 }
 
 
-def _things(shape, fault):  # noqa: C901 - one device
+def _things(shape, fault):  # noqa: C901, PLR0915 - one device
     """Return the description and the routes of a device with one collection."""
     end, key, wrapped = shape.get("end", ""), shape.get("key", "id"), shape.get("wrapped", False)
     thing = {"type": "object", "properties": {"id": {"type": "integer", "readOnly": True}, **_WRITTEN["properties"]}}
@@ -36,6 +38,12 @@ def _things(shape, fault):  # noqa: C901 - one device
         }
     )
     there, count = {1: {"id": 1, "label": "first", "level": 3}}, [1]
+
+    def later(act, *values):
+        if shape.get("later"):
+            asyncio.get_running_loop().call_later(shape["later"], act, *values)
+        else:
+            act(*values)
 
     def body(value):
         return web.json_response({"data": value} if wrapped else value)
@@ -59,7 +67,8 @@ def _things(shape, fault):  # noqa: C901 - one device
             return error(422, "not valid")
         count[0] += 1
         if fault != "created is lost":
-            there[count[0]] = {"id": count[0], **value, **({"label": "new"} if fault == "POST changes" else {})}
+            kept = {"id": count[0], **value, **({"label": "new"} if fault == "POST changes" else {})}
+            later(there.__setitem__, count[0], kept)
         told = {"id": count[0] + (5000 if fault == "wrong id" else 0), **value}
         answer = web.json_response({"data": told} if wrapped else told, status=201)
         if shape.get("located"):
@@ -73,7 +82,8 @@ def _things(shape, fault):  # noqa: C901 - one device
     async def get(request):
         number = of(request)
         if number not in there:
-            return error(404, "no such valve")
+            is_past = number is not None and number <= count[0]
+            return error(shape.get("gone", 404) if is_past else 404, "no such valve")
         return body(there[number])
 
     async def put(request):
@@ -85,7 +95,7 @@ def _things(shape, fault):  # noqa: C901 - one device
         if fault == "PUT clamps":
             value["level"] = min(value["level"], 60)
         if fault != "PUT without effect":
-            there[number] = {"id": number, **value}
+            later(there.__setitem__, number, {"id": number, **value})
         return body({"id": number, **value})
 
     async def delete(request):
@@ -93,7 +103,7 @@ def _things(shape, fault):  # noqa: C901 - one device
         if number not in there:
             return error(404, "no such valve")
         if fault != "DELETE keeps":
-            del there[number]
+            later(there.pop, number, None)
         return web.Response(status=204)
 
     async def every(_):
@@ -109,6 +119,7 @@ _SHAPES = {
     "slash": {"end": "/", "key": "pk"},
     "located": {"located": True, "key": "valve_id"},
     "wrapped": {"wrapped": True},
+    "later": {"later": 0.5, "gone": 410},
 }
 _FAULTS = [
     ("slash", "created is lost", "description/created-is-there"),
