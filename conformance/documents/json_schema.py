@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import re
 import threading
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache, cached_property, lru_cache, partial
@@ -634,10 +635,19 @@ class Shape:
             return False
 
     def _first_error(self, value: Any) -> ValidationError | None:
-        from jsonschema.exceptions import best_match  # noqa: PLC0415 - as above
+        """Return the worst violation; of alternatives, that in the one which fits best, if there is one."""
+        from jsonschema.exceptions import relevance  # noqa: PLC0415 - as above
 
         _FOLLOWED.count = 0
-        error: ValidationError | None = best_match(self._validator.iter_errors(value))
+        error: ValidationError | None = max(self._validator.iter_errors(value), key=relevance, default=None)
+        while error is not None and error.context:
+            alternatives = defaultdict(list)
+            for one in error.context:
+                alternatives[one.relative_schema_path[0]].append(one)
+            best, *others = sorted(alternatives.values(), key=_misfit)
+            if others and _misfit(best) == _misfit(others[0]):
+                break
+            error = max(best, key=relevance)
         return error
 
     def _passes(self, value: Any) -> bool:
@@ -645,6 +655,12 @@ class Shape:
             return self.is_exact and bool(self._quick.is_valid(value)) and _all_finite(value)
         except (ValueError, TypeError, OverflowError):
             return False  # a number that it does not take (an Infinity): the other one judges that
+
+
+def _misfit(errors: list[ValidationError]) -> tuple[bool, bool, int]:
+    """Return how far a value is from an alternative: another type, another kind by a fixed value, and its errors."""
+    is_another_type = any(one.validator == "type" and not one.relative_path for one in errors)
+    return is_another_type, any(one.validator in {"const", "enum"} for one in errors), len(errors)
 
 
 def _described(error: ValidationError, where: str) -> str:

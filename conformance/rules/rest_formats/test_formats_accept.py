@@ -1,5 +1,10 @@
 """Which format a robot sends for which Accept header (RFC 9110 12.4.2, 12.5.1)."""
 
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+
 import pytest
 
 from conformance.api.expectation import expect
@@ -7,12 +12,15 @@ from conformance.api.rest.accept import quality
 from conformance.api.rest.applicable import answered
 from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
+from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _Q = "rest-formats/q-values"
 _SPECIFIC = "rest-formats/specific-range"
 _DEFAULT = "rest-formats/json-default"
+# A finding names as many further values.
+_NAMED = 11
 # {a} is the default format, {b} and {c} the others (or the default again), {A} to {C} in capitals.
 _MATRIX = (
     (_Q, "{b}"),
@@ -67,23 +75,63 @@ def test_preferred_format(api: RestInterface, judge: Judge) -> None:
     cases = [(call, id_, text) for call in calls for id_, text in _MATRIX]
     # At little effort each line of the matrix is tried with one resource, another one for each line.
     once = [(calls[index % len(calls)], *_MATRIX[index]) for index in range(len(_MATRIX))] if calls else []
-    for call, id_, text in once + api.run.effort.draw(cases, len(cases), f"{api.run.seed}/accept"):
-        _judge_preferred(api, judge, call, id_, text)
+    chosen = once + api.run.effort.draw(cases, len(cases), f"{api.run.seed}/accept")
+    preferred: list[Preferred] = []
+    try:
+        for call, id_, text in chosen:
+            preferred.append(Preferred(id_, call.operation.formats, *_sent(api, call, text)))
+    finally:
+        judge_preferred(judge, preferred)
 
 
-def _judge_preferred(api: RestInterface, judge: Judge, call: Call, id_: str, text: str) -> None:
+def judge_preferred(judge: Judge, preferred: list[Preferred]) -> None:
+    """Judge requests with preferences: one finding for each format that came in place of the preferred one."""
+    failed = defaultdict(list)
+    for one in preferred:
+        if not one.holds:
+            failed[one.got].append(one.accept)
+    for one in preferred:
+        others = [accept for accept in dict.fromkeys(failed[one.got]) if accept != one.accept]
+        more = f" (and for {len(others)} more values of Accept: {' | '.join(others[:_NAMED])})" if others else ""
+        expect(judge, one.requirement, one.exchange).that(one.holds, f"{one.expected}{more}", cause=one.got)
+
+
+def _sent(api: RestInterface, call: Call, text: str) -> tuple[str, Exchange]:
+    """Send a line of the matrix; return the value of Accept, and the exchange."""
     formats = call.operation.formats
     a, b, c = (*formats, *formats)[:3]
     accept = text.format(a=a, b=b, c=c, A=a.upper(), B=b.upper(), C=c.upper())
-    best = max(quality(name, accept) for name in formats)
-    exchange = call.send(api, ("Accept", accept))
-    answer = exchange.response
-    sent = answer.media_type if answer.ok else ""
-    # A robot may have further formats of its own, and send one that is as acceptable.
-    fine = quality(sent, accept) >= best if sent else best == 0
-    best_formats = [name for name in formats if quality(name, accept) == best]
-    expect(judge, id_, exchange).that(
-        fine and (sent != "" or (answer.status == 406)),
-        f"{' or '.join(best_formats) if best else 'status 406'} when Accept is {accept}",
-        cause=f"{text} {sent}",
-    )
+    return accept, call.send(api, ("Accept", accept))
+
+
+@dataclass(frozen=True)
+class Preferred:
+    """A request with preferences, for an operation with these formats."""
+
+    requirement: str
+    formats: tuple[str, ...]
+    accept: str
+    exchange: Exchange
+
+    @property
+    def got(self) -> str:
+        """The media type of a successful response, or the status of another one."""
+        answer = self.exchange.response
+        return answer.media_type if answer.ok else str(answer.status)
+
+    @property
+    def _best(self) -> float:
+        return max(quality(name, self.accept) for name in self.formats)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the response has the preferred format, or none is acceptable and the status is 406."""
+        # A robot may have further formats of its own, and send one that is as acceptable.
+        sent = self.exchange.response.media_type if self.exchange.response.ok else ""
+        return quality(sent, self.accept) >= self._best if sent else not self._best and self.got == "406"
+
+    @property
+    def expected(self) -> str:
+        """What the requirement demands."""
+        names = [name for name in self.formats if quality(name, self.accept) == self._best]
+        return f"{' or '.join(names) if self._best else 'status 406'} when Accept is {self.accept}"
