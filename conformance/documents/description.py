@@ -14,7 +14,7 @@ from urllib.parse import quote, urlsplit
 
 from conformance.commandline.device_options import advice
 from conformance.contract.document_text import parsed
-from conformance.documents.description_faults import unresolved
+from conformance.documents.description_faults import misplaced, reason, unresolved
 from conformance.documents.json_schema import Schema, UnresolvedError
 from conformance.documents.overlay import OverlayError, overlaid
 from conformance.documents.schema_budget import crowd_in
@@ -107,7 +107,8 @@ def _description(source: str, load: Load, overlays: Iterable[str], trust: Trust)
         try:
             document = as_openapi_3(document)
         except (UnresolvedError, AttributeError, TypeError, KeyError) as error:
-            raise DescriptionError(f"{source} is no usable Swagger 2.0 description: {error!r}") from error
+            why = reason(error, misplaced(original), ())
+            raise DescriptionError(f"{source} is no usable Swagger 2.0 description: {why}") from error
     elif not version.startswith("3."):
         raise DescriptionError(f"{source} is no OpenAPI description: it has neither 'openapi: 3...' nor 'swagger: 2.0'")
     if not isinstance(document.get("paths"), dict):
@@ -121,7 +122,7 @@ def _description(source: str, load: Load, overlays: Iterable[str], trust: Trust)
         document = with_sent(document, document, frozenset())
     else:
         uncalled, document = not_called(document), with_sent(document, document)
-    document, unread = without_unreadable(in_one_version(document))
+    document, unread = without_unreadable(in_one_version(document), original)
     base_url, remarks = _base_url(source, document, trust)
     references = (*bundle.unresolved, *broken)
     left_out = (*unread, *bundle.refused)

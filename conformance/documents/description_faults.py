@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
+from itertools import islice
 from typing import Any
 
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed, resolved, shape_of
@@ -12,6 +13,9 @@ from conformance.documents.openapi import methods_of
 from conformance.documents.resources import PARAMETER
 from conformance.documents.schema_places import DATA
 from conformance.documents.schema_words import foreign_words, without_foreign_words
+
+# So many violations are looked at for the reason why a part cannot be read.
+_MOST_FAULTS = 1_000
 
 
 def invalid(original: Schema) -> list[str]:
@@ -25,6 +29,40 @@ def invalid(original: Schema) -> list[str]:
         where = "/".join(str(part) for part in error.instance_path)
         faults.append(f"/{where}: {error.message[:160]}")
     return [*foreign, *sorted(set(faults), key=len)[:20], *_path_parameters(original), *_schemas(original)]
+
+
+def misplaced(original: Schema) -> list[tuple[str, str]]:
+    """Return the members of a description that are of another type than its version says: their places, and how."""
+    version = str(original.get("openapi") or original.get("swagger") or "")[:3]
+    errors = map(_deepest, islice(_validator(version).iter_errors(without_foreign_words(original)), _MOST_FAULTS))
+    return [(f"{_pointer(error.instance_path)}/", error.message[:160]) for error in errors]
+
+
+def _deepest(error: Any) -> Any:
+    """Return the violation that lies deepest, of several alternatives as well."""
+    inner = (_deepest(one) for alternative in getattr(error.kind, "context", ()) for one in alternative)
+    return max((error, *inner), key=lambda one: len(one.instance_path))
+
+
+def _pointer(path: Iterable[object]) -> str:
+    return "".join(f"/{str(part).replace('~', '~0').replace('/', '~1')}" for part in path)
+
+
+def reason(error: Exception, faults: list[tuple[str, str]], *places: Iterable[object]) -> str:
+    """Return why a part of a description cannot be read.
+
+    Args:
+        error: what reading it raised.
+        faults: as `misplaced` returns them.
+        places: where the cause may be, the likeliest first.
+    """
+    if isinstance(error, UnresolvedError):
+        return str(error)
+    for near in map(_pointer, places):
+        for place, fault in faults:
+            if place.startswith(f"{near}/"):
+                return f"at {place.removesuffix('/')}: {fault}"
+    return "a part of it is not as OpenAPI says, or leads back to itself"
 
 
 @lru_cache(maxsize=4)
@@ -57,11 +95,11 @@ def _path_parameters(document: Schema) -> Iterator[str]:
     for path, method, operation, shared in _operations(document):
         own = operation.get("parameters", [])
         given = [*shared, *(own if isinstance(own, list) else [])]
-        declared = {one.get("name") for one in given if isinstance(one, dict) and one.get("in") == "path"}
+        declared = {str(one.get("name")) for one in given if isinstance(one, dict) and one.get("in") == "path"}
         used = set(PARAMETER.findall(path))
         for name in sorted(used - declared):
             yield f"{method} {path} does not declare its path parameter {name}"
-        for name in sorted(declared - used, key=str):
+        for name in sorted(declared - used):
             yield f"{method} {path} declares the path parameter {name}, which is not in the path"
 
 
@@ -164,7 +202,10 @@ def _examples(operation: Schema, shared: list[Any]) -> Iterator[tuple[str, Schem
     body = operation.get("requestBody", {})
     responses = operation.get("responses", {})
     contents = [("the request body", body)] if isinstance(body, dict) else []
-    contents += [(f"the body of status {status}", one) for status, one in responses.items() if isinstance(one, dict)]
+    if isinstance(responses, dict):
+        contents += [
+            (f"the body of status {status}", one) for status, one in responses.items() if isinstance(one, dict)
+        ]
     for place, one in contents:
         content = one.get("content", {})
         for name, media in content.items() if isinstance(content, dict) else ():

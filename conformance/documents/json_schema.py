@@ -126,6 +126,8 @@ class _Resolver:
         }
 
     def _referred(self, value: Schema, reference: str, trail: tuple[str, ...]) -> Any:
+        if reference.startswith(f"{_SCHEME}/"):
+            return value  # the ring in which it is was resolved before
         found = pointed(self._document, reference)
         # OpenAPI 3.0 ignores what stands beside a $ref; `nullable` is taken as its author means it.
         beside = {

@@ -53,7 +53,7 @@ def _inner(schema: dict[str, Any], name: str, pointer: str) -> list[tuple[Holder
     if name in _ONE and isinstance(part, dict | bool):
         return [(schema, name, pointer, True)]
     if name in _NAMED and isinstance(part, dict):
-        return [(part, key, f"{pointer}/{key.replace('~', '~0').replace('/', '~1')}", True) for key in part]
+        return [(part, key, f"{pointer}/{str(key).replace('~', '~0').replace('/', '~1')}", True) for key in part]
     if (name in _SEVERAL or name == "items") and isinstance(part, list):
         return [(part, i, f"{pointer}/{i}", True) for i in range(len(part))]
     return []
@@ -65,7 +65,7 @@ def _outer(value: dict[str, Any], name: str, pointer: str) -> list[tuple[Holder,
     if name in {"schema", "itemSchema"}:
         return [(value, name, pointer, True)]
     if name in {"schemas", "definitions"} and isinstance(part, dict):
-        return [(part, key, f"{pointer}/{key.replace('~', '~0').replace('/', '~1')}", True) for key in part]
+        return [(part, key, f"{pointer}/{str(key).replace('~', '~0').replace('/', '~1')}", True) for key in part]
     if name == FILES:
         return [(part, key, f"{pointer}/{key}", _is_schema(part[key])) for key in part]
     if name in DATA - {"examples"} or not isinstance(part, dict | list):

@@ -91,7 +91,7 @@ def _places(schemes: dict[str, Schema], security: Any) -> Iterator[Place]:
             scheme = schemes.get(name, {})
             if scheme.get("type") == "apiKey":
                 yield place_of(str(scheme.get("in", "")), str(scheme.get("name", "")))
-            elif scheme.get("type") in _OF_HTTP:
+            elif str(scheme.get("type")) in _OF_HTTP:
                 yield _AUTHORIZATION
 
 

@@ -145,10 +145,10 @@ def _form(fields: list[Schema], consumes: Any) -> Schema:
     )
     schema = {
         "type": "object",
-        "properties": {one["name"]: _schema_of(one) for one in fields},
-        "required": [one["name"] for one in fields if one.get("required")],
+        "properties": {str(one["name"]): _schema_of(one) for one in fields},
+        "required": [str(one["name"]) for one in fields if one.get("required")],
     }
-    encoding = {one["name"]: _collection(one) for one in fields if one.get("type") == "array"}
+    encoding = {str(one["name"]): _collection(one) for one in fields if one.get("type") == "array"}
     return {
         "required": bool(schema["required"]),
         "content": {_MULTIPART if is_multipart else _FORM: {"schema": schema, "encoding": encoding}},

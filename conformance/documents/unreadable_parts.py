@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import jsonschema_rs
 
+from conformance.documents.description_faults import misplaced, reason
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed, resolved
 from conformance.documents.openapi import methods_of, read_operations
 from conformance.documents.schema_budget import Growth
@@ -21,17 +22,17 @@ _LINES: Final = 200
 _META: Final = jsonschema_rs.validator_for({"$ref": "https://json-schema.org/draft/2020-12/schema"})
 
 
-def without_unreadable(document: Schema) -> tuple[Schema, list[str]]:
+def without_unreadable(document: Schema, original: Schema | None = None) -> tuple[Schema, list[str]]:
     """Return a document without its unreadable schemas and operations, and a line on each.
 
-    Such a schema allows any value, and such an operation is not there.
+    Such a schema allows any value, and such an operation is not there. The lines name the places in the original.
     """
     document, lines = _without_schemas(document)
     bare = _bare(document)
     try:
         read_operations(bare)
     except _UNREADABLE:
-        found, more = _without_operations(document, bare)
+        found, more = _without_operations(document, bare, misplaced(original or document))
         return found, _some([*lines, *more])
     return document, _some(lines)
 
@@ -89,15 +90,15 @@ def _fault(schema: Any) -> str:
     return "" if error is None else error.message.splitlines()[0][:160]
 
 
-def _without_operations(document: Schema, bare: Schema) -> tuple[Schema, list[str]]:
+def _without_operations(document: Schema, bare: Schema, faults: list[tuple[str, str]]) -> tuple[Schema, list[str]]:
     lines, paths = [], {}
     for path, item in document["paths"].items():
         try:
             whole = pointed(document, item["$ref"]) if isinstance(item, dict) and "$ref" in item else item
-            broken = dict(_broken(bare, path)) if isinstance(whole, dict) else {"": "it is no object"}
+            broken = dict(_broken(bare, path, faults)) if isinstance(whole, dict) else {"": "it is no object"}
         except _UNREADABLE as error:
-            whole, broken = None, {"": f"{type(error).__name__}: {error}"}
-        lines += [f"{f'{method} {path}'.strip()}: not judged: {reason}" for method, reason in broken.items()]
+            whole, broken = None, {"": reason(error, faults, ("paths", path), ("components",))}
+        lines += [f"{f'{method} {path}'.strip()}: not judged: {why}" for method, why in broken.items()]
         if not broken:
             paths[path] = item
         elif isinstance(whole, dict):
@@ -109,7 +110,7 @@ def _without_operations(document: Schema, bare: Schema) -> tuple[Schema, list[st
     return {**document, "paths": paths}, lines
 
 
-def _broken(document: Schema, path: str) -> Iterator[tuple[str, str]]:
+def _broken(document: Schema, path: str, faults: list[tuple[str, str]]) -> Iterator[tuple[str, str]]:
     """Yield the method of each operation of a path that cannot be read, and why."""
     item = resolved(document, document["paths"][path])
     for method, operation in methods_of(item).items():
@@ -117,4 +118,5 @@ def _broken(document: Schema, path: str) -> Iterator[tuple[str, str]]:
         try:
             read_operations({**document, "paths": {path: alone}})
         except _UNREADABLE as error:
-            yield method, f"{type(error).__name__}: {error}"
+            own, shared = ("paths", path, method.lower()), ("paths", path, "parameters")
+            yield method, reason(error, faults, own, shared, ("components",), ("paths", path))
