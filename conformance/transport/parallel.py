@@ -61,11 +61,16 @@ def send_together(rounds: Sequence[Sequence[Outgoing]]) -> list[list[Attempt]]:
                 for request in requests:
                     request.client.connection.take_slot((request.method, request.client.url(request.path)))
                 start = threading.Barrier(len(requests))
-                jobs = [
-                    pool.submit(client.send, request, start.wait)
-                    for client, request in zip(clients, requests, strict=False)
-                ]
-                attempts.append([job.result() for job in jobs])
+                try:
+                    jobs = [
+                        pool.submit(client.send, request, start.wait)
+                        for client, request in zip(clients, requests, strict=False)
+                    ]
+                    attempts.append([job.result() for job in jobs])
+                except BaseException:
+                    # A signal came before all were begun: the others would wait, and the process, without an end.
+                    start.abort()
+                    raise
                 for request in requests:
                     request.client.connection.note(request.method)
                 _tell(requests, attempts[-1])

@@ -26,12 +26,10 @@ CASES = (
     ([{"type": "string", "pattern": "^a"}, {"type": "integer", "minimum": 5}], 3, "less than the minimum of 5"),
     ([{"type": "string", "pattern": "^a"}, {"type": "integer", "minimum": 5}], "b", "does not match '^a'"),
     ([{"type": "string"}, _SIZED], {"size": {"w": "x"}}, 'it.size.w is "x", not of type number'),
-    ([{"$ref": "#/$defs/dog"}, {"$ref": "#/$defs/cat"}], {"kind": "cat"}, "it.meow is missing"),
 )
 
 
 @pytest.mark.parametrize("word", ["oneOf", "anyOf"])
 @pytest.mark.parametrize(("alternatives", "value", "said"), CASES)
 def test_the_alternative_that_fits_best_is_named(word, alternatives, value, said):
-    schema = {word: alternatives, "$defs": {"dog": _DOG, "cat": _CAT}}
-    assert said in shape_of(modern(schema)).problem(value, "it")
+    assert said in shape_of(modern({word: alternatives})).problem(value, "it")

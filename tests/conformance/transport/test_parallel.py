@@ -64,3 +64,32 @@ def test_a_robot_that_does_not_answer_is_an_error(client):
     client.connection.timeout_s = 0.2
     with pytest.raises(NoAnswerError):
         send_together([[Outgoing(client, "GET", "/alone")]])
+
+
+class _Interrupted(list):
+    """Requests of which a signal lets only the first be begun."""
+
+    turns = 0
+
+    def __iter__(self):
+        self.turns += 1
+        for number, request in enumerate(super().__iter__()):
+            if self.turns > 1 and number:
+                raise KeyboardInterrupt
+            yield request
+
+
+def test_a_signal_while_the_requests_are_begun_leaves_no_client_waiting(client):
+    """One such client kept a run alive for ever, after its result was written."""
+    raised = []
+
+    def run():
+        try:
+            send_together([_Interrupted(Outgoing(client, "GET", f"/{number}") for number in range(CLIENTS))])
+        except KeyboardInterrupt:
+            raised.append(1)
+
+    sending = threading.Thread(target=run, daemon=True)
+    sending.start()
+    sending.join(60)
+    assert raised == [1]
