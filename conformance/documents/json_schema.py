@@ -45,6 +45,8 @@ _MOST_JUDGED: Final = 20_000
 _LONGEST_JUDGED: Final = 10_000
 # References that lead to a violation in one value: alternatives that refer to each other multiply.
 _MOST_FOLLOWED: Final = 1_000
+# How a lazy reference is written where `bundled` has put what it leads to.
+_BUNDLED: Final = re.compile(r"#/\$defs/(\d+(?:,\w+)*)")
 _LAZY: Final[list[tuple[Schema, str]]] = []
 _LAZY_NUMBERS: Final[dict[tuple[int, str], int]] = {}
 _VALUES: Final = frozenset({"example", "examples", "default", "enum", "const"})
@@ -346,8 +348,7 @@ def _followed(validator: Any, reference: str, instance: Any, schema: Schema) -> 
     """
     from jsonschema import Draft202012Validator  # noqa: PLC0415 - as above
 
-    uri = f"{_SCHEME}/{reference.removeprefix('#/$defs/')}" if reference.startswith("#/$defs/") else ""
-    if uri and _surely_holds(uri, instance):
+    if (found := _BUNDLED.fullmatch(reference)) and _surely_holds(f"{_SCHEME}/{found[1]}", instance):
         return
     _FOLLOWED.count += 1
     if _FOLLOWED.count > _MOST_FOLLOWED:

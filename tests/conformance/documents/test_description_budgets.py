@@ -223,3 +223,9 @@ def test_the_actions_of_an_overlay_have_one_budget(name: str) -> None:
 
     with pytest.raises(DescriptionError, match=r"beyond the limit of an overlay"):
         read_description("a.json", lambda source: json.dumps(files[source]).encode(), ["o.json"])
+
+
+def test_a_reference_to_definitions_of_its_own_is_followed() -> None:
+    shape = Shape({"$ref": "#/$defs/name", "$defs": {"name": {"type": "string"}, "1": {"type": "integer"}}})
+    assert (shape.problem("a"), shape.holds(1)) == ("", False)
+    assert shape.problem(1)
