@@ -58,6 +58,8 @@ _ACTING: Final = 12
 TIMED: Final = 5
 # One of so many requests is the first on its connection.
 _FRESH: Final = 5
+# A device may have the run's deadline for its own work, and tell by a response that it is over: that is no hang.
+_GRACE: Final = 1.25
 # How often a thing is created and deleted.
 _CYCLES: Final = 24
 # An operation that once took more than a second gets this part of the requests.
@@ -273,7 +275,7 @@ class Surveyor:
         """
         self.api.is_recorded = True
         try:
-            return request.send(self.api, fresh=fresh)
+            return request.send(self.api, fresh=fresh, timeout_s=_GRACE * self.api.client.connection.timeout_s)
         finally:
             self.api.is_recorded = False
 

@@ -29,8 +29,13 @@ class GeneratedRequest:
         """The Content-Type without parameters."""
         return media_type_of(self.content_type)
 
-    def send(self, api: RestInterface, *, fresh: bool = False) -> Exchange:
-        """Send the request through the run's client; ``fresh``: on a connection of its own.
+    def send(self, api: RestInterface, *, fresh: bool = False, timeout_s: float | None = None) -> Exchange:
+        """Send the request through the run's client.
+
+        Args:
+            api: the device's REST interface.
+            fresh: on a connection of its own.
+            timeout_s: deadline instead of the run's, s.
 
         Raises:
             NoAnswerError: no HTTP response was received.
@@ -38,4 +43,6 @@ class GeneratedRequest:
         fields = [*self.headers, *([("Content-Type", self.content_type)] if self.content_type else [])]
         # Clients send these again when a kept connection ends (RFC 9112 9.3.1), which hides a device that hangs up.
         fresh = fresh or self.method in {"PUT", "DELETE"}
-        return api.client.send(self.method, self.target, headers=fields, body=self.body, fresh=fresh)
+        return api.client.send(
+            self.method, self.target, headers=fields, body=self.body, fresh=fresh, timeout_s=timeout_s
+        )
