@@ -124,7 +124,9 @@ class DistributedExecutor:
         self.runner.start(plan.connections, spawn_rate=plan.connections)
 
     def _wait(self, reached: Callable[[], bool], what: str) -> None:
-        deadline = time.monotonic() + (_READY_S if self._expected <= self._processes else 10 * _READY_S)
+        # Workers of other machines are started by hand; once all are there, nobody can join.
+        by_hand = self._expected > self._processes and not self._dealt_out
+        deadline = time.monotonic() + (10 * _READY_S if by_hand else _READY_S)
         while not reached():
             gevent.sleep(0.02)
             if self.stopped():

@@ -57,8 +57,12 @@ class Renewing:
         self._threads = [threading.Thread(target=self._renew, args=(one, number)) for one in range(number)]
 
     def __enter__(self) -> Self:
-        for one in self._threads:
-            one.start()
+        try:
+            for one in self._threads:
+                one.start()
+        except BaseException:
+            self._over.set()  # nothing else would end those that have begun
+            raise
         return self
 
     def __exit__(

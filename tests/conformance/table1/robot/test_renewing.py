@@ -115,6 +115,17 @@ def test_each_renewal_is_told_when_they_are_over(body, drive):
     assert told.count("PUT") == body.puts
 
 
+def test_no_renewal_goes_on_where_not_all_could_be_begun(drive):
+    renewing = _renewing(drive)
+    threads = vars(renewing)["_threads"]
+    threads[-1].start()  # its second start fails
+    with pytest.raises(RuntimeError), renewing:
+        pass
+    for one in threads:
+        one.join(60)
+    assert not any(one.is_alive() for one in threads)
+
+
 def test_rest_needs_no_renewal(body, drive):
     with drive.held(STILL_VELOCITY) as lasted:
         assert lasted(drive.clock.now())
