@@ -29,6 +29,8 @@ from conformance.verdict.case import Checker
 from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
+# So long the modules that later checks need are awaited, s.
+_PREPARES_S: Final = 30.0
 # What is imported late because few commands need it, and is needed later in a run.
 _NEEDED_LATER: Final = ("schemathesis.specs.openapi", "jsonschema")
 
@@ -114,10 +116,11 @@ def _prepared(interfaces: Interfaces, run: Run) -> Iterator[None]:
     services = tuple(interfaces.soap.there.values())
     for service in services:
         _ = service.own  # may send requests: here, and not at any moment of a drive
-    thread = threading.Thread(target=_prepare, args=(services, run), name="preparing")
+    # A signal during an import may leave its lock held: then this thread never ends.
+    thread = threading.Thread(target=_prepare, args=(services, run), name="preparing", daemon=True)
     thread.start()
     yield
-    thread.join()
+    thread.join(_PREPARES_S)
 
 
 def _prepare(services: Iterable[SoapService], run: Run) -> None:
