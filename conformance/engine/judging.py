@@ -1,10 +1,12 @@
 """``roaas judge``: judge what a run left, its history and its traces, by the present rules, without the device."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from conformance.api.rest.habits import Habits
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.address import split
 from conformance.api.soap.service import SoapService
@@ -18,13 +20,14 @@ from conformance.history.events import Ended, Sent, Span, Withdrawn
 from conformance.history.reading import read_history
 from conformance.history.writing import HISTORY_NAME
 from conformance.scenarios.rule import Rule, record
-from conformance.scenarios.scenario import Scenario
+from conformance.scenarios.scenario import Recordings, Scenario
 from conformance.scenarios.stored import TRACES_NAME, read_traces
+from conformance.scenarios.survey import generated_requests, survey
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, Listener
 from conformance.transport.parallel import is_busy
 from conformance.transport.passage import Heard
-from conformance.verdict.case import Checker
+from conformance.verdict.case import Case, Checker
 from conformance.verdict.evidence import Judge
 from conformance.verdict.observers import Observers
 from conformance.verdict.verdicts import Verdict
@@ -60,10 +63,11 @@ def judge_stored(robot: RobotUnderTest, target: Mapping[str, Any], folder: Path)
     """
     run, requests, ended = robot.run, 0, True
     there = {name for name in (HISTORY_NAME, TRACES_NAME) if (folder / name).exists()}
+    rules = _rules(robot) if TRACES_NAME in there else []
+    traces = read_traces(folder / TRACES_NAME, [scenario for _, scenario in rules]) if rules else Recordings()
     if HISTORY_NAME in there or not there:
-        requests, ended = _judge_history(robot, target, folder / HISTORY_NAME)
-    if TRACES_NAME in there:
-        _judge_traces(robot, folder)
+        requests, ended = _judge_history(robot, target, folder / HISTORY_NAME, traces)
+    _judge_traces(robot, rules, traces)
     for evidence in run.judge.evidence.values():
         # A part that takes an experiment is the run's affair.
         evidence.parts = {part: cases for part, cases in evidence.parts.items() if cases}
@@ -72,11 +76,13 @@ def judge_stored(robot: RobotUnderTest, target: Mapping[str, Any], folder: Path)
     return Judged(judged, requests, ended, tuple(run.judge.faults))
 
 
-def _judge_history(robot: RobotUnderTest, target: Mapping[str, Any], path: Path) -> tuple[int, bool]:
+def _judge_history(
+    robot: RobotUnderTest, target: Mapping[str, Any], path: Path, traces: Recordings
+) -> tuple[int, bool]:
     """Judge each exchange as in the run; return how many requests there are, and whether the run ended."""
     events, judge = list(read_history(path)), robot.run.judge
     withdrawn = {event.id for event in events if isinstance(event, Withdrawn)}
-    listeners, requests = list(_listeners(robot, target)), 0
+    listeners, requests = list(_listeners(robot, target, traces)), 0
     for event in events:
         if isinstance(event, Span):
             judge.begin(event.name)
@@ -101,17 +107,39 @@ def _tell(judge: Judge, listeners: list[Listener], outcome: Attempt) -> None:
             listener.unanswered(outcome)
 
 
-def _listeners(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[Listener]:
+def _listeners(robot: RobotUnderTest, target: Mapping[str, Any], traces: Recordings) -> Iterator[Listener]:
     """Yield what judges the exchanges of a run, whichever check sent them."""
     run, services = robot.run, list(_services(robot, target))
     checkers: list[Checker] = []
     if rest := target.get("rest"):
         api = RestInterface(run, HttpClient(str(rest), Connection()))
         yield from api.device.observers(api)
+        checkers.append(_crashes(api, traces))
         checkers.append(RestCheckers(run.contract, api.client.base_url, [one.endpoint for one in services]))
     if services:
         checkers.append(SoapCheckers({one.endpoint: answers_of(one.contract) for one in services}))
     yield Observers(run.judge, checkers)
+
+
+def _crashes(api: RestInterface, traces: Recordings) -> Checker:
+    """Return the checker of crashes, which leaves out what a survey recorded: its rules judge that."""
+    played = [traces.played[one.name].trace for one in (survey, generated_requests) if one.name in traces.played]
+    recorded = Counter(_key(probe.exchange) for trace in played for probe in trace.probes if probe.exchange)
+    habits = Habits(api)
+
+    def judged(attempt: Attempt) -> Iterator[Case]:
+        if isinstance(attempt, Exchange):
+            key = _key(attempt)
+            api.is_recorded = recorded[key] > 0
+            recorded[key] -= 1
+            yield from habits(attempt)
+
+    return judged
+
+
+def _key(exchange: Exchange) -> tuple[str, str, bytes, int, bytes]:
+    request, response = exchange.request, exchange.response
+    return request.method, request.url, request.body, response.status, response.body
 
 
 def _services(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[SoapService]:
@@ -126,18 +154,18 @@ def _services(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[Soap
             yield SoapService(name, HttpClient(base, Connection()), below, contract_wsdl_path=path)
 
 
-def _judge_traces(robot: RobotUnderTest, folder: Path) -> None:
+def _rules(robot: RobotUnderTest) -> list[tuple[Rule, Scenario]]:
+    """Return the contract's rules on traces."""
+    marks = (item.get_closest_marker("rule") for item in collected(robot))
+    return [mark.args for mark in marks if mark is not None]
+
+
+def _judge_traces(robot: RobotUnderTest, rules: list[tuple[Rule, Scenario]], traces: Recordings) -> None:
     """Judge the traces of scenarios by the contract's rules."""
-    rules: list[tuple[Rule, Scenario]] = []
-    for item in collected(robot):
-        mark = item.get_closest_marker("rule")
-        if mark is not None:
-            rules.append(mark.args)
-    recordings = read_traces(folder / TRACES_NAME, [scenario for _, scenario in rules])
     run = robot.run
     moves = run.statement.motion_map
     known: dict[str, Any] = {"run": run, "statement": run.statement, "effort": run.effort, "motion": moves}
     for rule, scenario in rules:
-        recording = recordings.played.get(scenario.name)
+        recording = traces.played.get(scenario.name)
         if recording is not None and (moves or "motion" not in rule.fixtures):
             record(run.judge, rule.requirement, rule.outcomes(recording.trace, known.__getitem__))

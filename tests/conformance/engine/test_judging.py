@@ -62,6 +62,23 @@ def test_verdicts_cases_and_causes_are_those_of_the_run(run):
     assert f"{done.result['requests']} requests in the history" in text.replace(",", "")
 
 
+@pytest.mark.parametrize("crashes", [{"HEAD"}, {"GET", "HEAD"}])
+def test_a_crash_is_judged_once_whichever_check_met_it(tmp_path, crashes):
+    """A survey's rule judges GET; no scenario records HEAD."""
+    turns = itertools.count(1)
+
+    async def state(request):
+        is_well = request.method not in crashes or next(turns) % 2
+        return web.json_response({"on": True}, status=200 if is_well else 500)
+
+    with small_device(described({"/state": reading(_STATE)}), {"/state": {"GET": state}}) as url:
+        done = certified(url, tmp_path / "out")
+    one = next(one for one in done.result["requirements"] if one["id"] == "robustness/no-server-error")
+    assert one["verdict"] == "fail", done.text
+    _, text = _judged(tmp_path / "out", one["id"])
+    assert text.startswith(f"fail: {one['id']} ({one['cases']} cases)"), (text, one)
+
+
 def test_one_requirement_is_told_by_its_id(run):
     code, text = _judged(run[0], "http/field-once")
     assert (code, text.splitlines()[0].startswith("pass: http/field-once (")) == (0, True)
