@@ -332,3 +332,64 @@ def test_a_type_that_no_compiler_ends_with_is_refused(content: str) -> None:
         _read(_schema("urn:t", content))
 
     assert time.process_time() - started < 5
+
+
+def _derived(count: int) -> str:
+    one = '<xs:complexType name="C{}"><xs:complexContent><xs:extension base="{}"/></xs:complexContent></xs:complexType>'
+    first = '<xs:complexType name="C0"><xs:sequence/></xs:complexType>'
+    types = "".join(one.format(number, f"t:C{number - 1}") for number in range(1, count))
+    return first + types + _got(f'<xs:sequence><xs:element name="a" type="t:C{count - 1}"/></xs:sequence>')
+
+
+def _inside(count: int) -> str:
+    one = '<xs:complexType name="C{}"><xs:sequence><xs:element name="a" type="{}"/></xs:sequence></xs:complexType>'
+    types = "".join(one.format(number, f"t:C{number + 1}") for number in range(count))
+    last = f'<xs:simpleType name="C{count}"><xs:restriction base="xs:int"/></xs:simpleType>'
+    return types + last + _got('<xs:sequence><xs:element name="a" type="t:C0"/></xs:sequence>')
+
+
+def _repeated(times: int, depth: int, how: str = "minOccurs") -> str:
+    group = f'<xs:sequence minOccurs="{{}}" maxOccurs="{times}">'.format(times if how == "minOccurs" else 0)
+    return _got(group * depth + '<xs:element name="v" type="xs:int"/>' + "</xs:sequence>" * depth)
+
+
+def _text(pattern: str) -> str:
+    facet = f'<xs:restriction base="xs:string"><xs:pattern value="{pattern}"/></xs:restriction>'
+    return _got(f'<xs:sequence><xs:element name="a"><xs:simpleType>{facet}</xs:simpleType></xs:element></xs:sequence>')
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (_derived(2000), "a chain of more than 150 types"),
+        (_inside(2000), "a chain of more than 150 types"),
+        (_repeated(1000, 4), "more than 10,000 elements, unrolled"),
+        (_repeated(20_000, 1), "more than 10,000 elements, unrolled"),
+        (_text("(a|b)*" * 1000 + "c"), "a pattern of 6,001 characters"),
+    ],
+    ids=["derived", "inside", "repeated in repeated", "repeated", "pattern"],
+)
+def test_what_takes_a_compiler_all_memory_is_refused(content: str, reason: str) -> None:
+    started = time.process_time()
+
+    with pytest.raises(WsdlError, match=reason):
+        _read(_schema("urn:t", content))
+
+    assert time.process_time() - started < 5
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        _derived(30),
+        _inside(30),
+        _repeated(100, 1),
+        _repeated(99_999, 1, "maxOccurs"),
+        _text("(a|b)*[A-Z]{3}(-\\d{2}){1,5}"),
+        '<xs:complexType name="C"><xs:sequence><xs:element name="c" type="t:C" minOccurs="0"/></xs:sequence>'
+        "</xs:complexType>" + _got('<xs:sequence><xs:element name="a" type="t:C"/></xs:sequence>'),
+    ],
+    ids=["derived", "inside", "repeated", "repeated at most", "pattern", "within itself"],
+)
+def test_what_real_services_have_is_compiled(content: str) -> None:
+    assert _read(_schema("urn:t", content)).ports
