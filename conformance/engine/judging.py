@@ -64,7 +64,8 @@ def judge_stored(robot: RobotUnderTest, target: Mapping[str, Any], folder: Path)
     run, requests, ended = robot.run, 0, True
     there = {name for name in (HISTORY_NAME, TRACES_NAME) if (folder / name).exists()}
     rules = _rules(robot) if TRACES_NAME in there else []
-    traces = read_traces(folder / TRACES_NAME, [scenario for _, scenario in rules]) if rules else Recordings()
+    known = [scenario for _, scenario in rules]
+    traces = read_traces(folder / TRACES_NAME, known, run.judge.fault) if known else Recordings()
     if HISTORY_NAME in there or not there:
         requests, ended = _judge_history(robot, target, folder / HISTORY_NAME, traces)
     _judge_traces(robot, rules, traces)

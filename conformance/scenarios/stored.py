@@ -6,7 +6,7 @@ type of its trace; msgspec encodes and decodes.
 
 import gzip
 import typing
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -45,11 +45,16 @@ def write_traces(recordings: Recordings, folder: Path) -> Path | None:
     return write_octets(path, gzip.compress(msgspec.json.encode(traces, enc_hook=_plain), _FAST, mtime=0))
 
 
-def read_traces(path: Path, scenarios: Iterable[Scenario]) -> Recordings:
+def read_traces(path: Path, scenarios: Iterable[Scenario], report: Callable[[str, Exception], None]) -> Recordings:
     """Read a file of traces; return the recordings of known scenarios.
 
+    Args:
+        path: the file.
+        scenarios: those that are known.
+        report: is called for a trace that is not of its scenario's type, as one of an earlier version may be.
+
     Raises:
-        TracesError: the file cannot be read, or a trace is not of its scenario's type.
+        TracesError: the file cannot be read.
     """
     try:
         octets = unzipped(read_octets(path), _MOST)
@@ -62,8 +67,9 @@ def read_traces(path: Path, scenarios: Iterable[Scenario]) -> Recordings:
             try:
                 trace = msgspec.json.decode(raw[scenario.name], type=_type_of(scenario), dec_hook=_rich)
             except (ValueError, RecursionError) as error:
-                raise TracesError(f"{path}: the trace of {scenario.name} is not well made: {error}") from error
-            played[scenario.name] = Recording(trace)
+                report(f"the trace of {scenario.name}", error)
+            else:
+                played[scenario.name] = Recording(trace)
     return Recordings(played)
 
 

@@ -1,8 +1,10 @@
 """`roaas judge`: a stored run is judged as it was judged, also where it was cut short, and nothing is sent."""
 
 import asyncio
+import gzip
 import itertools
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -134,3 +136,13 @@ def test_what_no_check_listened_to_is_not_judged(run, tmp_path):
         assert len(list(read_history(tmp_path / HISTORY_NAME))) == 2 + len(passages) + len(withdrawn)
         code, text = _judged(tmp_path, "http/date-format")
         assert code == expected, (passages, text)
+
+
+def test_a_trace_of_an_earlier_version_is_named_and_the_rest_is_judged(run, tmp_path):
+    shutil.copytree(run[0], tmp_path / "out")
+    traces = json.loads(gzip.decompress((tmp_path / "out" / "traces.json.gz").read_bytes()))
+    traces["survey"] = {"probes": [{"of": "another version"}]}
+    (tmp_path / "out" / "traces.json.gz").write_bytes(gzip.compress(json.dumps(traces).encode()))
+    done = ended(sys.executable, "-m", "roaas", "judge", tmp_path / "out")
+    assert (done.returncode, "fail: http/date-format (" in done.stdout) == (1, True), done.stdout
+    assert "the trace of survey: not judged" in done.stderr
