@@ -163,7 +163,9 @@ def _alike(value: Any, other: Any, schema: Schema) -> bool:  # noqa: PLR0911 - o
 
 
 def _letters(value: Any) -> str:
-    """Return a scalar as text without case, space and punctuation."""
+    """Return a scalar as text without case, space and punctuation, and a number rounded."""
+    if is_number(value):
+        return f"{float(value):.6g}"
     text = "" if value is None else str(value)
     return "".join(one for one in text.casefold() if one.isalnum())
 
