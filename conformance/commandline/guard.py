@@ -23,7 +23,7 @@ _SHOWN = 300
 # What Python and the loader of its modules say where the memory of a process is limited, beside MemoryError.
 _NO_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread", "out of memory")
 # With fewer, libraries end the process in the middle of a run, with exit code 1 or an abort, and not with MemoryError.
-_LEAST_MB = {"certify": 400, "replay": 400, "load": 1_200}
+_LEAST_MB = {"certify": 400, "replay": 400, "judge": 400, "explain": 120, "load": 1_200}
 # Freed where memory ends, so that this can be told.
 _RESERVE = bytearray(1 << 20)
 
@@ -83,9 +83,14 @@ def inert_lines(text: str) -> str:
     return "\n".join(map(inert, text.split("\n")))
 
 
+def is_of_memory(error: BaseException) -> bool:
+    """Return whether an exception says that a process gets no more memory or threads."""
+    return isinstance(error, MemoryError) or any(said in str(error).lower() for said in _NO_MEMORY)
+
+
 def report_failure(error: Exception) -> ExitCode:
     """Print one sentence on an exception that no command expects, and where the details are; return the exit code."""
-    if isinstance(error, MemoryError) or any(said in str(error).lower() for said in _NO_MEMORY):
+    if is_of_memory(error):
         _RESERVE.clear()
         traceback.clear_frames(error.__traceback__)
         click.echo(

@@ -19,6 +19,7 @@ from typing import Any
 
 import msgspec
 
+from conformance.commandline.guard import is_of_memory
 from conformance.contract.classes import FULL, ConformanceClass, Topic
 from conformance.contract.described import DOCUMENT_NAME, ORIGINAL_NAME, UNRESOLVED_NAME
 from conformance.contract.document_text import parsed
@@ -329,6 +330,8 @@ class Contract:
         try:
             return module_of(self.directory / named) if named.endswith(".py") else import_module(named)
         except (ImportError, OSError, SyntaxError) as error:
+            if is_of_memory(error):
+                raise MemoryError from error
             raise ContractError(
                 f"{self.directory / MANIFEST}: the plugin {named} cannot be imported: {error}"
             ) from error

@@ -17,6 +17,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+from conformance.commandline.guard import is_of_memory
 from conformance.contract.locating import ContractError, module_of
 from conformance.contract.pack import Contract
 from conformance.mutation.messages import Change
@@ -174,6 +175,8 @@ def self_test_of(contract: Contract) -> SelfTest:
     try:
         found = getattr(import_module(named) if named else module_of(path), "SELFTEST", None)
     except (ImportError, OSError, SyntaxError) as error:
+        if is_of_memory(error):
+            raise MemoryError from error
         raise ContractError(f"{contract.directory}: {named or MODULE} cannot be imported: {error}") from error
     if not isinstance(found, SelfTest):
         raise ContractError(f"{contract.directory}: {named or MODULE} has no SELFTEST, a SelfTest of {__name__}")
