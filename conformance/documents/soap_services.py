@@ -20,6 +20,7 @@ from conformance.documents.wsdl_imports import Fetch, Locate, collect
 from conformance.documents.xml_names import ENVELOPE, WSDL, WSDL_SOAP, XSD, clark
 from conformance.documents.xsd import SchemaError, Types
 from conformance.documents.xsd_assembly import SchemaDocument, rpc_wrapper
+from conformance.documents.xsd_shapes import too_large
 from conformance.transport.reach import server_of
 
 ENVELOPE_12: Final = "http://www.w3.org/2003/05/soap-envelope"
@@ -130,21 +131,22 @@ def read_services(
     if not ports:
         how = advice(" with --base-url", ", as in [api] base_url of a statement")
         raise WsdlError(f"{location} has no port over HTTP: name the address of the service{how}")
+    calls = [(f"{one.name} of port {port.name}", one) for port in ports for one in port.operations]
+    named = [(who, tag) for who, one in calls for tag in (one.request, one.response) if tag]
     try:
         types = Types.compiled([*found.schemas, *reader.wrappers])
+        faults, notes = gaps(found, types, location, named)
     except SchemaError as error:
         raise WsdlError(f"the schemas of {location} do not compile: {error}") from error
-    named = [
-        (f"{operation.name} of port {port.name}", tag)
-        for port in ports
-        for operation in port.operations
-        for tag in filter(None, (operation.request, operation.response))
-    ]
-    faults, notes = gaps(found, types, location, named)
-    faults += reader.faults
+    ports = tuple(replace(port, operations=tuple(_bounded(port.operations, types))) for port in ports)
     name = found.definitions[0].get("name") or ports[0].service
-    faults, notes = ([], [*notes, *faults]) if foreign else (faults, notes)
+    faults, notes = ([], [*notes, *faults, *reader.faults]) if foreign else ([*faults, *reader.faults], notes)
     return SoapDescription(name, ports, types, tuple(dict.fromkeys(faults)), tuple(dict.fromkeys(notes)), foreign)
+
+
+def _bounded(operations: tuple[SoapOperation, ...], types: Types) -> Iterator[SoapOperation]:
+    for one in operations:
+        yield replace(one, remark=one.remark or too_large(types.shape(one.request)))
 
 
 class _Reader:
@@ -155,6 +157,7 @@ class _Reader:
         self.wrappers: list[SchemaDocument] = []
         self.faults: list[str] = []
         self._made: set[str] = set()
+        self._by_name: dict[str, dict[str, etree._Element]] = {}
 
     def _all(self, path: str) -> list[etree._Element]:
         found: list[etree._Element] = []
@@ -166,10 +169,13 @@ class _Reader:
     def _named(self, path: str, reference: etree._Element, attribute: str) -> etree._Element | None:
         """Return what a QName in an attribute refers to."""
         wanted = _qname(reference, reference.get(attribute) or "")
-        for element in self._all(path):
-            space = next((root.get("targetNamespace") or "" for root in self._definitions if _has(root, element)), "")
-            if clark(space, element.get("name") or "") == wanted:
-                return element
+        if path not in self._by_name:
+            self._by_name[path] = {  # of two with one name the first counts
+                clark(one.getroottree().getroot().get("targetNamespace") or "", one.get("name") or ""): one
+                for one in reversed(self._all(path))
+            }
+        if wanted in self._by_name[path]:
+            return self._by_name[path][wanted]
         self.faults.append(f"{attribute} of {reference.get('name') or 'a port'} names {wanted}, which is not there")
         return None
 
@@ -281,10 +287,6 @@ def _soap(parent: etree._Element, name: str) -> etree._Element | None:
     tags = [clark(space, name) for space in _SPACES]
     found = (parent.find(f"{place}{tag}") for tag in tags for place in ("", f"{_MULTIPART}/{_PART}/"))
     return next((one for one in found if one is not None), None)
-
-
-def _has(root: etree._Element, element: etree._Element) -> bool:
-    return element.getroottree().getroot() is root
 
 
 def _qname(element: etree._Element, text: str) -> str:

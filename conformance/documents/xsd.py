@@ -6,7 +6,6 @@ A message counts as valid or invalid only if both agree, so that a bug in one of
 from __future__ import annotations
 
 import copy
-import math
 import re
 import tempfile
 from collections.abc import Sequence
@@ -17,9 +16,12 @@ from lxml import etree
 
 from conformance.documents.xml_names import XSD, XSI, clark
 from conformance.documents.xsd_assembly import SchemaDocument, assemble
+from conformance.documents.xsd_budget import beyond_compilers
 from conformance.documents.xsd_shapes import Element, shape
 
 _SHOWN: Final = 300
+# So deep may the groups of a type lie in each other, those of its base types included.
+_DEEPEST: Final = 400
 # How xmlschema compiles, in turn: as XSD 1.0, as XSD 1.1, and in spite of errors, which are recorded.
 _WAYS: Final = (("XMLSchema10", "strict"), ("XMLSchema11", "strict"), ("XMLSchema10", "lax"))
 
@@ -28,21 +30,6 @@ _TYPE: Final = clark(XSI, "type")
 _PATTERN: Final = clark(XSD, "pattern")
 # A repeated group with a repetition or alternatives in it.
 _SLOW: Final = re.compile(r"\((?:.*[+*}|].*)\)[+*{]", re.DOTALL)
-
-
-# The compilers build an automaton for each type, of a size that may be the square of its particles; a group counts as
-# often as it is referred to.
-_MOST_PARTICLES: Final = 1_000
-_DEEPEST: Final = 100
-# A group is unrolled as often as it occurs at least, in nearly 40 kB for each particle.
-_MOST_UNROLLED: Final = 10_000
-# So many types may each be derived from the next one, or have a member of it.
-_MOST_CHAINED: Final = 150
-_LONGEST_PATTERN: Final = 5_000
-_MOST_GROUPS: Final = 300
-_MODELS: Final = tuple(clark(XSD, name) for name in ("sequence", "choice", "all", "group"))
-_REFERENCES: Final = ("type", "base", "itemType")
-_PARTICLES: Final = tuple(clark(XSD, name) for name in ("element", "any", "attribute", "group", "attributeGroup"))
 
 
 class SchemaError(ValueError):
@@ -63,15 +50,15 @@ class Types:
         # Imported late: it takes a sixth of a second, and nothing is compiled before the robot is on its way to a goal.
         import xmlschema  # noqa: PLC0415
 
+        # By itself it refuses types derived over 15 levels.
+        xmlschema.limits.MAX_MODEL_DEPTH = _DEEPEST
         self.libxml: etree.XMLSchema | None = None
         self.python: Any = None
         self.problems: list[str] = []
         self.is_11 = False
         self._errors = xmlschema.XMLSchemaException
         self._shapes: dict[str, Element | None] = {}
-        if name := _too_large(documents):
-            raise SchemaError(f"{name} has more than {_MOST_PARTICLES:,} elements or attributes, groups included")
-        if problem := _beyond_compilers(documents):
+        if problem := beyond_compilers(documents):
             raise SchemaError(problem)
         with tempfile.TemporaryDirectory(prefix="roaas-xsd-") as folder:
             try:
@@ -107,10 +94,17 @@ class Types:
         return _COMPILED[key]
 
     def shape(self, tag: str) -> Element | None:
-        """Return the global element with a tag, or None."""
+        """Return the global element with a tag, or None.
+
+        Raises:
+            SchemaError: its types lie too deep in each other.
+        """
         if tag not in self._shapes:
             declared = self.python.maps.elements.get(tag)
-            self._shapes[tag] = None if declared is None else shape(declared)
+            try:
+                self._shapes[tag] = None if declared is None else shape(declared)
+            except (self._errors, RecursionError) as error:
+                raise SchemaError(f"the types of {tag} lie too deep in each other: {error}"[:_SHOWN]) from error
         return self._shapes[tag]
 
     def libxml_problem(self, element: etree._Element) -> str:
@@ -163,83 +157,6 @@ class Types:
 
 
 _COMPILED: Final[dict[tuple[tuple[str, bytes], ...], Types]] = {}
-
-
-def _too_large(documents: Sequence[SchemaDocument]) -> str:
-    """Return the name of a type or group that no compiler can be given; empty if there is none."""
-    wholes = [whole for one in documents for whole in one.root.iterchildren(etree.Element)]
-    groups = {(whole.tag, whole.get("name")): whole for whole in wholes}
-    sizes: dict[etree._Element, int] = {}
-
-    def size(whole: etree._Element, depth: int = 0) -> int:
-        if whole not in sizes:
-            sizes[whole] = 1  # of a group within itself
-            total = 0
-            for part in whole.iter(*_PARTICLES):
-                group = groups.get((part.tag, part.get("ref", "").rpartition(":")[2])) if part.get("ref") else None
-                is_group = group is not None and part.tag.endswith("roup") and depth <= _DEEPEST
-                total += size(group, depth + 1) if group is not None and is_group else 1
-                if total > _MOST_PARTICLES:
-                    break
-            sizes[whole] = total
-        return sizes[whole]
-
-    found = next((one for one in wholes if size(one) > _MOST_PARTICLES), None)
-    return "" if found is None else f"{etree.QName(found).localname} {found.get('name')}"
-
-
-def _beyond_compilers(documents: Sequence[SchemaDocument]) -> str:
-    """Return what would take a compiler more memory or time than there is; empty if there is nothing."""
-    for one in documents:
-        for model in one.root.iter(*_MODELS):
-            around = [model, *(outer for outer in model.iterancestors() if outer.tag in _MODELS)]
-            repeated = math.prod(map(_times, around))
-            if repeated > 1 and repeated * sum(1 for _ in model.iter(*_PARTICLES)) > _MOST_UNROLLED:
-                owner = next((outer.get("name") for outer in model.iterancestors() if outer.get("name")), "a type")
-                return f"the repeated groups of {owner} have more than {_MOST_UNROLLED:,} elements, unrolled"
-        for pattern in one.root.iter(_PATTERN):
-            text = pattern.get("value", "")
-            if len(text) > _LONGEST_PATTERN or text.count("(") > _MOST_GROUPS:
-                return f"a pattern of {len(text):,} characters and {text.count('('):,} groups"
-    chain = _longest_chain([whole for one in documents for whole in one.root.iterchildren(etree.Element)])
-    return f"type {chain} begins a chain of more than {_MOST_CHAINED} types" if chain else ""
-
-
-def _times(model: etree._Element) -> int:
-    """Return how often a group of particles is repeated at least; for the rest, compilers have counters."""
-    least = model.get("minOccurs", "1")
-    return max(int(least), 1) if least.isascii() and least.isdigit() else 1
-
-
-def _longest_chain(wholes: Sequence[etree._Element]) -> str:
-    """Return the name of a type from which more than the allowed number of types follow each other, or nothing."""
-    types = {str(whole.get("name")): whole for whole in wholes if whole.get("name") and whole.tag.endswith("Type")}
-    nexts = {
-        name: {
-            target
-            for part in whole.iter(etree.Element)
-            for word in _REFERENCES
-            if (target := part.get(word, "").rpartition(":")[2]) in types and target != name
-        }
-        for name, whole in types.items()
-    }
-    depths: dict[str, int] = {}
-    for start, first in nexts.items():
-        # What is under way has no depth yet: a type within itself is no longer chain.
-        waiting, under_way = [(start, iter(first))], {start}
-        while waiting:
-            name, rest = waiting[-1]
-            deeper = next((one for one in rest if one not in depths and one not in under_way), None)
-            if deeper is not None:
-                waiting.append((deeper, iter(nexts[deeper])))
-                under_way.add(deeper)
-                continue
-            waiting.pop()
-            under_way.discard(name)
-            depths[name] = 1 + max((depths.get(one, 0) for one in nexts[name]), default=0)
-            if depths[name] > _MOST_CHAINED:
-                return name
-    return ""
 
 
 def _without_slow_patterns(folder: Path) -> bool:

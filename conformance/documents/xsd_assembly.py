@@ -99,7 +99,7 @@ def assemble(documents: Sequence[SchemaDocument], folder: Path) -> Assembly:
             made.twice += _declare(known, root, space, drop=outer and len(spaces[document.location]) == 1)
     for document, root in zip(documents, roots, strict=True):
         for space in spaces[document.location]:
-            made.unknown += (one for one in _references(root, space) if one not in known and one not in made.unknown)
+            made.unknown += (one for one in references(root, space) if one not in known and one not in made.unknown)
     for root in roots:
         _import(root, {one.space for one in made.unknown})
     spaces_of = [one.namespace for one in documents]
@@ -163,7 +163,7 @@ def _declare(known: dict[Component, bytes], root: etree._Element, space: str, *,
     differ: list[Component] = []
     parents = [root, *root.iterchildren(*_REDEFINE)]
     for child in [one for parent in parents for one in parent.iterchildren(etree.Element) if one.get("name")]:
-        component = Component(_kind(child.tag), space, child.get("name", ""))
+        component = Component(kind_of(child.tag), space, child.get("name", ""))
         text = etree.tostring(child, method="c14n", exclusive=True)
         if child.getparent() is root and component in known and drop:
             differ += [component] if known[component] != text else []
@@ -172,16 +172,17 @@ def _declare(known: dict[Component, bytes], root: etree._Element, space: str, *,
     return differ
 
 
-def _kind(tag: str) -> str:
+def kind_of(tag: str) -> str:
+    """Return the kind of component that an element with a tag declares or refers to."""
     name = etree.QName(tag).localname
     return "type" if name in {"complexType", "simpleType"} else name
 
 
-def _references(root: etree._Element, space: str) -> Iterator[Component]:
-    """Yield the components that a document refers to."""
-    for element in root.iter(etree.Element):
+def references(root: etree._Element, space: str, *, deep: bool = True) -> Iterator[Component]:
+    """Yield the components that a document or a part of it refers to; without ``deep``, those of the part alone."""
+    for element in root.iter(etree.Element) if deep else (root,):
         for attribute, text in element.attrib.items():
-            kind = _kind(element.tag) if attribute == "ref" else _NAMED.get(str(attribute))
+            kind = kind_of(element.tag) if attribute == "ref" else _NAMED.get(str(attribute))
             for name in str(text).split() if kind and etree.QName(element).namespace == XSD else ():
                 prefix, _, local = name.rpartition(":")
                 given = element.nsmap.get(prefix or None) or ("" if root.get("targetNamespace") else space)
@@ -194,7 +195,7 @@ def _import(root: etree._Element, spaces: set[str]) -> None:
     """Let a document import those of some namespaces that it refers to."""
     own = root.get("targetNamespace") or ""
     there = {reference.get("namespace") or "" for reference in root.iterchildren(_IMPORT)}
-    for space in sorted(({one.space for one in _references(root, own)} & spaces) - there - {own}):
+    for space in sorted(({one.space for one in references(root, own)} & spaces) - there - {own}):
         root.insert(0, etree.Element(_IMPORT, {"namespace": space} if space else {}))
 
 

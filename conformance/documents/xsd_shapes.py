@@ -12,6 +12,8 @@ from conformance.documents.xsd_unknown import UNKNOWN
 
 # So many elements of one message are read; types that hold one another in many ways would be read without end.
 _MOST: Final = 20_000
+# So many elements a request may have.
+_LARGEST: Final = 100_000
 
 
 @dataclass(frozen=True)
@@ -155,6 +157,20 @@ class _Reader:
 def shape(declared: Any) -> Element:
     """Return the content that an xmlschema element declaration allows."""
     return _Reader().element(declared)
+
+
+def too_large(request: Element | None) -> str:
+    """Return why no message of an element can be sent: it must have too many elements. Empty if it can."""
+    count = 0 if request is None else _least(request)
+    return f"its smallest request has {count:,} elements; the limit is {_LARGEST:,}" if count > _LARGEST else ""
+
+
+def _least(part: Element | Group) -> int:
+    """Return how many elements a message has in which each occurs as often as it must, and once if it need not."""
+    inner = part.type.content if isinstance(part, Element) and isinstance(part.type, Complex) else None
+    items = (part.items[:1] if part.model == "choice" else part.items) if isinstance(part, Group) else (inner,)
+    own = sum(_least(one) for one in items if one is not None) + isinstance(part, Element)
+    return max(part.minimum, 1) * own
 
 
 def _is_any(declared: Any) -> bool:

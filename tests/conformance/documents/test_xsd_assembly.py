@@ -358,16 +358,75 @@ def _text(pattern: str) -> str:
     return _got(f'<xs:sequence><xs:element name="a"><xs:simpleType>{facet}</xs:simpleType></xs:element></xs:sequence>')
 
 
+def _grown(count: int, own: int) -> str:
+    """Return a chain of types, each of which adds so many elements to those of its base."""
+    one = '<xs:complexType name="C{}"><xs:complexContent><xs:extension base="t:C{}"><xs:sequence>{}</xs:sequence>'
+    types = "".join(
+        one.format(number, number - 1, "".join(f'<xs:element name="a{number}_{part}"/>' for part in range(own)))
+        + "</xs:extension></xs:complexContent></xs:complexType>"
+        for number in range(1, count)
+    )
+    return '<xs:complexType name="C0"><xs:sequence/></xs:complexType>' + types + _value(f"t:C{count - 1}")
+
+
+def _linked(count: int, one: str, last: str, first: str) -> str:
+    """Return components of which each refers to the next, N."""
+    return "".join(one.format(I=number, N=number + 1) for number in range(count)) + last.format(I=count) + _got(first)
+
+
+_ELEMENT = (
+    '<xs:element name="e{I}"><xs:complexType><xs:choice><xs:element ref="t:e{N}"/></xs:choice></xs:complexType>'
+    "</xs:element>"
+)
+_UNION = '<xs:simpleType name="u{{I}}"><xs:union memberTypes="{}"/></xs:simpleType>'
+_TEXT = '<xs:simpleType name="u{I}"><xs:restriction base="xs:string"/></xs:simpleType>'
+_OF_UNION = '<xs:sequence><xs:element name="a" type="t:u0"/></xs:sequence>'
+_GROUP = (
+    '<xs:group name="g{I}"><xs:sequence><xs:group ref="t:g{N}" minOccurs="1000" maxOccurs="1000"/></xs:sequence>'
+    "</xs:group>"
+)
+_LAST = '<xs:group name="g{I}"><xs:sequence><xs:element name="v"/></xs:sequence></xs:group>'
+
+
+def _types(count: int, members: int) -> str:
+    one = '<xs:complexType name="C{}"><xs:sequence>{}</xs:sequence></xs:complexType>'
+    parts = "".join(f'<xs:element name="a{part}" minOccurs="0"/>' for part in range(members))
+    return "".join(one.format(number, parts) for number in range(count)) + _value("t:C0")
+
+
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
+        (
+            _linked(2000, _ELEMENT, '<xs:element name="e{I}"/>', '<xs:sequence><xs:element ref="t:e0"/></xs:sequence>'),
+            "element e1850 begins a chain",
+        ),
+        (_linked(2000, _UNION.format("t:u{N} xs:int"), _TEXT, _OF_UNION), "type u1850 begins a chain"),
+        (_linked(2000, _GROUP, _LAST, '<xs:group ref="t:g0"/>'), "group g1850 begins a chain"),
+        (_linked(10, _UNION.format("t:u{N} " * 10), _TEXT, _OF_UNION), "type u[0-9] has more than 1,000"),
+        (_grown(140, 100), "type C11 has more than 1,000"),
+        (_types(100, 500), "types have 50,00[0-9] elements"),
+        (_text("a*" * 2000), "a pattern of 4,000 characters and 2,000 groups, quantifiers"),
         (_derived(2000), "a chain of more than 150 types"),
         (_inside(2000), "a chain of more than 150 types"),
         (_repeated(1000, 4), "more than 10,000 elements, unrolled"),
         (_repeated(20_000, 1), "more than 10,000 elements, unrolled"),
         (_text("(a|b)*" * 1000 + "c"), "a pattern of 6,001 characters"),
     ],
-    ids=["derived", "inside", "repeated in repeated", "repeated", "pattern"],
+    ids=[
+        "elements",
+        "unions",
+        "groups",
+        "union of unions",
+        "inherited",
+        "types",
+        "quantifiers",
+        "derived",
+        "inside",
+        "repeated in repeated",
+        "repeated",
+        "pattern",
+    ],
 )
 def test_what_takes_a_compiler_all_memory_is_refused(content: str, reason: str) -> None:
     started = time.process_time()
@@ -382,6 +441,12 @@ def test_what_takes_a_compiler_all_memory_is_refused(content: str, reason: str) 
     "content",
     [
         _derived(30),
+        _grown(30, 5),
+        _got(
+            '<xs:sequence minOccurs="200" maxOccurs="200"><xs:element name="a"><xs:complexType>'
+            '<xs:sequence minOccurs="200" maxOccurs="200"><xs:element name="b"/></xs:sequence>'
+            "</xs:complexType></xs:element></xs:sequence>"
+        ),
         _inside(30),
         _repeated(100, 1),
         _repeated(99_999, 1, "maxOccurs"),
@@ -389,7 +454,55 @@ def test_what_takes_a_compiler_all_memory_is_refused(content: str, reason: str) 
         '<xs:complexType name="C"><xs:sequence><xs:element name="c" type="t:C" minOccurs="0"/></xs:sequence>'
         "</xs:complexType>" + _got('<xs:sequence><xs:element name="a" type="t:C"/></xs:sequence>'),
     ],
-    ids=["derived", "inside", "repeated", "repeated at most", "pattern", "within itself"],
+    ids=[
+        "derived",
+        "grown",
+        "repeated in a type of its own",
+        "inside",
+        "repeated",
+        "repeated at most",
+        "pattern",
+        "within itself",
+    ],
 )
 def test_what_real_services_have_is_compiled(content: str) -> None:
     assert _read(_schema("urn:t", content)).ports
+
+
+@pytest.mark.parametrize(
+    ("content", "remark"),
+    [
+        (_linked(3, _GROUP, _LAST, '<xs:group ref="t:g0"/>'), "its smallest request has 1,000,000,001 elements"),
+        (
+            _got('<xs:sequence><xs:element name="v" minOccurs="99"/></xs:sequence>').replace(
+                '"99"', '"99" maxOccurs="99"'
+            ),
+            "",
+        ),
+    ],
+    ids=["groups", "real"],
+)
+def test_an_operation_whose_smallest_request_is_too_large_is_not_called(content: str, remark: str) -> None:
+    content = content.replace("Got", "Put").replace("Get", "Got").replace("Put", "Get")
+
+    (port,) = _read(_schema("urn:t", content)).ports
+
+    assert port.operations[0].remark.startswith(remark)
+    assert bool(port.operations[0].remark) is bool(remark)
+
+
+def test_a_service_of_many_operations_is_read_in_linear_time() -> None:
+    many = range(1500)
+    messages = "".join(f'<w:message name="i{one}"><w:part name="p" element="t:Get"/></w:message>' for one in many)
+    declared = "".join(f'<w:operation name="G{one}"><w:input message="t:i{one}"/></w:operation>' for one in many)
+    body = '<w:input><s:body use="literal"/></w:input>'
+    bound = "".join(f'<w:operation name="G{one}"><s:operation soapAction=""/>{body}</w:operation>' for one in many)
+    wsdl = _WSDL.replace("TYPES", _schema("urn:t", _value("xs:int"))).replace("<w:portType", messages + "<w:portType")
+    wsdl = wsdl.replace('<w:portType name="P">', f'<w:portType name="P">{declared}')
+    wsdl = wsdl.replace("</w:binding>", f"{bound}</w:binding>")
+    started = time.process_time()
+
+    (port,) = read_services(wsdl.encode(), "http://device/a.wsdl", lambda _: b"").ports
+
+    assert len(port.operations) == 1501
+    assert time.process_time() - started < 5
