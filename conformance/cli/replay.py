@@ -194,13 +194,16 @@ def _judge_again(
     except (StatementError, ContractError, DescriptionError, OSError) as error:
         raise click.UsageError(str(error)) from error
     click.secho(warning(judged), fg="red", nl=False)
+    # Where the time was over, what was seen until then may be too little.
+    cut = {item["id"] for item in judged["requirements"] if "the time of --minutes" in item["reason"]}
     for item in judged["requirements"]:
-        word = _WORDS.get(item["verdict"], "not judged")
+        is_cut = item["verdict"] == "pass" and item["id"] in cut
+        word = "not judged" if is_cut else _WORDS.get(item["verdict"], "not judged")
         click.echo(f"{word}: {item['id']}: {inert(item['reason']) or 'passed'} ({counted(item['cases'], 'case')})")
     verdicts = {item["verdict"] for item in judged["requirements"]}
     if verdicts & {"fail", "warn"}:
         return CommandResult(ExitCode.FAILED)
-    gone = verdicts == {"pass"} and "stop_undelivered" not in judged
+    gone = verdicts == {"pass"} and not cut and "stop_undelivered" not in judged
     return CommandResult(ExitCode.PASSED if gone else ExitCode.INCONCLUSIVE)
 
 
