@@ -8,13 +8,16 @@ Over 300 lines because lazy references belong to both: copying a schema makes th
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import threading
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from fractions import Fraction
 from functools import cache, cached_property, lru_cache, partial
+from hashlib import sha256
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar, cast
 from urllib.parse import unquote
 
@@ -40,10 +43,11 @@ _UNEVALUATED: Final = frozenset({"unevaluatedProperties", "unevaluatedItems"})
 _MOST_TOGETHER: Final = 30
 # Schemas of so many nodes are kept compiled, in nearly 1 kB each.
 _MOST_KEPT: Final = 100_000
-# So many judgements of parts of values are remembered, of parts that have at most so many octets as JSON.
-_MOST_JUDGED: Final = 20_000
-_LONGEST_JUDGED: Final = 10_000
-# References that lead to a violation in one value: alternatives that refer to each other multiply.
+# So many judgements of parts of values are remembered, in about 250 octets each.
+_MOST_JUDGED: Final = 100_000
+# A part of so many octets as JSON is remembered by its digest.
+_DIGESTED: Final = 100
+# So many references are followed to name a violation: alternatives that refer to each other multiply.
 _MOST_FOLLOWED: Final = 1_000
 # How a lazy reference is written where `bundled` has put what it leads to.
 _BUNDLED: Final = re.compile(r"#/\$defs/(\d+(?:,\w+)*)")
@@ -318,6 +322,7 @@ def _naming() -> Any:
     types = Draft202012Validator.TYPE_CHECKER.redefine("number", lambda _, value: is_number(value))
     keywords = {
         "$ref": _followed,
+        "multipleOf": _multiple,
         "pattern": _pattern,
         "patternProperties": _members,
         "additionalProperties": _further,
@@ -327,33 +332,38 @@ def _naming() -> Any:
     return cast("Any", extend)(Draft202012Validator, validators=keywords, type_checker=types)
 
 
-class _Followed(threading.local):
-    """How many references have been followed for the present value."""
+class _Following(threading.local):
+    """How many references are still followed to name what is wrong with a value."""
 
-    count = 0
-
-
-_FOLLOWED: Final = _Followed()
+    left = 0
 
 
-class _TooManyError(Exception):
-    """Raised where a value would take too many references to be judged one by one."""
+_FOLLOWING: Final = _Following()
 
 
 def _followed(validator: Any, reference: str, instance: Any, schema: Schema) -> Iterator[ValidationError]:
-    """Find the violations behind a reference, unless too many references led to some in this value.
-
-    Raises:
-        _TooManyError: they did.
-    """
+    """Find the violations behind a reference; beyond the budget, one that names only the place."""
     from jsonschema import Draft202012Validator  # noqa: PLC0415 - as above
+    from jsonschema.exceptions import ValidationError  # noqa: PLC0415 - as above
 
-    if (found := _BUNDLED.fullmatch(reference)) and _surely_holds(f"{_SCHEME}/{found[1]}", instance):
-        return
-    _FOLLOWED.count += 1
-    if _FOLLOWED.count > _MOST_FOLLOWED:
-        raise _TooManyError
+    if found := _BUNDLED.fullmatch(reference):
+        is_finite = _all_finite(instance)
+        if is_finite and _holds_by(f"{_SCHEME}/{found[1]}", instance):
+            return
+        _FOLLOWING.left -= 1
+        # Whether a value with an infinity is valid is known by following alone.
+        if _FOLLOWING.left < (0 if is_finite else -_MOST_FOLLOWED):
+            yield ValidationError("it fits none of the alternatives", validator="anyOf")
+            return
     yield from Draft202012Validator.VALIDATORS["$ref"](validator, reference, instance, schema)
+
+
+def _multiple(_: Any, step: float, instance: Any, __: Schema) -> Iterator[ValidationError]:
+    """Judge by decimal digits, as jsonschema-rs does: 0.07 is a multiple of 0.01, though no double says so."""
+    from jsonschema.exceptions import ValidationError  # noqa: PLC0415 - as above
+
+    if is_number(instance) and Fraction(str(instance)) % Fraction(str(step)):
+        yield ValidationError(f"{instance} is not a multiple of {step}")
 
 
 def _pattern(_: Any, pattern: str, instance: Any, __: Schema) -> Iterator[ValidationError]:
@@ -576,18 +586,13 @@ def _nodes_in(value: Any) -> int:
 
 
 class Shape:
-    """A schema without references, for validating values. Numbers must be finite doubles.
-
-    Attributes:
-        schema: as given.
-        is_exact: whether jsonschema-rs allows what the schema allows, and no more.
-    """
+    """A schema without references, for validating values. Numbers must be finite doubles."""
 
     def __init__(self, schema: Schema) -> None:
         self.schema = schema
         self._quick = validator_of(schema, _holds_by)
         # By such names, jsonschema-rs allows too much.
-        self.is_exact = _are_plain(_patterns_in(_compiled_of(schema), names=True))
+        self._is_exact = _are_plain(_patterns_in(_compiled_of(schema), names=True))
 
     def problem(self, value: Any, where: str = "") -> str:
         """Return the first violation in ``value``, with its place below ``where``; empty if the value is valid."""
@@ -597,8 +602,6 @@ class Shape:
             error = self._first_error(value)
         except RecursionError:
             return "the value is nested too deeply"
-        except _TooManyError:
-            return f"{where or 'the value'} fits none of the alternatives"
         return _described(error, where) if error is not None else ""
 
     def holds(self, value: Any) -> bool:
@@ -610,17 +613,14 @@ class Shape:
 
     def holds_within(self, value: Any) -> bool:
         """Return the same for a part of a value whose numbers are finite."""
-        return bool(self._quick.is_valid(value)) if self.is_exact else self._is_valid(value)
+        return bool(self._quick.is_valid(value)) if self._is_exact else self._is_valid(value)
 
     def broken_rule(self, value: Any) -> tuple[str, bool]:
         """Return the violated schema keyword, and True if ``value`` itself violates it, and not only a member.
 
         For a valid value, return an empty keyword and False.
         """
-        try:
-            error = self._first_error(value)
-        except _TooManyError:
-            return "anyOf", True
+        error = self._first_error(value)
         return ("", False) if error is None else (str(error.validator), not error.absolute_path)
 
     @cached_property
@@ -631,17 +631,18 @@ class Shape:
         return _naming()(bundled(self.schema), registry=REGISTRY)
 
     def _is_valid(self, value: Any) -> bool:
-        _FOLLOWED.count = 0
+        # One judgement may ask for another, in the midst of a search for a name.
+        before, _FOLLOWING.left = _FOLLOWING.left, 0
         try:
             return bool(self._validator.is_valid(value))
-        except _TooManyError:
-            return False
+        finally:
+            _FOLLOWING.left = before
 
     def _first_error(self, value: Any) -> ValidationError | None:
         """Return the worst violation; of alternatives, that in the one which fits best, if there is one."""
         from jsonschema.exceptions import relevance  # noqa: PLC0415 - as above
 
-        _FOLLOWED.count = 0
+        _FOLLOWING.left = _MOST_FOLLOWED
         error: ValidationError | None = max(self._validator.iter_errors(value), key=relevance, default=None)
         while error is not None and error.context:
             alternatives = defaultdict(list)
@@ -655,7 +656,7 @@ class Shape:
 
     def _passes(self, value: Any) -> bool:
         try:
-            return self.is_exact and bool(self._quick.is_valid(value)) and _all_finite(value)
+            return self._is_exact and bool(self._quick.is_valid(value)) and _all_finite(value)
         except (ValueError, TypeError, OverflowError):
             return False  # a number that it does not take (an Infinity): the other one judges that
 
@@ -694,13 +695,6 @@ def shape_of(schema: Schema) -> Shape:
 _JUDGED: Final[dict[tuple[str, bytes], bool]] = {}
 
 
-def _surely_holds(uri: str, value: Any) -> bool:
-    """Return whether a value is valid by a lazy reference, as far as jsonschema-rs can tell."""
-    schema = referred(uri)
-    is_exact = isinstance(schema, dict) and shape_of(schema).is_exact
-    return is_exact and _all_finite(value) and _holds_by(uri, value)
-
-
 def _holds_by(uri: str, value: Any) -> bool:
     """Judge a part of a value by a lazy reference, once: alternatives that refer to each other ask again and again."""
     schema = referred(uri)
@@ -708,15 +702,15 @@ def _holds_by(uri: str, value: Any) -> bool:
         return schema is not False
     try:
         text = _encode(value)
-    except (TypeError, ValueError, OverflowError, RecursionError):
-        return shape_of(schema).holds_within(value)
+    except (TypeError, ValueError, OverflowError):
+        text = json.dumps(value).encode()  # a lone surrogate
+    text = text if len(text) < _DIGESTED else sha256(text).digest()
     found = _JUDGED.get((uri, text))
     if found is None:
         found = shape_of(schema).holds_within(value)
-        if len(text) <= _LONGEST_JUDGED:
-            if len(_JUDGED) >= _MOST_JUDGED:
-                _JUDGED.clear()
-            _JUDGED[uri, text] = found
+        if len(_JUDGED) >= _MOST_JUDGED:
+            _JUDGED.clear()
+        _JUDGED[uri, text] = found
     return found
 
 

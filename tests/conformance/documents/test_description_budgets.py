@@ -120,6 +120,40 @@ def test_alternatives_that_all_refer_to_each_other_are_judged(key: str) -> None:
     assert time.process_time() - started < 8
 
 
+#: What jsonschema-rs reads otherwise than ECMA-262 in the schema of each item, so Python has to judge the item.
+_INEXACT: dict[str, Any] = {"patternProperties": {r"^\p{Lu}+$": {"type": "integer"}}, "additionalProperties": False}
+
+
+@pytest.mark.parametrize("words", [{}, _INEXACT], ids=["exact", "inexact"])
+@pytest.mark.parametrize("count", [1, 3_000])
+def test_a_long_list_of_valid_items_is_valid(words: dict[str, Any], count: int) -> None:
+    node = {"type": "object", "properties": {"next": _ref(0), "price": {"multipleOf": 1e-5}}, **words}
+    shape = Shape(resolved({"components": {"schemas": {"s0": node}}}, {"type": "array", "items": _ref(0)}))
+    right: list[Any] = [{"next": {"price": 7e-5, **({"A": number} if words else {})}} for number in range(count)]
+
+    assert (shape.problem(right), shape.holds(right), shape.broken_rule(right)) == ("", True, ("", False))
+
+    right[-1]["next"]["next"] = "wrong"
+    assert not shape.holds(right)
+    assert "next.next" in shape.problem(right)
+
+
+@pytest.mark.parametrize("leaf", ["a" * 20_000, float("inf"), "\ud800"], ids=["long", "infinite", "surrogate"])
+def test_alternatives_are_judged_once_whatever_the_value_has(leaf: Any) -> None:
+    kinds = {f"s{i}": {"properties": {"child": _ref(0), "a": {"type": "integer"}}} for i in range(1, 301)}
+    document = {"components": {"schemas": {"s0": {"anyOf": [_ref(i) for i in range(1, 301)]}, **kinds}}}
+    shape = Shape(modern(resolved(document, _ref(0))))
+    wrong: dict[str, Any] = {"a": "1", "b": leaf}
+    for _ in range(5):
+        wrong = {"child": wrong}
+    started = time.process_time()
+
+    assert not shape.holds(wrong)
+    assert shape.problem(wrong)
+
+    assert time.process_time() - started < 8
+
+
 _NODE = {"type": "object", "properties": {"value": {"type": "string"}, **_ten(_ref(0))}}
 _KINDS = [f"s{i}" for i in range(1, 50)]
 #: Schemas that real descriptions have, with the others that they name.
