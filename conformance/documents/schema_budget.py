@@ -35,8 +35,10 @@ _CROWDS: Final = {
     "links": 1_000, "security": 1_000, "servers": 1_000, "encoding": 1_000, "examples": 10_000,
     "securitySchemes": 1_000,
 }  # fmt: skip
-# A generator that follows each reference walks through so many parts, so many references deep.
-_MOST_UNROLLED: Final = 50_000
+# A generator that follows each reference walks through so many parts, so many references deep. It makes cases of each,
+# with all the others in them, so its time grows with the square. GitHub's largest operation has 900 parts.
+_MOST_UNROLLED: Final = 10_000
+_MOST_BESIDE: Final = 1_000
 _UNROLLED_DEEPEST: Final = 8
 _SEVERAL: Final = ("allOf", "anyOf", "oneOf")
 _ONE: Final = ("not", "if", "then", "else")
@@ -246,5 +248,8 @@ def unrolls(document: Schema, value: Any) -> bool:
             except UnresolvedError:
                 continue
         inner = part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
-        waiting += [(one, depth) for one in inner if isinstance(one, dict | list)]
+        beside = [(one, depth) for one in inner if isinstance(one, dict | list)]
+        if len(beside) > _MOST_BESIDE:
+            return True
+        waiting += beside
     return seen > _MOST_UNROLLED

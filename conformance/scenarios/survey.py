@@ -517,7 +517,7 @@ def _send_generated(surveyor: Surveyor, operation: Operation, target: Target, ex
     run = surveyor.api.run
     until = time.monotonic() + _BUDGETS * run.effort.budget_s
     count = COVERAGE // (_SLOW_SHARE if operation.label in surveyor.api.slow else 1)
-    chosen = run.effort.draw(list(target.covering()), count, f"{run.seed}/coverage {target.label}")
+    chosen = run.effort.draw_passing(target.covering(), count, f"{run.seed}/coverage {target.label}")
     run.tally.planned += len(chosen)
     for case in chosen:
         if run.limit.is_past(_GENERATED_SHARE):

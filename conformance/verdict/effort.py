@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import heapq
 import math
 import random
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from typing import TypeVar
 
 _Item = TypeVar("_Item")
@@ -159,6 +161,13 @@ class Effort:
             return list(items)
         chooser = random.Random(zlib.crc32(seed.encode()))  # noqa: S311 - no secret
         return [items[index] for index in sorted(chooser.sample(range(len(items)), count))]
+
+    def draw_passing(self, items: Iterable[_Item], standard: int, seed: str) -> list[_Item]:
+        """Return the same of items that pass by, of which all together may be too many to keep."""
+        chooser = random.Random(zlib.crc32(seed.encode()))  # noqa: S311 - no secret
+        ranked = ((chooser.random(), index, item) for index, item in enumerate(items))
+        chosen = heapq.nsmallest(self.cases(standard), ranked, key=itemgetter(0))
+        return [item for _, _, item in sorted(chosen, key=itemgetter(1))]
 
 
 def _spaced(items: Sequence[_Item], count: int) -> list[_Item]:

@@ -5,12 +5,15 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import jsonschema_rs
 import pytest
+from aiohttp import web
 from processes import ended
-from small_device import certified, constant, described, reading, small_device
+from small_device import Handle, certified, constant, described, error, reading, small_device
 
 _MOST_MB = 500
 _LAUGHS = "".join(f"x{i}: &a{i} [{','.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 15))
@@ -99,6 +102,30 @@ def _large(place: str, value: Any) -> dict[str, Any]:
     return described({"/good": item})
 
 
+def _posting(schema: dict[str, Any]) -> dict[str, Any]:
+    """Return a description with a body that a generator would make a case of for each part, with all the others."""
+    good = reading({"type": "string"})
+    responses = {"200": good["get"]["responses"]["200"], "4XX": {"description": "refused"}}
+    body = {"required": True, "content": {"application/json": {"schema": schema}}}
+    return described({"/good": good, "/a": {"post": {"requestBody": body, "responses": responses}}})
+
+
+def _taking(document: dict[str, Any]) -> Handle:
+    """Return a handler of ``POST /a`` that takes what its description allows, and refuses the rest."""
+    bodies = document["paths"].get("/a", {}).get("post", {}).get("requestBody", {}).get("content", {}).values()
+    takes = jsonschema_rs.validator_for(next(iter(bodies), {}).get("schema", {})).is_valid
+
+    async def handle(request: web.Request) -> web.Response:
+        if request.content_type != "application/json":
+            return error(415, "no JSON")
+        with suppress(ValueError):
+            if takes(json.loads(await request.read())):
+                return web.json_response("yes")
+        return error(400, "not as described")
+
+    return handle
+
+
 #: Descriptions that are judged as others are, though they are large.
 LARGE = {
     "ring": lambda: described(
@@ -106,6 +133,9 @@ LARGE = {
         components={"schemas": _ring()},
     ),
     "example": lambda: _large("content", {"example": "a" * 20_000_000}),
+    "members": lambda: _posting({"properties": {f"p{i}": {"type": "integer"} for i in range(20_000)}}),
+    "fewer members": lambda: _posting({"properties": {f"p{i}": {"type": "integer"} for i in range(900)}}),
+    "alternatives": lambda: _posting({"oneOf": [{"enum": [i]} for i in range(4_000)]}),
 }
 
 
@@ -114,9 +144,10 @@ def test_a_large_description_is_judged_in_little_memory(name: str, tmp_path: Pat
     document = LARGE[name]()
     (tmp_path / "large.json").write_text(json.dumps(document), encoding="utf-8")
     routes = {path: constant("yes" if path == "/good" else {}) for path in document["paths"]}
+    routes["/a"] = {"POST": _taking(document)}
 
     with small_device({}, routes) as url:
-        words = ("--base-url", url, "--class", "description", "--timeout", 60)
+        words = ("--base-url", url, "--class", "description", "--timeout", 60, "--call", "*")
         found = certified(tmp_path / "large.json", tmp_path / "out", *words, peak_mb=tmp_path / "peak")
 
     assert found.exit_code in {0, 4}, found.text

@@ -83,7 +83,7 @@ def test_moving_operations(api: RestInterface, judge: Judge, explore: Explorer) 
 
 
 def _run(api: RestInterface, judge: Judge, explore: Explorer, guard: MotionGuard, target: Target) -> None:
-    coverage = api.run.effort.draw(list(target.coverage()), _COVERAGE, f"{api.run.seed}/coverage {target.label}")
+    coverage = api.run.effort.draw_passing(target.coverage(), _COVERAGE, f"{api.run.seed}/coverage {target.label}")
     for item in api.run.effort.subsample([*target.examples(), *coverage], 1):
         _judge_generated(api, judge, guard, item)
 
