@@ -1,7 +1,4 @@
-"""`roaas load`: the options, and the process that does the measuring.
-
-Over 300 lines because half of them are the options.
-"""
+"""`roaas load`: the options, and the process that does the measuring."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from processes import ended
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("conformance", "reference_robot", "loadtests", "reports")
-MOST_LINES = 300
+MOST_LINES = 600
 _MODULE_NAME = re.compile(rf"({'|'.join(ROOMS)})(\.\w+)+")
 
 

@@ -10,8 +10,6 @@ stderr, logs and tracebacks. A secret is recognized in these forms, and in each 
 - broken over several lines, or cut short before an ellipsis or a quotation mark.
 
 Not recognized are a reversed or encrypted secret, and base64 of an escaped one.
-
-Over 300 lines because the forms of a secret, and the search for them, follow from one another.
 """
 
 import gzip

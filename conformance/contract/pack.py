@@ -3,8 +3,6 @@
 A pack is found by its name (a folder of ``conformance/packs``, or an entry point in the group ``roaas.packs``) or by
 its folder. A folder with only an OpenAPI or WSDL description is a pack too: its device is judged by the requirements
 that apply to any web API.
-
-Over 300 lines because a pack is one object, and each of its files is one property of it.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from conformance.contract.document_text import parsed
 from conformance.documents.description_faults import misplaced, reason, unresolved
 from conformance.documents.json_schema import Schema, UnresolvedError
 from conformance.documents.overlay import OverlayError, overlaid
-from conformance.documents.schema_budget import crowd_in
+from conformance.documents.schema_budget import crowd_in, long_text_in
 from conformance.documents.schema_places import DATA, FILES, make_plain
 from conformance.documents.schema_words import in_one_version
 from conformance.documents.sent_parameters import not_called, with_sent
@@ -113,8 +113,8 @@ def _description(source: str, load: Load, overlays: Iterable[str], trust: Trust)
         raise DescriptionError(f"{source} is no OpenAPI description: it has neither 'openapi: 3...' nor 'swagger: 2.0'")
     if not isinstance(document.get("paths"), dict):
         raise DescriptionError(f"{source} describes no operation: it has no 'paths'")
-    if crowd := crowd_in(document):
-        raise DescriptionError(f"{source} cannot be read with its overlays: {crowd}")
+    if excess := crowd_in(document) or long_text_in(document):
+        raise DescriptionError(f"{source} cannot be read with its overlays: {excess}")
     broken = unresolved(document)
     document = _without(document, frozenset(broken)) if broken else document
     uncalled: tuple[str, ...] = ()
@@ -169,8 +169,8 @@ def _parsed(source: str, load: Load) -> Schema:
         markup = octets.lstrip(_BLANK).startswith(b"<")
         what = ", but HTML or XML, such as a page for people, a login or a WSDL" if markup else ""
         raise DescriptionError(f"{source} is no description: it holds no object{what}")
-    if crowd := crowd_in(document):
-        raise DescriptionError(f"{source} cannot be read: {crowd}")
+    if excess := crowd_in(document) or long_text_in(document):
+        raise DescriptionError(f"{source} cannot be read: {excess}")
     return document
 
 

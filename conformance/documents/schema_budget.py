@@ -15,8 +15,8 @@ from conformance.documents.json_schema import Schema, UnresolvedError, pointed
 _MOST_AT_ONCE: Final = 5_000
 # The smallest value of a schema may have so many parts: members, items and characters.
 _LARGEST: Final = 1_000_000
-# An enum may have so many values: each is a request of its own where it is sent.
-_MOST_VALUES: Final = 50_000
+# Each value of these is a request of its own where it is sent.
+_MOST_VALUES: Final = {"enum": 50_000, "examples": 10_000}
 # So many references may follow each other, and so often schemas are looked at again.
 _DEEPEST: Final = 60
 _MOST_STEPS: Final = 50_000
@@ -35,6 +35,11 @@ _CROWDS: Final = {
     "links": 1_000, "security": 1_000, "servers": 1_000, "encoding": 1_000, "examples": 10_000,
     "securitySchemes": 1_000,
 }  # fmt: skip
+# Words, such as names, addresses and patterns, have at most so many characters, and what stands in addresses as well.
+_LONGEST_WORD: Final = 100_000
+_FOR_PEOPLE: Final = frozenset({"description", "summary", "title", "$comment"})
+_VALUES: Final = frozenset({"example", "examples", "default", "value", "enum", "const", "pattern"})
+_IN_ADDRESSES: Final = frozenset({"parameters", "servers", "headers"})
 # A generator that follows each reference walks through so many parts, so many references deep. It makes cases of each,
 # with all the others in them, so its time grows with the square. GitHub's largest operation has 900 parts.
 _MOST_UNROLLED: Final = 10_000
@@ -71,10 +76,12 @@ class Growth:
         if self._size(schema, [])[0] > _LARGEST:
             self._sizes[id(schema)] = 1
             return f"its smallest value has more than {_LARGEST:,} parts"
-        if len(values := _list(schema, "enum")) > _MOST_VALUES:
-            return f"an enum of {len(values):,} values; the limit is {_MOST_VALUES:,}"
-        if (longest := max(map(_characters, [*values, schema.get("const")]), default=0)) > _LARGEST:
-            return f"a value of {longest:,} characters in enum or const; the limit is {_LARGEST:,}"
+        for word, most in _MOST_VALUES.items():
+            if (count := len(_list(schema, word))) > most:
+                return f"{word} of {count:,} values; the limit is {most:,}"
+        sent = [*_list(schema, "enum"), schema.get("const"), schema.get("default")]
+        if (longest := max(map(_characters, sent), default=0)) > _LARGEST:
+            return f"a value of {longest:,} characters in enum, const or default; the limit is {_LARGEST:,}"
         names = schema.get("patternProperties")
         patterns = [schema.get("pattern"), *(names if isinstance(names, dict) else ())]
         return next(filter(None, (self._pattern_fault(one) for one in patterns if isinstance(one, str))), "")
@@ -233,6 +240,25 @@ def crowd_in(document: Schema) -> str:
             if most is not None and len(part) > most:
                 return f"{place}/{name} has {len(part):,} members; the limit is {most:,}"
             waiting.append((part, f"{place}/{str(name)[:_SHOWN]}"))
+    return ""
+
+
+def long_text_in(document: Schema) -> str:
+    """Return the place of a text that is longer than any name, address or pattern; empty if there is none.
+
+    Only texts for people, extensions and values of bodies may be longer; values of parameters and servers may not.
+    """
+    waiting: list[tuple[Any, str, bool]] = [(document, "#", False)]
+    while waiting:
+        value, place, is_short = waiting.pop()
+        for name, part in value.items() if isinstance(value, dict) else enumerate(value):
+            word = str(name)[:_SHOWN]
+            if word.startswith("x-") or (word in _VALUES and not is_short):
+                continue
+            if isinstance(part, dict | list):
+                waiting.append((part, f"{place}/{word}", is_short or word in _IN_ADDRESSES))
+            elif isinstance(part, str) and len(part) > _LONGEST_WORD and word not in _FOR_PEOPLE:
+                return f"{place}/{word} has {len(part):,} characters; the limit is {_LONGEST_WORD:,}"
     return ""
 
 

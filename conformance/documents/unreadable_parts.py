@@ -50,6 +50,13 @@ def _bare(value: Any) -> Any:
     return {key: {} if key in {"schema", "schemas", "itemSchema"} else _bare(item) for key, item in value.items()}
 
 
+def without_large(document: Schema) -> Schema:
+    """Return a description in which any value is valid where a schema is too large to judge by."""
+    growth = Growth(document)
+    places = [(holder, key) for holder, key, pointer in schema_places(document) if not in_extension(pointer)]
+    return _without_schemas(document)[0] if any(growth.fault(holder[key]) for holder, key in places[::-1]) else document
+
+
 def _without_schemas(document: Schema) -> tuple[Schema, list[str]]:
     growth = Growth(document)
     every = (holder[key] for holder, key, pointer in schema_places(document) if not in_extension(pointer))

@@ -12,6 +12,9 @@ from conformance.commandline.device_options import advice
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.documents.description import Description, DescriptionError, is_url, read_description
+from conformance.documents.json_schema import Schema
+from conformance.documents.openapi import methods_of
+from conformance.documents.schema_budget import unrolls
 from conformance.documents.security import without_credentials
 from conformance.statement.endpoints import Endpoints
 from conformance.transport.client import Connection
@@ -183,7 +186,19 @@ def described_contract(
     folder = write_described_pack(out / FOLDER, document, found.original, found.unresolved, moves=moves)
     Contract.load.cache_clear()
     remarks = (*(() if base_url or endpoints.rest else found.remarks), *found.not_called, *found.unread)
+    remarks += _without_cases(document)
     return Contract.load(folder), msgspec.structs.replace(endpoints, rest=base), remarks
+
+
+def _without_cases(document: Schema) -> tuple[str, ...]:
+    """Return a remark on the operations that are too large for a generator; empty if there are none."""
+    paths = ((path, item) for path, item in document["paths"].items() if isinstance(item, dict))
+    every = ((method, path, operation) for path, item in paths for method, operation in methods_of(item).items())
+    large = [f"{method} {path}" for method, path, operation in every if unrolls(document, operation)]
+    if not large:
+        return ()
+    more = f" and {len(large) - 1:,} other operations" if large[1:] else ""
+    return (f"{large[0]}{more} had no generated requests: the schemas have too many parts for that.",)
 
 
 def _server_of_ports(found: SoapDescription, source: str, trust: Trust) -> tuple[str, str]:

@@ -1,7 +1,4 @@
-"""The robot of a run: opens its interfaces and checks whether they respond.
-
-Over 300 lines because the interfaces and whether the device behind them responds are one state.
-"""
+"""The robot of a run: opens its interfaces and checks whether they respond."""
 
 import statistics
 import threading

@@ -1,7 +1,4 @@
-"""Call each operation of a WSDL that may be called: rightly, with one thing wrong, and rightly again.
-
-Over 300 lines because the caller, its probes and the messages that it sends are one survey.
-"""
+"""Call each operation of a WSDL that may be called: rightly, with one thing wrong, and rightly again."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The survey of a described API: each operation that may be called is sent valid, invalid and odd requests.
-
-Over 300 lines because the survey and the generated requests share one surveyor.
-"""
+"""The survey of a described API: each operation that may be called is sent valid, invalid and odd requests."""
 
 from __future__ import annotations
 

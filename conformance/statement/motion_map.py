@@ -4,8 +4,6 @@ Operations are written as in ``--call``: "METHOD PATH", the path as the descript
 a WSDL. Positions in responses are JSON pointers (RFC 6901); in XML they go by local names, with "@name" for an
 attribute. Bodies and paths are templates: "{yaw}" is the target of the axis yaw, "{seconds}" the duration of a move,
 "{value}" the value of a switch, and "{goto:/uuid}" a value in the response to the last accepted move.
-
-Over 300 lines because the format of the map is in one place.
 """
 
 from __future__ import annotations

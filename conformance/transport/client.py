@@ -1,7 +1,4 @@
-"""The HTTP client of the suite. Every request has a deadline, is recorded, and is reported to listeners.
-
-Over 300 lines because the client is one class, and the settings that it follows are read together with it.
-"""
+"""The HTTP client of the suite. Every request has a deadline, is recorded, and is reported to listeners."""
 
 import itertools
 import math

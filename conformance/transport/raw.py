@@ -1,8 +1,6 @@
 """HTTP/1.1 over a plain socket: requests that no client library sends, and responses checked byte by byte.
 
 Every wait has a deadline. The error for a response with broken framing names the violated clause of RFC 9112.
-
-Over 300 lines because the limits of what a robot may send belong to the loops that read it.
 """
 
 import itertools

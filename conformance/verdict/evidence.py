@@ -1,7 +1,4 @@
-"""The judge, which collects the evidence of checks and observers for each requirement.
-
-Over 300 lines because the judge is one class, and what it records is read together with it.
-"""
+"""The judge, which collects the evidence of checks and observers for each requirement."""
 
 import re
 import threading

@@ -2,8 +2,6 @@
 
 This module computes the content of all forms of the certificate; the templates lay it out. The page calls itself a
 certificate only if every claimed class passed.
-
-Over 300 lines because the templates take everything from one object.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from typing import Any, Final
 from urllib.parse import parse_qsl, urlsplit
 
@@ -63,9 +64,9 @@ _DEPTH: Final = 6
 
 def collections_of(operations: Iterable[Operation]) -> frozenset[str]:
     """Return the plain names of the collections whose items an API has paths for, in the singular."""
-    templates = {item.template for item in operations}
-    found = {before for template in templates for before in re.findall(r"([^/{}]+)/\{", template)}
-    return frozenset(singular(name) for name in found)
+    paths = [template.split("/") for template in {item.template for item in operations}]
+    found = {before.rpartition("}")[2] for parts in paths for before, part in pairwise(parts) if part.startswith("{")}
+    return frozenset(singular(name) for name in found if name)
 
 
 def singular(name: str) -> str:

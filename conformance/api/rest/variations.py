@@ -1,7 +1,4 @@
-"""Requests for one operation that differ from its usual request in one thing, valid and invalid ones.
-
-Over 300 lines because one table of variations is read as a whole.
-"""
+"""Requests for one operation that differ from its usual request in one thing, valid and invalid ones."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Whether a SOAP service keeps SOAP, its WSDL and its composure, whatever it is sent.
-
-Over 300 lines because sixteen short rules share what reads a message.
-"""
+"""Whether a SOAP service keeps SOAP, its WSDL and its composure, whatever it is sent."""
 
 from __future__ import annotations
 

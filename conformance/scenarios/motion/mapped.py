@@ -1,7 +1,4 @@
-"""A device that is read, commanded and stopped by its motion map.
-
-Over 300 lines because what was commanded, what is read and how it is stopped are one state.
-"""
+"""A device that is read, commanded and stopped by its motion map."""
 
 from __future__ import annotations
 

@@ -35,6 +35,29 @@ UNREADABLE = {
     "many paths": (json.dumps(described({f"/{i}": reading({}) for i in range(11_000)})), "#/paths has 11,000 members"),
 }  # fmt: skip
 
+_LONG = "a" * 200_000
+#: Places in a description where a text of any length is in every request, address or message, and what holds it.
+LONG_WORDS: dict[str, dict[str, Any]] = {
+    "get/parameters/0/name": {"parameters": [{"name": _LONG, "in": "query", "schema": {"type": "string"}}]},
+    "get/parameters/0/example": {"parameters": [{"name": "a", "in": "query", "schema": {}, "example": _LONG}]},
+    "parameters/0/schema/default": {"parameters": [{"name": "a", "in": "query", "schema": {"default": _LONG}}]},
+    "parameters/0/schema/enum/0": {"parameters": [{"name": "a", "in": "header", "schema": {"enum": [_LONG]}}]},
+    "get/operationId": {"operationId": _LONG},
+    "get/tags/0": {"tags": [_LONG]},
+    "variables/a/default": {"servers": [{"url": "/{a}", "variables": {"a": {"default": _LONG}}}]},
+    "servers/0/url": {"servers": [{"url": f"http://{_LONG}"}]},
+    "schema/type": {"requestBody": {"content": {"application/json": {"schema": {"type": _LONG}}}}},
+    "schema/\\$ref": {"requestBody": {"content": {"application/json": {"schema": {"$ref": f"#/{_LONG}"}}}}},
+    "schema/required/0": {"requestBody": {"content": {"application/json": {"schema": {"required": [_LONG]}}}}},
+}
+#: Long texts that have their place.
+LONG_TEXTS: dict[str, dict[str, Any]] = {
+    "description": {"description": _LONG, "summary": _LONG},
+    "extensions": {"x-logo": _LONG, "x-samples": [{"source": _LONG}]},
+    "example of a body": {"requestBody": {"content": {"application/json": {"schema": {}, "example": _LONG}}}},
+    "default of a body": {"requestBody": {"content": {"application/json": {"schema": {"default": _LONG}}}}},
+}
+
 
 def _ref(number: int) -> dict[str, str]:
     return {"$ref": f"#/components/schemas/s{number}"}
@@ -61,9 +84,11 @@ UNJUDGED: dict[str, tuple[Any, dict[str, Any], str]] = {
     "minProperties": ({"type": "object", "minProperties": 10**7}, {}, "smallest value"),
     "quantifiers": ({"type": "string", "pattern": "^(a{1000}){1000}$"}, {}, "nested quantifiers"),
     "quantifiers of names": ({"patternProperties": {"(((a{99}){99}){99})": {}}}, {}, "nested quantifiers"),
-    "an enum of many": ({"enum": list(range(60_000))}, {}, "an enum of 60,000 values"),
+    "an enum of many": ({"enum": list(range(60_000))}, {}, "enum of 60,000 values"),
     "a long text in an enum": ({"enum": ["a", "a" * 2_000_000]}, {}, "a value of 2,000,000 characters in enum"),
     "a long text deep in a const": ({"const": [{"a": "a" * 2_000_000}]}, {}, "a value of 2,000,002 characters"),
+    "a long default": ({"default": "a" * 2_000_000}, {}, "a value of 2,000,000 characters in enum, const or default"),
+    "many examples": ({"examples": ["a"] * 20_000}, {}, "examples of 20,000 values; the limit is 10,000"),
     "a long pattern": ({"pattern": "a|" * 200_000}, {}, "a pattern of 400,000 characters"),
     "many patterns": (
         {"anyOf": [{"pattern": f"a{{99999}}b{{{i}}}"} for i in range(100)]}, {}, "the patterns of the document",
@@ -84,6 +109,17 @@ def test_a_description_beyond_the_budget_is_refused_with_the_place(name: str) ->
         _read(text)
 
     assert time.process_time() - started < 8
+
+
+@pytest.mark.parametrize("place", LONG_WORDS)
+def test_a_long_text_in_every_request_is_refused_with_the_place(place: str) -> None:
+    with pytest.raises(DescriptionError, match=rf"{place} has 200,0\d\d characters; the limit is 100,000"):
+        _read(json.dumps(described({"/a": reading({}, **LONG_WORDS[place])})))
+
+
+@pytest.mark.parametrize("name", LONG_TEXTS)
+def test_a_long_text_for_people_or_in_a_body_is_read(name: str) -> None:
+    assert _read(json.dumps(described({"/a": reading({}, **LONG_TEXTS[name])}))).unread == ()
 
 
 @pytest.mark.parametrize("name", UNJUDGED)

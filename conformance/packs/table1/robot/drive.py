@@ -1,7 +1,4 @@
-"""Drive a robot by velocity commands and record a trace; drive_rules judges the trace.
-
-Over 300 lines because the commands, the looks and the waits of a drive share one trace.
-"""
+"""Drive a robot by velocity commands and record a trace; drive_rules judges the trace."""
 
 import math
 from collections.abc import Callable, Iterator
