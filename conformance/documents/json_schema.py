@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 Schema = dict[str, Any]
 T = TypeVar("T")
 # So many nodes of a document, and references one behind the other, are copied before the others stay lazy references.
-_MOST_NODES: Final = 2_000
+MOST_NODES: Final = 2_000
 _DEEPEST: Final = 8
 _SCHEME: Final = "roaas-lazy:"
 # The keyword of such a reference where its schema is compiled on its own.
@@ -96,23 +96,25 @@ def pointed(document: Schema, reference: str) -> Any:
     return value
 
 
-def resolved(document: Schema, value: Any) -> Any:
+def resolved(document: Schema, value: Any, most: int = MOST_NODES) -> Any:
     """Return a copy of ``value`` with each ``$ref`` replaced by its target.
 
     A schema inside itself, or far down, stays a reference: to a lazily read schema, which `whole` and `Shape` follow.
+    So does one with which the copy would have more than ``most`` nodes.
 
     Raises:
         UnresolvedError: a reference has no target.
     """
-    return _Resolver(document).copy(value, ())
+    return _Resolver(document, most=most).copy(value, ())
 
 
 class _Resolver:
     """Copies parts of a document, with the targets of references in their places as far as a budget reaches."""
 
-    def __init__(self, document: Schema, deepest: int = _DEEPEST) -> None:
+    def __init__(self, document: Schema, deepest: int = _DEEPEST, most: int = MOST_NODES) -> None:
         self._document = document
         self._deepest = deepest
+        self._most = most
         self._nodes = 0
         self._alone = str(document.get("openapi", "")).startswith("3.0")
 
@@ -152,7 +154,17 @@ class _Resolver:
 
     def _is_far(self, target: Schema, trail: tuple[str, ...]) -> bool:
         is_schema = not _SCHEMA_WORDS.isdisjoint(target) and _OTHERS.isdisjoint(target)
-        return is_schema and (self._nodes > _MOST_NODES or len(trail) > self._deepest)
+        return is_schema and (len(trail) > self._deepest or _is_larger(target, self._most - self._nodes))
+
+
+def _is_larger(value: Any, most: int) -> bool:
+    """Return whether a part of a document has more nodes, without following references."""
+    waiting = [value]
+    while waiting and most >= 0:
+        part = waiting.pop()
+        most -= 1
+        waiting += part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
+    return most < 0
 
 
 def lazy_reference(document: Schema, reference: str) -> str:

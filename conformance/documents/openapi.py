@@ -2,11 +2,20 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
-from typing import Any
+from typing import Any, Final
 
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
-from conformance.documents.json_schema import CHANGES, Schema, UnresolvedError, changed_alike, modern, opened, resolved
+from conformance.documents.json_schema import (
+    CHANGES,
+    MOST_NODES,
+    Schema,
+    UnresolvedError,
+    changed_alike,
+    modern,
+    opened,
+    resolved,
+)
 from conformance.documents.parameters import (
     Encoding,
     Parameter,
@@ -18,6 +27,10 @@ from conformance.documents.parameters import (
 
 _METHODS = ("get", "put", "post", "delete", "patch", "head", "options", "trace", "query")
 SAFE = frozenset({"GET", "HEAD", "OPTIONS", "TRACE", "QUERY"})
+# So many nodes of a document are copied for all its paths, and at least so many for each; what many refer to beyond
+# that is read once for all of them.
+_NODES_IN_ALL: Final = 500_000
+_FEWEST_NODES: Final = 100
 
 
 @dataclass(frozen=True)
@@ -152,8 +165,10 @@ def read_operations(document: Schema, *, closed: bool = False) -> list[Operation
     """
     found: list[Operation] = []
     security = document.get("security", ())
-    for path, item in document.get("paths", {}).items():
-        whole = resolved(document, item)
+    paths = document.get("paths", {})
+    most = max(_FEWEST_NODES, min(MOST_NODES, _NODES_IN_ALL // max(1, len(paths))))
+    for path, item in paths.items():
+        whole = resolved(document, item, most)
         shared = whole.get("parameters", [])
         found += [
             _operation(path, method, {"security": security, **given}, shared, closed=closed)

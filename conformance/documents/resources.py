@@ -52,11 +52,27 @@ def resources_of(contract: Contract) -> tuple[Resource, ...]:
     return tuple(Resource(template, operations) for template, operations in by_path.items())
 
 
+@lru_cache(maxsize=8)
+def _by_place(contract: Contract) -> dict[tuple[int, str], list[Resource]]:
+    """Return the resources by how many slashes they have and by their first segment; empty: that is a template."""
+    found: dict[tuple[int, str], list[Resource]] = {}
+    for item in resources_of(contract):
+        found.setdefault(_place(sendable(item.template)), []).append(item)
+    return found
+
+
+def _place(path: str) -> tuple[int, str]:
+    first = path.split("/", 2)[1] if "/" in path else path
+    return path.count("/"), "" if "{" in first else first
+
+
 @lru_cache(maxsize=512)
 def resource_at(contract: Contract, path: str) -> Resource | None:
     """Return the resource of a path, or None; literal paths precede templates (OpenAPI 3.1, 4.8.8.2)."""
-    path = sendable(path)
-    found = [item for item in resources_of(contract) if item.pattern.fullmatch(path)]
+    path, index = sendable(path), _by_place(contract)
+    slashes, first = _place(path)
+    near = [*index.get((slashes, first), ()), *(index.get((slashes, ""), ()) if first else ())]
+    found = [item for item in near if item.pattern.fullmatch(path)]
     return min(found, key=lambda item: item.template.count("{"), default=None)
 
 
