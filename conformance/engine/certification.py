@@ -91,10 +91,10 @@ def certify(
     run, started = robot.run, Started()
     remarks, recordings, reached = list(notes), Recordings(), True
     with remembered(run) as interruption:
-        with suppress(OSError):  # told in the end
-            write_result(_unfinished(robot, started, command, notes), out)
-        robot.keep_history(HistoryWriter(out, suite_version(), rfc3339(started.at)))
         try:
+            with suppress(OSError):  # told in the end
+                write_result(_unfinished(robot, started, command, notes), out)
+            robot.keep_history(HistoryWriter(out, suite_version(), rfc3339(started.at)))
             run.limit.begin()
             robot.connect(progress)
             reached = robot.reached

@@ -3,6 +3,7 @@
 import base64
 import contextlib
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -120,9 +121,7 @@ class Guard:
                     bufsize=0,
                     start_new_session=True,
                 )
-            if self._process is not None and self._process.stdin is not None:
-                self._process.stdin.write(json.dumps(message).encode() + b"\n")
-            self._told = stops
+            self._told = stops if tell(self._process, json.dumps(message).encode() + b"\n") else []
         except OSError:
             self._told = []
 
@@ -138,6 +137,22 @@ class Guard:
         is_quoted = connection.credentials.items[-1].kind is Kind.QUERY
         sent = connection.credentials.items[-1].sent
         return {**self._login, "token": auth.token, "sent": sent, "is_quoted": is_quoted} if self._login else None
+
+
+def tell(process: subprocess.Popen[bytes] | None, line: bytes) -> bool:
+    """Write a line to a process; return whether it took it. One that does not read is ended, and nobody waits for it.
+
+    Raises:
+        OSError: the process has ended.
+    """
+    if process is None or process.stdin is None:
+        return False
+    os.set_blocking(process.stdin.fileno(), False)
+    if process.stdin.write(line) == len(line):
+        return True
+    process.kill()
+    process.wait()
+    return False
 
 
 def _told_of(draft: Draft) -> dict[str, Any]:

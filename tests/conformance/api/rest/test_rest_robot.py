@@ -1,5 +1,8 @@
 """What the suite makes of answers of a live service: what is steady, what agrees, what may be sent."""
 
+import signal
+import subprocess
+import sys
 from dataclasses import replace
 
 import pytest
@@ -11,6 +14,7 @@ from conformance.api.rest.effects import reader_of, settles_at
 from conformance.api.rest.formats import disagreements
 from conformance.api.rest.generated import targets
 from conformance.api.rest.generated_request import GeneratedRequest
+from conformance.api.rest.guard import tell
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.motion_guard import MotionGuard
 from conformance.api.rest.snapshot import changed, changes_by_itself, flatten, steady, take_snapshots
@@ -109,6 +113,14 @@ def test_what_moves_needs_permission(api):
     wanted = GeneratedRequest("DELETE", "/books/5", "", b"")
     assert MotionGuard(api).admit(wanted) is None
     assert MotionGuard(replace(api, run=replace(api.run, allow_motion=True))).admit(wanted) == wanted
+
+
+def test_a_guard_that_does_not_read_is_ended_and_not_waited_for():
+    with subprocess.Popen([sys.executable, "-c", "input(); input()"], stdin=subprocess.PIPE, bufsize=0) as process:
+        process.send_signal(signal.SIGSTOP)
+        # A pipe holds 64 KiB.
+        taken = [tell(process, b"a" * 9_999 + b"\n") for _ in range(7)]
+        assert (taken[0], taken[-1], process.poll()) == (True, False, -signal.SIGKILL)
 
 
 def test_schemathesis_makes_the_same_requests_again(api):
