@@ -111,6 +111,6 @@ def _judged(document: dict[str, Any], folder: Path, statement_file: Path | None,
     statement = load_statement(statement_file, contract) if statement_file else empty_statement(contract)
     run = Run(statement, contract, claims=tuple(contract.classes), allow_motion=True)
     try:
-        return judge_stored(RobotUnderTest(run), document["target"], folder)
+        return judge_stored(RobotUnderTest(run), document, folder)
     except (HistoryError, TracesError) as error:
         raise click.UsageError(str(error)) from error

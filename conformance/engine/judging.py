@@ -16,8 +16,8 @@ from conformance.contract.interfaces import Interface
 from conformance.engine.certification import draw_verdicts
 from conformance.engine.planning import collected
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.history.events import Ended, Sent, Span, Withdrawn
-from conformance.history.reading import read_history
+from conformance.history.events import Began, Ended, Sent, Span, Withdrawn
+from conformance.history.reading import HistoryError, read_history
 from conformance.history.writing import HISTORY_NAME
 from conformance.scenarios.rule import Rule, record
 from conformance.scenarios.scenario import Recordings, Scenario
@@ -50,16 +50,16 @@ class Judged:
     faults: tuple[str, ...]
 
 
-def judge_stored(robot: RobotUnderTest, target: Mapping[str, Any], folder: Path) -> Judged:
+def judge_stored(robot: RobotUnderTest, result: Mapping[str, Any], folder: Path) -> Judged:
     """Judge the history and the traces in a result's folder; at least one of them has to be there.
 
     Args:
         robot: with statement and contract; it is not asked.
-        target: the addresses of the run, as in result.json.
+        result: the content of result.json.
         folder: of the result.
 
     Raises:
-        HistoryError, TracesError: one of the files cannot be read, or neither is there.
+        HistoryError, TracesError: one of the files cannot be read, neither is there, or the history is another run's.
     """
     run, requests, ended = robot.run, 0, True
     there = {name for name in (HISTORY_NAME, TRACES_NAME) if (folder / name).exists()}
@@ -67,7 +67,7 @@ def judge_stored(robot: RobotUnderTest, target: Mapping[str, Any], folder: Path)
     known = [scenario for _, scenario in rules]
     traces = read_traces(folder / TRACES_NAME, known, run.judge.fault) if known else Recordings()
     if HISTORY_NAME in there or not there:
-        requests, ended = _judge_history(robot, target, folder / HISTORY_NAME, traces)
+        requests, ended = _judge_history(robot, result, folder / HISTORY_NAME, traces)
     _judge_traces(robot, rules, traces)
     for evidence in run.judge.evidence.values():
         # A part that takes an experiment is the run's affair.
@@ -78,12 +78,17 @@ def judge_stored(robot: RobotUnderTest, target: Mapping[str, Any], folder: Path)
 
 
 def _judge_history(
-    robot: RobotUnderTest, target: Mapping[str, Any], path: Path, traces: Recordings
+    robot: RobotUnderTest, result: Mapping[str, Any], path: Path, traces: Recordings
 ) -> tuple[int, bool]:
     """Judge each exchange as in the run; return how many requests there are, and whether the run ended."""
     events, judge = list(read_history(path)), robot.run.judge
+    began = next((event.started for event in events if isinstance(event, Began)), "")
+    if began and began != result["started"]:
+        raise HistoryError(
+            f"{path} is the history of another run: it began at {began}, this one at {result['started']}"
+        )
     withdrawn = {event.id for event in events if isinstance(event, Withdrawn)}
-    listeners, requests = list(_listeners(robot, target, traces)), 0
+    listeners, requests = list(_listeners(robot, result["target"], traces)), 0
     for event in events:
         if isinstance(event, Span):
             judge.begin(event.name)

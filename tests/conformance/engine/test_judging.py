@@ -105,8 +105,8 @@ def test_a_run_that_was_killed_is_judged_up_to_then(tmp_path):
     assert (code, "fail: http/date-format" in text, "which was cut short" in text) == (1, True, True), text
 
 
-def _stored(out, passages, *, withdrawn=()):
-    writer = HistoryWriter(out, "1", "2026-11-28T00:00:00.000000Z")
+def _stored(out, passages, *, started, withdrawn=()):
+    writer = HistoryWriter(out, "1", started)
     numbers = [writer.record(one) for one in passages]
     for number in withdrawn:
         writer.withdraw(numbers[number])
@@ -132,10 +132,18 @@ def test_what_no_check_listened_to_is_not_judged(run, tmp_path):
         ([passage(busy, Heard.UNLESS_BUSY)], (), 4),
         ([passage(wrong, Heard.UNLESS_BUSY)], (), 1),
     ):
-        _stored(tmp_path, passages, withdrawn=withdrawn)
+        _stored(tmp_path, passages, started=done.result["started"], withdrawn=withdrawn)
         assert len(list(read_history(tmp_path / HISTORY_NAME))) == 2 + len(passages) + len(withdrawn)
         code, text = _judged(tmp_path, "http/date-format")
         assert code == expected, (passages, text)
+
+
+def test_the_history_of_another_run_is_refused(run, tmp_path):
+    shutil.copytree(run[0], tmp_path / "out")
+    _stored(tmp_path / "out", (), started="2026-11-28T00:00:00.000000Z")
+    done = ended(sys.executable, "-m", "roaas", "judge", tmp_path / "out")
+    assert done.returncode == 2, done.stdout
+    assert "the history of another run: it began at 2026-11-28T00:00:00.000000Z" in " ".join(done.stderr.split())
 
 
 def test_a_trace_of_an_earlier_version_is_named_and_the_rest_is_judged(run, tmp_path):
