@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
@@ -41,6 +42,9 @@ def invalid_refused(trace: Survey) -> Iterable[Outcome]:
     """Judge whether requests with values that the description forbids are refused."""
     sure = [one for one in trace.probes if one.kind in _WRONG and one.validity != VALID and one.exchange is not None]
     sure += [one for one in trace.probes if one.kind is Kind.GENERATED and one.validity == INVALID and one.exchange]
+    # What a path cannot name is not there either.
+    absent = _deletes_the_absent(trace)
+    sure = [one for one in sure if not (one.ok and one.operation in absent and _is_in_path(one))]
 
     def fault(probe: Probe) -> Fault | None:
         if not probe.ok:
@@ -60,6 +64,17 @@ def invalid_refused(trace: Survey) -> Iterable[Outcome]:
     yield from held_back(sure)
     acted = [one for one in sure if one.status not in HELD]
     yield from told_once(acted, "status 4xx for a request that the description forbids", fault)
+
+
+def _deletes_the_absent(trace: Survey) -> set[str]:
+    """Return the DELETE operations that succeed for what is not there, as an idempotent one may (RFC 9110 9.2.2)."""
+    deleted = [one for one in trace.probes if one.ok and one.exchange and one.operation.startswith("DELETE ")]
+    sent = Counter(one.exchange.request.url for one in deleted if one.exchange and one.validity == VALID)
+    return {one.operation for one in deleted if one.exchange and (one.invents or sent[one.exchange.request.url] > 1)}
+
+
+def _is_in_path(probe: Probe) -> bool:
+    return (probe.place if probe.says else _place_in(probe.why)).startswith("path ")
 
 
 def _place_in(why: str) -> str:

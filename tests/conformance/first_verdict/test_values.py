@@ -145,3 +145,21 @@ def test_a_status_that_the_application_decides_on_has_to_be_declared(tmp_path):
     found = {one["operation"]: len(one["findings"]) for one in seen.result["api"]["operations"]}
     assert found == {"GET /bare": 3, "GET /class": 0, "GET /default": 0, "GET /each": 0}
     assert seen.blamed == {"description/status-declared": "fail"}
+
+
+@pytest.mark.parametrize(("absent", "invalid", "blamed"), [(204, 204, False), (404, 204, True), (204, 400, False)])
+def test_an_idempotent_delete_may_succeed_for_what_a_path_cannot_name(tmp_path, absent, invalid, blamed):
+    name = {"name": "name", "in": "path", "required": True, "schema": {"type": "string", "pattern": "^[a-z]{1,8}$"}}
+    gone = {"description": "no such thing any more"}
+    document = described(
+        {"/maps/{name}": {"delete": {"parameters": [name], "responses": {"204": gone, "4XX": REFUSED}}}}
+    )
+
+    async def delete(request):
+        status = absent if re.fullmatch("[a-z]{1,8}", request.match_info["name"]) else invalid
+        return web.Response(status=status) if status == 204 else error(status, "refused")
+
+    with small_device(document, {"/maps/{name}": {"DELETE": delete}}) as url:
+        seen = certified(f"{url}/openapi.json", tmp_path / "out", "--call", "*")
+
+    assert (seen.blamed.get("description/invalid-refused") == "fail") is blamed, seen.text
