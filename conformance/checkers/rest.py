@@ -5,6 +5,7 @@ from typing import Final
 
 from conformance.api.rest.request_context import RequestContext
 from conformance.checkers import conditional, content, declared, fields, problem, refusals
+from conformance.checkers.lists import Lists
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
@@ -30,7 +31,7 @@ class RestCheckers:
     def __init__(self, contract: Contract, base_url: str, elsewhere: Iterable[str] = ()) -> None:
         self._contract, self._base_url = contract, base_url
         self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
-        self._conditional = conditional.Conditional()
+        self._conditional, self._lists = conditional.Conditional(), Lists()
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Yield the cases of one exchange; none if it went to another interface."""
@@ -48,5 +49,7 @@ class RestCheckers:
         for check in _ANY:
             yield from check(occasion)
         yield from self._conditional(occasion)
+        if self._contract.described:
+            yield from self._lists(occasion)
         for check in () if context.is_own_of(attempt.response) else _DOCUMENTS:
             yield from check(occasion)

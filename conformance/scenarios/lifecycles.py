@@ -11,9 +11,10 @@ from urllib.parse import quote, unquote, urlsplit
 
 from conformance.api.rest.applicable import allowed
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.listing import listed
 from conformance.api.rest.samples import fits
 from conformance.api.rest.statuses import HELD, held_text
-from conformance.api.rest.things import collection_of, identified, listed
+from conformance.api.rest.things import collection_of, identified
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, operations_of

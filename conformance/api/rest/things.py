@@ -57,20 +57,6 @@ def represented(value: Any, names: Collection[str]) -> dict[str, Any]:
     return max(found, key=lambda one: len({plain_name(name) for name in one} & set(names)), default={})
 
 
-def listed(value: Any) -> list[Any] | None:
-    """Return the items of a list: the body, or its only list, in an envelope too; None if there are none or several."""
-    for _ in range(2):
-        if isinstance(value, list):
-            return value
-        inner = list(value.values()) if isinstance(value, dict) else []
-        lists = [one for one in inner if isinstance(one, list)]
-        objects = [one for one in inner if isinstance(one, dict)]
-        if len(lists) > 1 or not (lists or objects):
-            return None
-        value = lists[0] if lists else objects[0]
-    return value if isinstance(value, list) else None
-
-
 def another(schema: Schema, body: dict[str, Any], turn: int, collections: frozenset[str]) -> dict[str, Any]:
     """Return a body with another value of each member that the client may choose, as far as the schema allows it."""
     changed = dict(body)

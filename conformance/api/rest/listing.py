@@ -1,0 +1,325 @@
+"""Lists: what the query parameters of an operation do to its list, by their names, and what a response shows of one."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import Any, Final
+
+from conformance.api.rest.samples import fits
+from conformance.documents.field_reading import pairs_of
+from conformance.documents.json_schema import Schema, kinds_of
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation, is_json
+from conformance.documents.parameter_reading import VALID, decoded_query, judged
+from conformance.documents.parameters import Parameter, plain_name
+from conformance.documents.representation import flat
+from conformance.transport.exchange import Response
+
+# Plain names of parameters, and of members that stand beside a list. Of names for the number of items, the second group
+# means it only where no parameter of the first is there, and no item has a member of that name.
+_LIMITS: Final = ("limit", "pagesize", "perpage", "maxresults", "maxitems", "pagelimit", "itemsperpage")
+_ALSO_LIMITS: Final = ("top", "take", "max", "size", "count", "first")
+_OFFSETS: Final = ("offset", "skip", "pageoffset")
+_PAGES: Final = ("page", "pagenumber", "pageindex", "pageno")
+_CURSORS: Final = ("cursor", "pagetoken", "after", "startingafter", "pagecursor", "pageafter", "marker")
+_SORTS: Final = ("sort", "sortby", "orderby", "ordering", "order", "sortfield", "sortkey")
+_DIRECTIONS: Final = ("order", "direction", "dir", "sortorder", "sortdirection", "sortdir", "orderdir")
+_REVERSING: Final = frozenset({"reverse", "reversed", "desc", "descending"})
+_WRAPPERS: Final = ("items", "data", "results", "value", "records", "entries", "content", "rows", "list", "embedded")
+_NO_ITEMS: Final = frozenset({"errors", "warnings", "links", "included", "facets", "messages"})
+#: Members and header fields that tell how many items there are; the third group may tell those on the page as well.
+_TOTALS: Final = frozenset(
+    {"total", "totalcount", "totalitems", "totalelements", "totalresults", "totalrecords", "totalsize", "totalrows",
+     "totalhits", "odatacount", "hydratotalitems", "numfound", "nbhits", "recordsfiltered"}
+)  # fmt: skip
+_HEADERS: Final = ("x-total-count", "x-total", "total-count", "x-pagination-total", "x-wp-total")
+COUNTS: Final = frozenset({"count", "itemcount", "itemscount", "recordcount", "numitems", "length"})
+_RANGE: Final = re.compile(r"\s*[A-Za-z]+\s+(?:\d+-\d+|\*)/(\d+)\s*")
+# Names that are a member's as well, and do not choose items by it: how a response is written, and texts to search for.
+_NO_FILTERS: Final = frozenset(
+    {"format", "lang", "language", "locale", "unit", "units", "currency", "timezone", "tz", "fields", "view", "include",
+     "expand", "embed", "version", "precision", "resolution", "interval", "search", "q", "query", "text", "name",
+     "title", "label", "description", "message", "comment", "note", "depth"}
+)  # fmt: skip
+_SIGN: Final = re.compile(r"([+-]?)(.*)", re.DOTALL)
+_SUFFIX: Final = re.compile(r"(.+?)[:._ \-]?(asc|desc)(?:ending)?", re.IGNORECASE)
+_IDENTIFYING: Final = ("id", "uuid", "guid", "pk", "key", "slug", "name", "serial", "serialnumber", "number")
+_NEXT: Final = re.compile(r"next", re.IGNORECASE)
+_DEPTH: Final = 3
+
+
+@dataclass(frozen=True)
+class Sorting:
+    """One value of a parameter that sorts.
+
+    Attributes:
+        member: plain name of the items' member.
+        descending: the direction; None: the value does not say it.
+    """
+
+    member: str
+    descending: bool | None
+
+
+@dataclass(frozen=True, eq=False)
+class Listing:
+    """The query parameters of an operation that answers a list.
+
+    Attributes:
+        operation: the operation.
+        item: schema of an item; empty where the description does not tell it.
+        limit, offset, page, cursor: how much of the list is shown, and from where on.
+        sort, direction: by which member it is sorted.
+        reverses: whether a further parameter may turn the order around.
+        filters: the parameters that choose items by a member, by the plain name of both.
+    """
+
+    operation: Operation
+    item: Schema = field(default_factory=dict)
+    limit: Parameter | None = None
+    offset: Parameter | None = None
+    page: Parameter | None = None
+    cursor: Parameter | None = None
+    sort: Parameter | None = None
+    direction: Parameter | None = None
+    reverses: bool = False
+    filters: Mapping[str, Parameter] = field(default_factory=dict)
+
+    @cached_property
+    def members(self) -> dict[str, Schema]:
+        """The schemas of an item's members by plain name, those below ``attributes`` too (JSON:API)."""
+        own = flat(self.item).get("properties", {})
+        inner = own.get("attributes")
+        inner = flat(inner).get("properties", {}) if isinstance(inner, dict) else {}
+        return {plain_name(name): part for name, part in {**inner, **own}.items() if isinstance(part, dict)}
+
+    @cached_property
+    def known(self) -> frozenset[str]:
+        """The names of all parameters whose part is known."""
+        parts = (self.limit, self.offset, self.page, self.cursor, self.sort, self.direction, *self.filters.values())
+        return frozenset(one.name for one in parts if one is not None)
+
+    @cached_property
+    def sortings(self) -> dict[str, Sorting]:
+        """What each declared value of the parameter that sorts means."""
+        return {} if self.sort is None else {text: one for text, one in self._sortings(self.sort) if one is not None}
+
+    def _sortings(self, sort: Parameter) -> Iterator[tuple[str, Sorting | None]]:
+        schema = flat(sort.schema)
+        schema = flat(schema["items"]) if isinstance(schema.get("items"), dict) else schema
+        given = [
+            one for one in (*schema.get("enum", ()), *sort.examples, schema.get("default")) if isinstance(one, str)
+        ]
+        found = {text: self._sorting(text) for text in given}
+        turned = {one.member for one in found.values() if one is not None and one.descending}
+        for text, one in found.items():
+            # Beside "-name", the value "name" means ascending order.
+            plain = one is not None and one.descending is None and one.member in turned
+            yield text, Sorting(one.member, descending=False) if one is not None and plain else one
+
+    def _sorting(self, text: str) -> Sorting | None:
+        match = _SIGN.fullmatch(text.strip())
+        sign, rest = (match[1], match[2]) if match else ("", text)
+        if plain_name(rest) in self.members:
+            return Sorting(plain_name(rest), {"": None, "+": False, "-": True}[sign])
+        suffix = _SUFFIX.fullmatch(rest)
+        if suffix is None or sign or plain_name(suffix[1]) not in self.members:
+            return None
+        return Sorting(plain_name(suffix[1]), suffix[2].lower() == "desc")
+
+    def sent(self, target: str) -> dict[str, str] | None:
+        """Return the texts of a target's query by name; None where one is there twice, invalid, or not declared."""
+        declared = {one.name: one for one in self.operation.parameter("query")}
+        try:
+            pairs = [(name, text) for name, text in pairs_of(target.partition("?")[2])]
+            texts = {name: decoded_query(text) for name, text in pairs}
+        except ValueError:
+            return None
+        if len(texts) < len(pairs) or not texts.keys() <= declared.keys():
+            return None
+        valid = all(judged(declared[name], [text], decoded_query) == VALID for name, text in pairs)
+        return texts if valid else None
+
+    def most(self, sent: Mapping[str, str]) -> int:
+        """Return how many items the parameters allow, by the one sent or its default; 0 where nothing says it."""
+        if self.limit is None:
+            return 0
+        if self.limit.name in sent:
+            return number_of(sent[self.limit.name])
+        default = flat(self.limit.schema).get("default")
+        is_plain = sent.keys() <= self.known and (self.cursor is None or self.cursor.name not in sent)
+        return default if is_plain and isinstance(default, int) and not isinstance(default, bool) else 0
+
+
+@dataclass(frozen=True)
+class Page:
+    """A list in a response.
+
+    Attributes:
+        items: its items.
+        totals: how many items there are, by the plain name of each member and header that tells it.
+        goes_on: whether the response has something like a link to the next page.
+        around: the objects that stand around the list, from outside.
+    """
+
+    items: tuple[Any, ...]
+    totals: Mapping[str, int] = field(default_factory=dict)
+    goes_on: bool = False
+    around: tuple[Mapping[str, Any], ...] = ()
+
+    @cached_property
+    def identities(self) -> tuple[str, ...]:
+        """What identifies each item, or its whole content."""
+        return tuple(map(identity_of, self.items))
+
+
+def number_of(text: str) -> int:
+    """Return a whole number in a text, or 0."""
+    return int(text) if re.fullmatch(r"\+?\d{1,9}", text, re.ASCII) else 0
+
+
+def members_of(item: Any) -> dict[str, Any]:
+    """Return the members of an item by plain name, those below ``attributes`` too; none where it is no object."""
+    if not isinstance(item, dict):
+        return {}
+    inner = item.get("attributes")
+    return {plain_name(name): one for name, one in {**(inner if isinstance(inner, dict) else {}), **item}.items()}
+
+
+def identity_of(item: Any) -> str:
+    """Return what identifies an item, as text; its whole content where no member does."""
+    own = members_of(item)
+    found = next((own[name] for name in _IDENTIFYING if isinstance(own.get(name), str | int)), None)
+    return json.dumps(item if found is None else found, sort_keys=True)
+
+
+def listed(value: Any) -> list[Any] | None:
+    """Return the items of a list: the body, or the list in an envelope; None if there are none or several."""
+    found = _found(value, 0)
+    return None if found is None else found[1]
+
+
+def _found(value: Any, depth: int) -> tuple[tuple[str, ...], list[Any]] | None:
+    """Return the names on the way to a list, and the list."""
+    if isinstance(value, list):
+        return (), value
+    if not isinstance(value, dict) or depth >= _DEPTH:
+        return None
+    named = {name: one for name, one in value.items() if plain_name(name) not in _NO_ITEMS}
+    lists = [name for name, one in named.items() if isinstance(one, list)]
+    usual = [name for wrapper in _WRAPPERS for name in lists if plain_name(name) == wrapper]
+    if len(lists) == 1 or usual:
+        chosen = (usual or lists)[0]
+        return (chosen,), value[chosen]
+    inner = (
+        [(name, _found(one, depth + 1)) for name, one in named.items() if isinstance(one, dict)] if not lists else []
+    )
+    found = [(name, one) for name, one in inner if one is not None]
+    usual = [one[0] for wrapper in _WRAPPERS for one in found if plain_name(one[0]) == wrapper]
+    for name, one in found:
+        if len(found) == 1 or usual[:1] == [name]:
+            return (name, *one[0]), one[1]
+    return None
+
+
+def page_of(response: Response) -> Page | None:
+    """Return the list in a successful JSON response, or None."""
+    if not response.ok or not response.body or response.cut or not is_json(response.media_type):
+        return None
+    text = read_json(response.body)
+    found = None if text.malformed else _found(text.value, 0)
+    if found is None:
+        return None
+    around, inner = [], text.value
+    for name in found[0]:
+        around.append({key: one for key, one in inner.items() if key != name})
+        inner = inner[name]
+    beside = [one for part in around for one in (part, *part.values()) if isinstance(one, dict)]
+    totals = {
+        plain: one
+        for part in reversed(beside)
+        for name, one in part.items()
+        if (plain := plain_name(name)) in _TOTALS | COUNTS and isinstance(one, int) and not isinstance(one, bool)
+    }
+    for name in _HEADERS:
+        totals |= {plain_name(name): int(one) for one in [response.header(name) or ""] if one.strip().isdecimal()}
+    if within := _RANGE.fullmatch(response.header("content-range") or ""):
+        totals["contentrange"] = int(within[1])
+    links = [response.header("link") or ""]
+    names = [name for part in beside for name, one in part.items() if one not in (None, "", False)]
+    goes_on = any(_NEXT.search(one) for one in (*links, *names))
+    goes_on |= any(one is True and "more" in name.lower() for part in beside for name, one in part.items())
+    return Page(tuple(found[1]), totals, goes_on, tuple(around))
+
+
+@lru_cache(maxsize=1024)
+def listing_of(operation: Operation) -> Listing | None:
+    """Return what the parameters of a GET do to its list; None where it has no declared list of objects or values."""
+    item = _item_of(operation.shape, 0)
+    query = {_plain(one.name): one for one in operation.parameter("query")}
+    # One thing that has a list among its members is no list, unless it can be read in parts.
+    is_thing = operation.template.rstrip("/").endswith("}") and query.keys().isdisjoint((*_LIMITS, *_OFFSETS, *_PAGES))
+    if operation.method != "GET" or item is None or is_thing:
+        return None
+    plain = Listing(operation, item)
+    free = {name: one for name, one in query.items() if name not in plain.members}
+    counts = {name: one for name, one in free.items() if kinds_of(one.schema) - {"null"} == {"integer"}}
+    limit = next((counts[name] for name in _LIMITS if name in counts), None)
+    if limit is None and not ("max" in counts and "min" in query):
+        limit = next((counts[name] for name in _ALSO_LIMITS if name in counts), None)
+    directions = {name: one for name, one in query.items() if name in _DIRECTIONS and _directs(one)}
+    sorts = [query[name] for name in _SORTS if name in query and name not in directions]
+    filters = {
+        name: one
+        for name, one in query.items()
+        if name in plain.members and name not in _NO_FILTERS and one not in sorts and name not in directions
+    }
+    return Listing(
+        operation,
+        item,
+        limit,
+        next((counts[name] for name in _OFFSETS if name in counts), None),
+        next((counts[name] for name in _PAGES if name in counts), None),
+        next((free[name] for name in _CURSORS if name in free and name not in counts), None),
+        sorts[0] if len(sorts) == 1 else None,
+        next(iter(directions.values())) if len(directions) == 1 else None,
+        len(directions) > 1 or not _REVERSING.isdisjoint(query),
+        filters,
+    )
+
+
+def _plain(name: str) -> str:
+    """Return the plain name of a parameter, without the ``filter`` of JSON:API."""
+    return plain_name(name[len("filter") :] if name.lower().startswith("filter[") else name)
+
+
+def _directs(parameter: Parameter) -> bool:
+    values = flat(parameter.schema).get("enum", ())
+    return bool(values) and all(str(one).lower().startswith(("asc", "desc")) for one in values)
+
+
+def _item_of(schema: Any, depth: int) -> Schema | None:
+    """Return the schema of the items of a list, in an envelope too; None where the schema has none or several."""
+    given = flat(schema) if isinstance(schema, dict) else {}
+    if "array" in kinds_of(given):
+        return given["items"] if isinstance(given.get("items"), dict) else {}
+    parts = {name: one for name, one in given.get("properties", {}).items() if plain_name(name) not in _NO_ITEMS}
+    lists = [name for name, one in parts.items() if isinstance(one, dict) and "array" in kinds_of(flat(one))]
+    usual = [name for wrapper in _WRAPPERS for name in lists if plain_name(name) == wrapper]
+    if len(lists) == 1 or usual:
+        return _item_of(parts[(usual or lists)[0]], depth)
+    if lists or depth >= _DEPTH:
+        return None
+    found = [(plain_name(name), _item_of(one, depth + 1)) for name, one in parts.items()]
+    there = [(name, one) for name, one in found if one is not None]
+    usual = [name for wrapper in _WRAPPERS for name, _ in there if name == wrapper]
+    return next((one for name, one in there if len(there) == 1 or usual[:1] == [name]), None)
+
+
+def fitting(parameter: Parameter | None, value: Any) -> bool:
+    """Return whether there is a parameter, and its schema allows a value."""
+    return parameter is not None and fits(parameter.schema, value)

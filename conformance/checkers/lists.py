@@ -1,0 +1,177 @@
+"""Lists: the query parameters that limit, filter and sort them do so, and totals agree with what is shown."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+from typing import Any, Final
+
+from conformance.api.rest.listing import Listing, Page, listing_of, members_of, page_of
+from conformance.checkers.occasion import Occasion
+from conformance.checkers.ordering import is_before
+from conformance.checkers.totals import Totals
+from conformance.documents.json_schema import kinds_of
+from conformance.documents.openapi import SAFE
+from conformance.documents.parameters import Parameter
+from conformance.documents.representation import flat
+from conformance.documents.writing import text_of
+from conformance.verdict.case import Case
+
+# So many values that items had are remembered, and so many items of a list are compared with each other.
+_REMEMBERED: Final = 50_000
+_COMPARED: Final = 60
+# By these a client may ask for a value or more, as logs are filtered; by these it may ask for more items, not for these
+# alone, where the value is true.
+_LEVELS: Final = frozenset({"level", "severity", "loglevel", "priority", "criticality", "rank"})
+_INCLUDING: Final = frozenset({"deleted", "archived", "hidden", "removed", "inactive", "expired", "retired", "draft"})
+_ALL: Final = frozenset({"all", "any", "none", "*", "both", "default", "unknown", "other", ""})
+
+
+class Lists:
+    """Judges each response with a list by the parameters of its request.
+
+    Only values are judged that an item already had in an earlier list: a device may change an item while it answers.
+    """
+
+    def __init__(self) -> None:
+        self._seen: set[int] = set()
+        # By operation, parameter and value: the other values that items had when this one was asked for.
+        self._others: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+        self._totals = Totals()
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        if occasion.request.method not in SAFE:
+            self._totals.changed(occasion.response.received_s)
+        operation = occasion.operation
+        listing = listing_of(operation) if operation is not None and operation.method == "GET" else None
+        if listing is None or occasion.request.method != "GET" or not occasion.context.usual:
+            return
+        page, sent = page_of(occasion.response), listing.sent(occasion.context.target)
+        if page is None or sent is None:
+            return
+        yield from _limit(occasion, listing, page, sent)
+        yield from self._filters(occasion, listing, page, sent)
+        yield from self._order(occasion, listing, page, sent)
+        yield from self._totals(occasion, listing, page, sent)
+        self._learn(listing, page)
+
+    def _learn(self, listing: Listing, page: Page) -> None:
+        names = {*listing.filters, *(one.member for one in listing.sortings.values())}
+        if len(self._seen) < _REMEMBERED:
+            for identity, item in zip(page.identities, page.items, strict=True):
+                own = members_of(item)
+                self._seen.update(hash((listing.operation.label, identity, name, str(own.get(name)))) for name in names)
+
+    def _known(self, listing: Listing, page: Page, name: str) -> Iterator[Any]:
+        """Yield a member of each item that had the same value before; items without it are left out."""
+        for identity, item in zip(page.identities, page.items, strict=True):
+            value = members_of(item).get(name)
+            if value is not None and hash((listing.operation.label, identity, name, str(value))) in self._seen:
+                yield value
+
+    def _filters(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+        for name, parameter in listing.filters.items():
+            text = sent.get(parameter.name)
+            if not text or text.lower() in _ALL or parameter.media_type:
+                continue
+            asked = text.split(",") if "array" in kinds_of(parameter.schema) else [text]
+            values = list(self._known(listing, page, name))
+            wrong = self._wrong(listing, name, asked, values)
+            if wrong is None:
+                continue
+            yield occasion.case(
+                "description/list-filter",
+                not wrong,
+                f"items whose {name} is {text}, which the parameter {parameter.name} asks for",
+                f"an item whose {name} is {', '.join(wrong)}",
+                cause=f"{listing.operation.label} {parameter.name}",
+            )
+
+    def _wrong(self, listing: Listing, name: str, asked: list[str], values: list[Any]) -> list[str] | None:
+        """Return a value that was not asked for, or nothing; None where that cannot be told."""
+        parameter, member = listing.filters[name], flat(listing.members[name])
+        choices = _choices(parameter)
+        others = [text for one in values for text in [_text(one)] if not _holds(one, asked)]
+        if kinds_of(parameter.schema) == {"boolean"}:
+            default = flat(parameter.schema).get("default")
+            includes = name in _INCLUDING and asked == ["true"]
+            is_plain = kinds_of(member) == {"boolean"} and not includes and asked != [text_of(default)]
+            return others[:1] if is_plain and values else None
+        items = flat(member["items"]) if isinstance(member.get("items"), dict) else member
+        if choices and set(asked) <= set(map(text_of, items.get("enum", ()))):
+            if name in _LEVELS and len(asked) == 1:
+                ranks = [choices.index(one) - choices.index(asked[0]) for one in others if one in choices]
+                return others[:1] if min(ranks, default=0) < 0 < max(ranks, default=0) else []
+            return others[:1] if values else None
+        # What a text or number chooses shows only in pairs: one with the other's items, and the other with this one's.
+        if len(asked) != 1 or not values or len(self._others) > _REMEMBERED:
+            return None
+        found = self._others[listing.operation.label, name]
+        found[asked[0]].update(others[:_COMPARED])
+        return [one for one in others if asked[0] in found.get(one, ())][:1]
+
+    def _order(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+        sort = listing.sort
+        if sort is None or listing.reverses:
+            return
+        default = flat(sort.schema).get("default", "") if sent.keys() <= listing.known else ""
+        text = sent.get(sort.name, str(default))
+        sorting = listing.sortings.get(text.split(",")[0])
+        if sorting is None or sorting.member in _LEVELS:
+            return
+        schema, descending = flat(listing.members[sorting.member]), sorting.descending
+        if listing.direction is not None:
+            given = sent.get(listing.direction.name) or flat(listing.direction.schema).get("default")
+            if descending is not None and given:
+                return
+            descending = str(given).lower().startswith("desc") if given else descending
+        if "enum" in schema or schema.get("format") == "duration":
+            return  # these may be sorted by what they mean
+        values = list(self._known(listing, page, sorting.member))[:_COMPARED]
+        pairs = [(one, other, is_before(one, other)) for one, other in combinations(values, 2)]
+        up, down = ([(one, other) for one, other, said in pairs if said is way] for way in (True, False))
+        if not up and not down:
+            return
+        wrong = {True: up, False: down, None: up and down}[descending]
+        way = {True: "descending ", False: "ascending ", None: ""}[descending]
+        yield occasion.case(
+            "description/list-order",
+            not wrong,
+            f"items in {way}order of {sorting.member}, which {text} as the parameter {sort.name} asks for",
+            f"{text_of(wrong[0][0])} before {text_of(wrong[0][1])}" if wrong else "",
+            cause=f"{listing.operation.label} {sorting.member}",
+        )
+
+
+def _limit(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+    """Judge that there are no more items than the parameter allows; 0 may mean all."""
+    most = listing.most(sent)
+    if listing.limit is not None and most > 0:
+        by = "asks for" if listing.limit.name in sent else "has as its default"
+        yield occasion.case(
+            "description/list-limit",
+            len(page.items) <= most,
+            f"at most {most} items, which the parameter {listing.limit.name} {by}",
+            f"{len(page.items)} items",
+            cause=listing.operation.label,
+        )
+
+
+def _choices(parameter: Parameter) -> list[str]:
+    """Return the declared values of a parameter, or of the items of its list, as texts."""
+    schema = flat(parameter.schema)
+    schema = flat(schema["items"]) if isinstance(schema.get("items"), dict) else schema
+    return [text_of(one) for one in schema.get("enum", ()) if one is not None]
+
+
+def _text(value: Any) -> str:
+    return ", ".join(map(text_of, value)) if isinstance(value, list) else text_of(value)
+
+
+def _holds(value: Any, asked: list[str]) -> bool:
+    """Return whether a member is, or has, one of the values that were asked for, whatever their case."""
+    wanted = {one.strip().casefold() for one in asked}
+    own = value if isinstance(value, list) else [value]
+    return any(isinstance(one, dict | list) or text_of(one).casefold() in wanted for one in own)

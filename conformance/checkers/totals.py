@@ -1,0 +1,117 @@
+"""Totals of lists: the number of items that a response names agrees with the items that it shows."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from conformance.api.rest.listing import COUNTS, Listing, Page, number_of
+from conformance.checkers.occasion import Occasion
+from conformance.verdict.case import Case
+
+#: A total may be kept apart from the list, and be late after a change, s. Wrong so often while nothing changes, it is
+#: wrong.
+SETTLES_S: Final = 3.0
+_OFTEN: Final = 2
+# Where servers cut a list without saying so, and where they stop counting.
+_CUTS: Final = (5, 16)
+_FEWEST_CUT: Final = 10
+_CAP: Final = 50
+
+
+@dataclass
+class _Count:
+    """What is known of one total of one operation.
+
+    Attributes:
+        agrees: whether it was the number of items the first time that a whole list was shown; None: none was.
+        is_of_all: whether it was more than the items on a page, so that it is not the number of those.
+        by_filter: whether it counts what a filter leaves, by the first list with a filter; None: there was none.
+        last: what identified the items of the last whole list that it agreed with.
+        wrong_since_s: when it was wrong first after that; 0: it was not.
+        times: how often it was wrong while nothing changed.
+    """
+
+    agrees: bool | None = None
+    is_of_all: bool = False
+    by_filter: bool | None = None
+    last: frozenset[str] = frozenset()
+    wrong_since_s: float = 0.0
+    times: int = 0
+
+    def learn(self, total: int, page: Page, *, plain: bool) -> None:
+        """Note what a total means beside a whole list."""
+        shown = len(page.items)
+        if plain and shown and self.agrees is None:
+            self.agrees = total == shown
+        elif not plain and 0 < shown < len(self.last) and self.by_filter is None:
+            self.by_filter = total == shown
+
+    def is_sure(self, page: Page, now_s: float, changed_s: float, *, whole: bool) -> bool:
+        """Note a wrong total; return whether no change that is under way explains it."""
+        self.wrong_since_s = self.wrong_since_s or now_s
+        shown = frozenset(page.identities)
+        if now_s - changed_s >= SETTLES_S and (shown == self.last or (not whole and shown <= self.last)):
+            self.times += 1
+        return self.times >= _OFTEN or now_s - self.wrong_since_s >= SETTLES_S
+
+
+class Totals:
+    """Judges totals over a run, each by what it meant the first time that it was seen beside a whole list."""
+
+    def __init__(self) -> None:
+        self._counts: dict[tuple[str, str], _Count] = defaultdict(_Count)
+        self._longest: dict[str, int] = defaultdict(int)
+        self._changed_s = float("-inf")
+
+    def changed(self, when_s: float) -> None:
+        """Note a request that may have changed a list."""
+        self._changed_s = when_s
+
+    def __call__(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+        """Yield the cases of one response; none where the parameters do not tell which part of the list it shows."""
+        label, shown = listing.operation.label, len(page.items)
+        self._longest[label] = max(self._longest[label], shown)
+        elsewhere = {one.name for one in (listing.page, listing.cursor) if one is not None}
+        if not sent.keys() <= listing.known - elsewhere:
+            return
+        offset = number_of(sent.get(listing.offset.name, "")) if listing.offset is not None else 0
+        plain = sent.keys().isdisjoint(one.name for one in listing.filters.values())
+        most = listing.most(sent)
+        whole = not page.goes_on and (not most or shown < most) and (shown > 0 or offset == 0)
+        for name, total in page.totals.items():
+            count = self._counts[label, name]
+            count.is_of_all |= total > shown > 0
+            if whole and offset == 0:
+                count.learn(total, page, plain=plain)
+            if not count.agrees or not (plain or count.by_filter):
+                continue
+            if name in COUNTS and (total == shown or not (count.is_of_all or total < shown)):
+                continue
+            least, sure = offset + shown, whole and not self._is_cut(label, shown)
+            if (shown and total < least and not _is_cap(total)) or (sure and total != least):
+                if count.is_sure(page, occasion.response.received_s, self._changed_s, whole=whole and offset == 0):
+                    expected = (
+                        f"{'' if sure else 'at least '}{least} as {name}, by the offset and the items that are shown"
+                    )
+                    yield _case(occasion, name, f"{total} as {name}", expected, holds=False)
+            elif whole and total == least:
+                if plain and offset == 0:
+                    count.last, count.wrong_since_s = frozenset(page.identities), 0.0
+                yield _case(occasion, name, "", "the number of items that are shown", holds=True)
+
+    def _is_cut(self, label: str, shown: int) -> bool:
+        """Return whether a server may have cut a list, at a round number of items that no list exceeded."""
+        is_round = shown % _CUTS[0] == 0 or shown % _CUTS[1] == 0
+        return shown >= max(_FEWEST_CUT, self._longest[label]) and is_round
+
+
+def _is_cap(total: int) -> bool:
+    return total > 0 and total % _CAP == 0
+
+
+def _case(occasion: Occasion, name: str, found: str, expected: str, *, holds: bool) -> Case:
+    label = occasion.operation.label if occasion.operation else ""
+    return occasion.case("description/list-total", holds, expected, found, cause=f"{label} {name}")

@@ -1,0 +1,327 @@
+"""Lists of a described API: parts of them by limit, offset, page and cursor, and each value of a filter or sort."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Final
+
+from conformance.api.rest.applicable import allowed
+from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.listing import Listing, Page, fitting, listing_of, members_of, page_of
+from conformance.api.rest.references import in_link
+from conformance.api.rest.values import Values
+from conformance.checkers.totals import SETTLES_S
+from conformance.documents.json_schema import kinds_of
+from conformance.documents.openapi import operations_of
+from conformance.documents.parameters import Parameter, plain_name
+from conformance.documents.representation import flat
+from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.transport.exchange import Exchange, NoAnswerError
+
+# So many pages are read one after another, and so many values of one parameter are sent: at quick, and else.
+_PAGES: Final = 4
+_VALUES: Final = {"quick": 3}
+_MOST_VALUES: Final = 12
+# A fault counts that was seen twice in so many tries; the list was the same before and after, read so often.
+_TRIES: Final = 4
+_TWICE: Final = 2
+_STEADY: Final = 3
+# So far beyond the end a part of a list is asked for, as far as the schema allows.
+_BEYOND: Final = (1000, 100, 10, 1)
+_DEPTH: Final = 3
+
+
+@dataclass(frozen=True)
+class Paged:
+    """Parts of a list beside the list.
+
+    Attributes:
+        operation: label of the operation.
+        way: how the parts were asked for.
+        found: the last request for a part.
+        expected: what the part should have, as a noun phrase.
+        fault: what it had instead; empty: what it should have.
+    """
+
+    operation: str
+    way: str
+    found: Exchange
+    expected: str
+    fault: str = ""
+
+
+def lists_of(api: RestInterface) -> list[Listing]:
+    """Return the lists that may be read and that end."""
+    found = [
+        listing_of(one) for one in operations_of(api.run.contract) if one.label not in api.streams and allowed(api, one)
+    ]
+    return [one for one in found if one is not None]
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LATE)
+def pages_of_lists(api: RestInterface, values: Values) -> tuple[Paged, ...]:
+    """Read each list in parts, by each of its parameters for that, and compare the parts with the list."""
+    found, is_possible = list[Paged](), False
+    for listing in lists_of(api):
+        if listing.offset or listing.page or listing.cursor:
+            is_possible = True
+            api.run.limit.check()
+            with suppress(NoAnswerError):  # the survey tells what breaks a connection
+                found += _Parts(Reader(api, values, listing)).all()
+    if not is_possible:
+        raise NotPossibleError("no list that may be read has parameters for its pages")
+    return tuple(found)
+
+
+def vary_lists(api: RestInterface, values: Values) -> None:
+    """Send each list values of its filters and sorts, with and without a limit; and read it as it is, at the end."""
+    for listing in lists_of(api):
+        api.run.limit.check()
+        with suppress(NoAnswerError):
+            reader = Reader(api, values, listing)
+            page = reader.page()
+            if page is not None and page.items:
+                for query in _queries(listing, page, _VALUES.get(api.run.effort.name, _MOST_VALUES)):
+                    reader.read(query)
+                _settled(reader)
+
+
+@dataclass(frozen=True)
+class Reader:
+    """Reads one list."""
+
+    api: RestInterface
+    values: Values
+    listing: Listing
+
+    def read(self, query: dict[str, Any] | None = None) -> Exchange:
+        """Send the usual request with further values of query parameters, by name."""
+        inputs = usual_inputs(self.listing.operation, self.values)[0]
+        for name, value in (query or {}).items():
+            inputs = inputs.having("query", name, value)
+        return written(self.listing.operation, inputs).send(self.api)
+
+    def page(self) -> Page | None:
+        """Return the list as it is without optional parameters; None if it is not answered."""
+        return page_of(self.read().response)
+
+
+def _settled(reader: Reader) -> None:
+    """Read a list; where a total has ceased to be the number of items, once more when no change explains it."""
+    first, now = reader.api.first.get(reader.listing.operation.label), reader.page()
+    before = page_of(first.response) if first is not None else None
+    if before is None or now is None or now.goes_on:
+        return
+    agreed = [name for name, total in before.totals.items() if total == len(before.items)]
+    if any(now.totals.get(name, len(now.items)) != len(now.items) for name in agreed):
+        time.sleep(SETTLES_S)
+        for _ in range(_TWICE):
+            reader.read()
+
+
+def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]]:
+    """Yield values of filters and of the sort, every other one with a limit."""
+    rows: list[dict[str, Any]] = []
+    for name, parameter in listing.filters.items():
+        rows += [{parameter.name: value} for value in _choices(parameter, name, page)[:most]]
+    if listing.sort is not None:
+        directions = flat(listing.direction.schema).get("enum", ()) if listing.direction is not None else ()
+        for number, text in enumerate(list(listing.sortings)[:most]):
+            value: Any = [text] if "array" in kinds_of(listing.sort.schema) else text
+            turned = {listing.direction.name: directions[number % len(directions)]} if listing.direction else {}
+            rows.append({listing.sort.name: value, **turned})
+    few = next((one for one in (2, 1) if fitting(listing.limit, one)), None)
+    for number, row in enumerate(rows):
+        yield row
+        if number % 2 == 0 and listing.limit is not None and few is not None:
+            yield {**row, listing.limit.name: few}
+    if not rows and listing.limit is not None and few is not None:
+        yield {listing.limit.name: few}
+
+
+def _choices(parameter: Parameter, name: str, page: Page) -> list[Any]:
+    """Return values to filter by: the declared ones, or two different ones that items have."""
+    schema, is_list = flat(parameter.schema), "array" in kinds_of(parameter.schema)
+    schema = flat(schema["items"]) if isinstance(schema.get("items"), dict) else schema
+    found = [True, False] if kinds_of(schema) == {"boolean"} else [one for one in schema.get("enum", ()) if one]
+    if not found:
+        there = [members_of(one).get(name) for one in page.items]
+        found = list(dict.fromkeys(one for one in there if isinstance(one, str | int) and one != ""))[:2]
+    return [one for one in ([[value] for value in found] if is_list else found) if fitting(parameter, one)]
+
+
+@dataclass
+class _Parts:
+    """Reads one list in parts."""
+
+    reader: Reader
+
+    def all(self) -> Iterator[Paged]:
+        """Yield what each way to read the list in parts has shown."""
+        whole = self.reader.page()
+        if whole is None or len(set(whole.identities)) < max(2, len(whole.items)):
+            return
+        for walk in (self._shifted, self._beyond, self._by_offset, self._by_page, self._by_cursor):
+            found = self._twice(walk, whole)
+            if found is not None:
+                yield found
+
+    def _twice(self, walk: Callable[[Page], Paged | None], whole: Page) -> Paged | None:
+        """Return what a walk has shown; a fault if it was seen twice while the list stayed the same."""
+        faults = 0
+        for _ in range(_TRIES):
+            found = walk(whole)
+            if found is None or (not found.fault and not faults):
+                return found
+            faults += bool(found.fault)
+            again = [self.reader.page() for _ in range(_STEADY)]
+            if any(one is None or one.identities != whole.identities for one in again):
+                return None
+            if found.fault and faults == _TWICE:
+                return found
+        return None
+
+    def _part(self, query: dict[str, Any]) -> tuple[Exchange, Page] | None:
+        exchange = self.reader.read(query)
+        page = page_of(exchange.response)
+        return (exchange, page) if page is not None else None
+
+    def _paged(self, way: str, found: Exchange, expected: str, fault: str) -> Paged:
+        return Paged(self.reader.listing.operation.label, way, found, expected, fault)
+
+    def _shifted(self, whole: Page) -> Paged | None:
+        """Read from the second item on."""
+        offset = self.reader.listing.offset
+        part = self._part({offset.name: 1}) if offset is not None and fitting(offset, 1) else None
+        if offset is None or part is None:
+            return None
+        expected, found = whole.identities[1:], part[1].identities
+        fault = "" if found[: len(expected)] == expected else _difference(expected, found)
+        return self._paged(offset.name, part[0], f"the list from its second item on, by {offset.name}=1", fault)
+
+    def _beyond(self, whole: Page) -> Paged | None:
+        """Read far beyond the end."""
+        offset, end = self.reader.listing.offset, max([len(whole.items), *whole.totals.values()])
+        far = next((end + more for more in _BEYOND if fitting(offset, end + more)), None)
+        part = self._part({offset.name: far}) if offset is not None and far is not None else None
+        if offset is None or part is None or (whole.goes_on and not whole.totals):
+            return None
+        again = [one for one in part[1].identities if one in whole.identities]
+        fault = f"the item {again[0]} of the first page" if again else ""
+        return self._paged(offset.name, part[0], f"no item of the first page, by {offset.name}={far}", fault)
+
+    def _by_offset(self, whole: Page) -> Paged | None:
+        offset = self.reader.listing.offset
+        if offset is None or not fitting(offset, 0):
+            return None
+        return self._walk(whole, offset.name, lambda read, _: {offset.name: read})
+
+    def _by_page(self, whole: Page) -> Paged | None:
+        page, size = self.reader.listing.page, self._size(whole)
+        limit = self.reader.listing.limit
+        if page is None or limit is None or not size:
+            return None
+        # Pages are counted from 0 or from 1.
+        begin = 1 if 1 in {flat(page.schema).get("default"), flat(page.schema).get("minimum")} else None
+        if begin is None:
+            starts = (one for one in (1, 0) if self._begins(whole, {page.name: one, limit.name: size}))
+            begin = next(starts, None)
+        if begin is None:
+            return None
+        return self._walk(whole, page.name, lambda _, number: {page.name: begin + number})
+
+    def _begins(self, whole: Page, query: dict[str, Any]) -> bool:
+        part = self._part(query)
+        return part is not None and part[1].identities[:1] == whole.identities[:1]
+
+    def _by_cursor(self, whole: Page) -> Paged | None:
+        cursor = self.reader.listing.cursor
+        return None if cursor is None else self._walk(whole, cursor.name, lambda read, _: {} if not read else None)
+
+    def _size(self, whole: Page) -> int:
+        """Return how many items a page is asked to have, so that there are about three; 0 where none is allowed."""
+        sizes = range((len(whole.items) + 2) // 3, len(whole.items))
+        return next((one for one in sizes if fitting(self.reader.listing.limit, one)), 0)
+
+    def _walk(self, whole: Page, way: str, where: Callable[[int, int], dict[str, Any] | None]) -> Paged | None:
+        """Read page after page, and compare all of them with the list.
+
+        Args:
+            whole: the list.
+            way: name of the parameter.
+            where: returns the parameter by the number of items and of pages read; None: the page before names it.
+        """
+        limit, size = self.reader.listing.limit, self._size(whole)
+        if limit is None or not size:
+            return None
+        joined: list[str] = []
+        last: tuple[Exchange, Page] | None = None
+        ends = ""
+        for number in range(_PAGES):
+            query = where(len(joined), number)
+            if query is None and last is not None:
+                following = next(_cursors(self.reader.listing, *last), "")
+                query = {way: following} if following else None
+            if query is None:
+                # Only a device that named a next page before has said that this is the last one.
+                ends = f"no further page after {len(joined)} items" if number > 1 and not whole.goes_on else ""
+                break
+            part = self._part({**query, limit.name: size})
+            if part is None:
+                return None
+            last = part
+            joined += part[1].identities
+            if len(joined) >= len(whole.items) and not whole.goes_on:
+                break
+            if not part[1].items:
+                ends = f"an empty page after {len(joined)} items"
+                break
+        if last is None:
+            return None
+        expected = whole.identities[: len(joined)]
+        fault = "" if tuple(joined[: len(expected)]) == expected else _difference(expected, tuple(joined))
+        fault = fault or (ends if len(joined) < len(whole.items) else "")
+        fault = fault or next((f"the item {one[:60]} twice" for one in joined if joined.count(one) > 1), "")
+        return self._paged(way, last[0], f"each item of the list once, page after page by {way}", fault)
+
+
+def _difference(expected: tuple[str, ...], found: tuple[str, ...]) -> str:
+    """Return where two lists differ, as a noun phrase."""
+    for number, (one, other) in enumerate(zip(expected, found, strict=False), 1):
+        if one != other:
+            return f"{other[:60]} in place of {one[:60]} as item {number}"
+    return f"{len(found)} items instead of {len(expected)}"
+
+
+def _cursors(listing: Listing, exchange: Exchange, page: Page) -> Iterator[str]:
+    """Yield what a response names as the beginning of the next page."""
+    name = listing.cursor.name if listing.cursor is not None else ""
+    links = [one for one in (exchange.response.header("link") or "").split(",") if "next" in one]
+    texts = [*(one.partition("<")[2].partition(">")[0] for one in links), *_following(page.around, 0, said=False)]
+    for text in texts:
+        linked = dict(in_link(text))
+        if name in linked:
+            yield linked[name]
+        elif "?" not in text and "/" not in text:
+            yield text
+    if plain_name(name) == "startingafter" and page.goes_on and page.items:
+        yield str(members_of(page.items[-1]).get("id", ""))
+
+
+def _following(value: Any, depth: int, *, said: bool) -> Iterator[str]:
+    """Yield the texts and numbers below members whose names tell of a next page."""
+    if isinstance(value, dict) and depth <= _DEPTH:
+        for name, one in value.items():
+            yield from _following(
+                one, depth + 1, said=said or "next" in name.lower() or plain_name(name) == "endcursor"
+            )
+    elif isinstance(value, tuple):
+        for one in value:
+            yield from _following(one, depth, said=said)
+    elif said and isinstance(value, str | int) and not isinstance(value, bool) and value != "":
+        yield str(value)

@@ -1,0 +1,342 @@
+"""Lists in every style: parameters that do what they say are never blamed, and those that do not are."""
+
+import json
+from urllib.parse import urlencode
+
+import pytest
+from small_device import answers, described
+
+from conformance.api.rest.listing import listed
+from conformance.checkers.ordering import is_before
+from conformance.checkers.rest import RestCheckers
+from conformance.contract.described import write_described_pack
+from conformance.contract.pack import Contract
+from conformance.transport.exchange import Exchange, Request, Response
+
+BASE = "http://device:8000"
+LIMIT, FILTER, ORDER, TOTAL = (f"description/list-{name}" for name in ("limit", "filter", "order", "total"))
+_STATES, _LEVELS, _WAYS = ["open", "closed", "moving"], ["info", "warning", "error"], ["asc", "desc"]
+_MEMBERS = {
+    "id": {"type": "integer"},
+    "name": {"type": "string"},
+    "zone": {"type": "string"},
+    "state": {"type": "string", "enum": _STATES},
+    "level": {"type": "string", "enum": _LEVELS},
+    "active": {"type": "boolean"},
+    "archived": {"type": "boolean"},
+    "tags": {"type": "array", "items": {"type": "string", "enum": ["a", "b"]}},
+    "opened": {"type": ["string", "null"], "format": "date-time"},
+    "size": {"type": "number"},
+}
+_ITEM = {"type": "object", "properties": _MEMBERS}
+_NAMES = ("id", "name", "zone", "state", "level", "active", "tags", "size", "opened")
+VALVES = [
+    dict(zip(_NAMES, row, strict=True))
+    for row in (
+        (1, "alpha", "north", "open", "info", True, ["a"], 3, "2026-01-02T00:00:00Z"),
+        (2, "bravo", "south", "closed", "error", False, ["b"], 1, None),
+        (3, "charlie", "north", "moving", "warning", True, ["a", "b"], 2.5, "2026-01-01T00:00:00+02:00"),
+        (4, "delta", "south", "open", "info", False, [], 2, "2025-12-01T00:00:00Z"),
+    )
+]
+
+
+def _whole(name, **schema):
+    return {"name": name, "in": "query", "schema": {"type": "integer", **schema}}
+
+
+def _text(name, **schema):
+    return {"name": name, "in": "query", "schema": {"type": "string", **schema}}
+
+
+def _bool(name, **schema):
+    return {"name": name, "in": "query", "schema": {"type": "boolean", **schema}}
+
+
+def _of(value):
+    """Return a schema for an envelope whose innermost list has valves."""
+    if isinstance(value, list):
+        return {"type": "array", "items": _ITEM}
+    inner = {name: _of(one) for name, one in value.items() if isinstance(one, dict | list)}
+    return {"type": "object", "properties": inner}
+
+
+class Seen:
+    """The requirements that are not met in a run of exchanges with one list."""
+
+    def __init__(self, tmp_path, parameters, wrapped=lambda items: items):
+        get = {"responses": {"200": answers(_of(wrapped([])))}, "parameters": list(parameters)}
+        document = described(
+            {"/valves": {"get": get, "post": {"responses": {"201": {"description": "made"}}}}}, "3.1.0"
+        )
+        self.checkers = RestCheckers(Contract.load(write_described_pack(tmp_path, document, document)), BASE)
+        self.wrapped, self.now, self.cases = wrapped, 1000.0, []
+
+    def read(self, items, headers=(), after=1.0, body=None, **query):
+        """Judge one list."""
+        octets = json.dumps(self.wrapped(items) if body is None else body).encode()
+        target = f"/valves?{urlencode(query, safe=',')}" if query else "/valves"
+        return self._judge("GET", target, 200, (("Content-Type", "application/json"), *headers), octets, after)
+
+    def write(self):
+        """Judge a POST."""
+        return self._judge("POST", "/valves", 201, (), b"", 0.1)
+
+    def _judge(self, method, target, status, headers, octets, after):
+        self.now += after
+        request = Request(method, BASE + target, (("Host", "device:8000"),))
+        exchange = Exchange(request, Response(status, headers, octets, 1.0, received_s=self.now))
+        self.cases += [one for one in self.checkers(exchange) if one.requirement.startswith("description/list-")]
+        return self
+
+    @property
+    def broken(self):
+        return {one.requirement for one in self.cases if not one.holds}
+
+    @property
+    def judged(self):
+        return {one.requirement for one in self.cases}
+
+
+@pytest.mark.parametrize(
+    ("name", "schema", "query", "count", "blamed"),
+    [
+        ("limit", {}, {"limit": 2}, 3, True),
+        ("page[size]", {}, {"page[size]": 2}, 4, True),
+        ("$top", {}, {"$top": 1}, 2, True),
+        ("per_page", {"maximum": 3}, {"per_page": 3}, 4, True),
+        ("pageSize", {"default": 2}, {}, 3, True),
+        ("max", {}, {"max": 1}, 4, True),
+        ("limit", {}, {"limit": 2}, 2, False),
+        ("limit", {}, {"limit": 100}, 4, False),
+        ("limit", {}, {"limit": 0}, 4, False),
+        ("limit", {"minimum": 3}, {"limit": 1}, 3, False),
+        ("limit", {}, {}, 4, False),
+        ("limit", {"default": 2}, {"ids": "1,2,3"}, 3, False),
+        ("size", {}, {"size": 1}, 4, False),
+        ("depth", {}, {"depth": 1}, 4, False),
+    ],
+)
+def test_limits(name, schema, query, count, blamed, tmp_path):
+    seen = Seen(tmp_path, [_whole(name, **schema), _text("ids")])
+    assert (LIMIT in seen.read(VALVES[:count], **query).broken) == blamed
+
+
+ENVELOPES = {
+    "plain": lambda items: items,
+    "data": lambda items: {"data": items, "meta": {"x": []}},
+    "HAL": lambda items: {"_links": {"self": {"href": "/valves"}}, "_embedded": {"valves": items}, "page": {"size": 5}},
+    "OData": lambda items: {"@odata.context": "x", "value": items},
+    "nested": lambda items: {"data": {"results": items, "kinds": {"a": 1}}, "errors": []},
+    "facets": lambda items: {"facets": [1], "items": items},
+}
+
+
+@pytest.mark.parametrize("envelope", ENVELOPES)
+def test_a_list_is_found_in_its_envelope(envelope, tmp_path):
+    assert listed(ENVELOPES[envelope](VALVES)) == VALVES
+    assert Seen(tmp_path, [_whole("limit")], ENVELOPES[envelope]).read(VALVES, limit=1).broken == {LIMIT}
+
+
+@pytest.mark.parametrize(
+    ("parameter", "query", "keep", "blamed"),
+    [
+        (_text("state", enum=_STATES), {"state": "open"}, lambda one: one["state"] != "closed", True),
+        (_text("filter[state]", enum=_STATES), {"filter[state]": "open"}, lambda _: True, True),
+        (_bool("active"), {"active": "true"}, lambda _: True, True),
+        (_bool("active"), {"active": "false"}, lambda one: one["active"], True),
+        (_text("tags", enum=["a", "b"]), {"tags": "a"}, lambda _: True, True),
+        (_text("level", enum=_LEVELS), {"level": "warning"}, lambda _: True, True),
+        (_text("state", enum=_STATES), {"state": "open"}, lambda one: one["state"] == "open", False),
+        (_text("state", enum=[*_STATES, "all"]), {"state": "all"}, lambda _: True, False),
+        (_text("level", enum=_LEVELS), {"level": "warning"}, lambda one: one["level"] != "info", False),
+        (_text("tags", enum=["a", "b"]), {"tags": "a"}, lambda one: "a" in one["tags"], False),
+        (_bool("active", default=False), {"active": "false"}, lambda _: True, False),
+        (_bool("archived"), {"archived": "true"}, lambda _: True, False),
+        (_text("name"), {"name": "a"}, lambda _: True, False),
+        (_text("state", enum=["OPEN"]), {"state": "OPEN"}, lambda _: True, False),
+        (_text("zone"), {"zone": "north"}, lambda _: True, False),
+        (_whole("size"), {"size": 2}, lambda one: one["size"] >= 2, False),
+    ],
+)  # fmt: skip
+def test_filters(parameter, query, keep, blamed, tmp_path):
+    seen = Seen(tmp_path, [parameter]).read([{**one, "archived": False} for one in VALVES])
+    assert (FILTER in seen.read([{**one, "archived": False} for one in VALVES if keep(one)], **query).broken) == blamed
+
+
+def test_a_filter_that_takes_a_list_allows_each_of_it(tmp_path):
+    parameter = {**_text("state"), "schema": {"type": "array", "items": _MEMBERS["state"]}, "explode": False}
+    seen = Seen(tmp_path, [parameter]).read(VALVES)
+    assert not seen.read([one for one in VALVES if one["state"] != "moving"], state="open,closed").broken
+    assert seen.read(VALVES, state="open,closed").broken == {FILTER}
+
+
+def test_a_text_is_ignored_only_where_each_of_two_values_gives_the_others_items(tmp_path):
+    seen = Seen(tmp_path, [_text("zone")]).read(VALVES)
+    assert not seen.read(VALVES, zone="north").broken
+    assert not seen.read([one for one in VALVES if one["zone"] == "south"], zone="south").broken
+    assert seen.read(VALVES, zone="south").broken == {FILTER}
+
+
+def test_an_item_that_changes_while_it_is_read_is_not_judged(tmp_path):
+    seen = Seen(tmp_path, [_text("state", enum=_STATES)]).read(VALVES)
+    turned = [{**VALVES[0], "state": "moving"}]
+    assert not seen.read(turned, state="open").broken
+    assert seen.read(turned, state="open").broken == {FILTER}
+
+
+_SORT = _text("sort", enum=["name", "-name", "size", "opened:desc", "state", "id"])
+
+
+@pytest.mark.parametrize(
+    ("parameters", "query", "order", "blamed"),
+    [
+        ([_SORT], {"sort": "name"}, "2134", True),
+        ([_SORT], {"sort": "-name"}, "1234", True),
+        ([_SORT], {"sort": "size"}, "1234", True),
+        ([_SORT], {"sort": "opened:desc"}, "4321", True),
+        ([_text("order_by", enum=["size_desc"])], {"order_by": "size_desc"}, "2431", True),
+        ([_text("sort", enum=["size"]), _text("order", enum=_WAYS)], {"sort": "size", "order": "desc"}, "2431", True),
+        ([_text("sort", enum=["-id"], default="-id")], {}, "1234", True),
+        ([_text("sortBy", enum=["id"]), _text("sortDir", enum=_WAYS, default="asc")], {"sortBy": "id"}, "1342", True),
+        ([_SORT], {"sort": "name"}, "1234", False),
+        ([_SORT], {"sort": "-name"}, "4321", False),
+        ([_SORT], {"sort": "size"}, "1342", False),
+        ([_SORT], {"sort": "id"}, "4321", False),
+        ([_SORT], {"sort": "opened:desc"}, "1342", False),
+        ([_SORT], {"sort": "opened:desc"}, "2134", False),
+        ([_SORT], {"sort": "state"}, "1234", False),
+        ([_text("sort", enum=["size"]), _bool("reverse")], {"sort": "size"}, "1234", False),
+        ([_text("sort")], {"sort": "size"}, "1234", False),
+    ],
+)  # fmt: skip
+def test_orders(parameters, query, order, blamed, tmp_path):
+    items = [VALVES[int(number) - 1] for number in order]
+    assert (ORDER in Seen(tmp_path, parameters).read(VALVES).read(items, **query).broken) == blamed
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "said"),
+    [
+        (1, 2.5, True),
+        (3, 3.0, None),
+        ("2026-01-01T00:00:00Z", "2026-01-01T00:30:00+01:00", False),
+        ("2026-01-01", "2026-02-01", True),
+        ("alpha", "bravo", True),
+        ("Alpha", "bravo", True),
+        ("alpha", "Bravo", None),
+        ("item10", "item9", None),
+        ("a_b", "ab", None),
+        ("é", "f", None),
+        ("high", "low", None),
+        ("Monday", "Tuesday", None),
+        ("10.0.0.9", "10.0.1.0", None),
+        (True, False, None),
+        ("a", 1, None),
+    ],
+)
+def test_two_values_are_compared_only_where_every_order_agrees(one, other, said):
+    assert is_before(one, other) is said
+
+
+def _totalled(name, of=len):
+    return lambda items: {"items": items, name: of(items)}
+
+
+def test_a_total_that_counts_what_was_deleted_is_noticed(tmp_path):
+    for name in ("total", "totalElements", "count"):
+        seen = Seen(tmp_path / name, [_whole("limit"), _whole("offset")], _totalled(name)).read(VALVES).write()
+        assert not seen.read(VALVES[1:], body={"items": VALVES[1:], name: 4}).broken, "it may be late"
+        assert seen.read(VALVES[1:], body={"items": VALVES[1:], name: 4}, after=4.0).broken == {TOTAL}
+
+
+def test_a_total_that_is_wrong_now_and_then_is_noticed(tmp_path):
+    seen = Seen(tmp_path, [], _totalled("total")).read(VALVES)
+    for _ in range(2):
+        seen.read(VALVES).read(VALVES, body={"items": VALVES, "total": 5}, after=4.0)
+    assert seen.broken == {TOTAL}
+
+
+def test_a_header_and_a_filtered_total_are_judged_alike(tmp_path):
+    def many(number):
+        return [("X-Total-Count", str(number))]
+
+    seen = Seen(tmp_path, [_text("state", enum=_STATES)])
+    seen.read(VALVES, many(4)).read([VALVES[1]], many(1), state="closed")
+    assert not seen.broken
+    seen.read([VALVES[1]], many(4), after=4.0, state="closed").read([VALVES[1]], many(4), after=4.0, state="closed")
+    assert seen.broken == {TOTAL}
+
+
+def _page_count(seen):
+    seen.read(VALVES).read(VALVES[2:], offset=2).read(VALVES[:1], limit=1).read(VALVES[1:2], limit=1, offset=1)
+
+
+def _all_unfiltered(seen):
+    seen.read(VALVES)
+    for _ in range(3):
+        seen.read(VALVES[:1], body={"items": VALVES[:1], "total": 4}, after=4.0, state="open")
+
+
+def _estimated(seen):
+    for number in (3, 5, 9):
+        seen.read(VALVES, body={"items": VALVES, "total": number}, after=4.0)
+
+
+def _capped(seen):
+    seen.read(VALVES)
+    for _ in range(3):
+        seen.read(VALVES[2:], body={"items": VALVES, "total": 50}, after=4.0, offset=60, limit=4)
+
+
+def _late(seen):
+    seen.read(VALVES).write()
+    for total in (4, 4, 3):
+        seen.read(VALVES[1:], body={"items": VALVES[1:], "total": total}, after=0.5)
+    seen.read(VALVES[1:], after=9.0)
+
+
+def _cut_by_server(seen):
+    many = [{"id": number} for number in range(20)]
+    seen.read(many, body={"items": many, "total": 20}).write()
+    for _ in range(3):
+        seen.read(many, body={"items": many, "total": 21}, after=4.0)
+
+
+def _cursor(seen):
+    for _ in range(3):
+        seen.read(VALVES[:2], body={"items": VALVES[:2], "total": 4, "next_cursor": "x"}, after=4.0)
+        seen.read(VALVES[2:], body={"items": VALVES[2:], "total": 4}, after=4.0, cursor="x")
+
+
+def _sliding(seen):
+    for number in range(9):
+        items = [{"id": number + one} for one in range(4)]
+        seen.read(items, body={"items": items, "total": 4 + number % 2}, after=0.5)
+        seen.read(items, body={"items": items, "total": 4}, after=0.5)
+
+
+def _beyond(seen):
+    for _ in range(3):
+        seen.read(VALVES).read([], body={"items": [], "total": 4}, after=4.0, offset=99)
+
+
+@pytest.mark.parametrize(
+    ("name", "play"),
+    [
+        ("count", _page_count),
+        ("total", _all_unfiltered),
+        ("total", _estimated),
+        ("total", _capped),
+        ("total", _late),
+        ("total", _cut_by_server),
+        ("total", _cursor),
+        ("total", _sliding),
+        ("total", _beyond),
+    ],
+)
+def test_a_total_that_means_something_else_is_not_blamed(name, play, tmp_path):
+    parameters = [_whole("limit"), _whole("offset"), _text("cursor"), _text("state", enum=_STATES)]
+    seen = Seen(tmp_path, parameters, _totalled(name))
+    play(seen)
+    assert TOTAL not in seen.broken, [one for one in seen.cases if not one.holds]

@@ -1,0 +1,196 @@
+"""Devices with lists in every style are certified: right ones are not blamed, and each fault is found at quick."""
+
+from aiohttp import web
+from small_device import REFUSED, answers, certified, described, error, small_device
+
+LIMIT, FILTER, ORDER, TOTAL, PAGES = (
+    f"description/list-{name}" for name in ("limit", "filter", "order", "total", "pages")
+)
+_STATES, _SORTED = ["open", "closed", "moving"], ["label", "-label", "flow", "-flow"]
+_NEW = {"type": "object", "required": ["label"], "properties": {"label": {"type": "string", "maxLength": 20}}}
+_VALVE = {
+    "type": "object",
+    "properties": {
+        "id": {"type": "integer"},
+        "label": {"type": "string"},
+        "state": {"type": "string", "enum": _STATES},
+        "flow": {"type": "number"},
+    },
+}
+_WHOLE, _ANY = {"type": "integer", "minimum": 0, "maximum": 100}, {"type": "object"}
+_VALVES = {"type": "array", "items": _VALVE}
+# Names of the parameters of each style, the members around its lists, and how to make them of a part and the total.
+_STYLES = {
+    "offset": {"limit": "limit", "offset": "offset", "in": "items", "around": lambda _, of: {"total": of}},
+    "page-1": {"limit": "per_page", "page": "page", "first": 1, "header": "X-Total-Count"},
+    "page-0": {"limit": "size", "page": "page", "in": "content", "around": lambda _, of: {"p": {"totalElements": of}}},
+    "cursor": {"limit": "limit", "cursor": "cursor", "most": 4, "in": "items", "around": lambda *_: {}},
+    "OData": {"limit": "$top", "offset": "$skip", "in": "value", "around": lambda part, _: {"count": len(part)}},
+    "JSON-API": {"limit": "page[size]", "page": "page[number]", "first": 1, "in": "data",
+                 "around": lambda _, of: {"meta": {"total": of}}},
+    "none": {"in": "results", "around": lambda _, of: {"count": of}},
+}  # fmt: skip
+_FAULTS = [
+    ("offset", "limit off by one", LIMIT),
+    ("cursor", "limit off by one", LIMIT),
+    ("page-1", "filter ignored for one value", FILTER),
+    ("OData", "filter ignored beside a limit", FILTER),
+    ("JSON-API", "order ignored after many reads", ORDER),
+    ("none", "one order ignored", ORDER),
+    ("offset", "total counts the deleted", TOTAL),
+    ("none", "total counts the deleted", TOTAL),
+    ("page-1", "total counts the refused", TOTAL),
+    ("cursor", "page repeated", PAGES),
+    ("page-0", "page repeated", PAGES),
+    ("page-1", "item left out", PAGES),
+    ("OData", "first page beyond the end", PAGES),
+]
+
+
+class _Collection:
+    """One collection of valves, in one style and with one fault."""
+
+    def __init__(self, path, style, fault=""):
+        self.path, self.style, self.fault = path, _STYLES[style], fault
+        self.valves = [
+            {"id": one, "label": f"valve {'gcafbde'[one]}", "state": _STATES[one % 3], "flow": one * 7 % 5 / 2}
+            for one in range(7)
+        ]
+        self.reads, self.created, self.deleted, self.refused = 0, 7, 0, 0
+
+    def described(self):
+        """Return its paths."""
+        given = [(self.style[role], _WHOLE) for role in ("limit", "offset", "page") if role in self.style]
+        given += [("state", {"type": "string", "enum": _STATES}), ("sort", {"type": "string", "enum": _SORTED})]
+        given += [(self.style["cursor"], {"type": "string"})] if "cursor" in self.style else []
+        shown = {"type": "object", "properties": {self.style["in"]: _VALVES}} if "in" in self.style else _VALVES
+        key = {"in": "path", "name": "id", "required": True, "schema": {"type": "integer"}}
+        bad, body = {"4XX": REFUSED}, {"required": True, "content": {"application/json": {"schema": _NEW}}}
+        return {
+            self.path: {
+                "get": {
+                    "parameters": [{"in": "query", "name": name, "schema": schema} for name, schema in given],
+                    "responses": {"200": answers(shown), **bad},
+                },
+                "post": {"requestBody": body, "responses": {"201": answers(_VALVE), **bad}},
+            },
+            f"{self.path}/{{id}}": {
+                "parameters": [key],
+                "get": {"responses": {"200": answers(_VALVE), **bad}},
+                "delete": {"responses": {"204": {"description": "gone"}, **bad}},
+            },
+        }
+
+    def routes(self):
+        """Return its handlers."""
+        return {
+            self.path: {"GET": self._list, "POST": self._post},
+            f"{self.path}/{{id}}": {"GET": self._get, "DELETE": self._delete},
+        }
+
+    def _number(self, request, role, default):
+        text = request.query.get(self.style.get(role, ""), str(default)).removeprefix("c")
+        return int(text) if text.isascii() and text.isdigit() and int(text) <= 100 else None
+
+    async def _list(self, request):
+        self.reads += 1
+        query, first = request.query, self.style.get("first", 0)
+        known = {*(one for one in self.style.values() if isinstance(one, str)), "state", "sort"}
+        limit, *where = (self._number(request, role, 0) for role in ("limit", "offset", "cursor"))
+        page = self._number(request, "page", first)
+        is_right = query.get("state", "open") in _STATES and query.get("sort", "label") in _SORTED
+        if not is_right or not query.keys() <= known or None in {limit, page, *where} or page < first:
+            return self._refusal()
+        size = min(limit or 50, self.style.get("most", 50))
+        found = self._chosen(query)
+        begin = self._begin(sum(where) + (page - first) * size, len(found))
+        end = begin + size + (self.fault == "limit off by one" and limit > 0)
+        total = len(found)
+        total += self.deleted if self.fault == "total counts the deleted" else 0
+        total += self.fault == "total counts the refused" and self.refused > 9
+        part = found[begin:end]
+        headers = {self.style["header"]: str(total)} if "header" in self.style else {}
+        if "in" not in self.style:
+            return web.json_response(part, headers=headers)
+        following = {"next": f"c{end}"} if "cursor" in self.style and end < len(found) else {}
+        return web.json_response({self.style["in"]: part, **self.style["around"](part, total), **following})
+
+    def _chosen(self, query):
+        found, state, sort = list(self.valves), query.get("state"), query.get("sort")
+        ignores = {
+            "filter ignored for one value": state == "moving",
+            "filter ignored beside a limit": self.style.get("limit") in query,
+            "order ignored after many reads": self.reads > 60,
+            "one order ignored": sort == "-flow",
+        }.get(self.fault, False)
+        if state and not (ignores and self.fault.startswith("filter")):
+            found = [one for one in found if one["state"] == state]
+        if sort and not (ignores and "order" in self.fault):
+            found.sort(key=lambda one: one[sort.strip("-")], reverse=sort[0] == "-")
+        return found
+
+    def _begin(self, begin, end):
+        begin -= self.fault == "page repeated" and begin >= 2
+        begin += self.fault == "item left out" and begin > 0
+        return 0 if self.fault == "first page beyond the end" and begin > end else begin
+
+    def _refusal(self):
+        self.refused += 1
+        return error(422, "no such value")
+
+    async def _post(self, request):
+        try:
+            label = (await request.json())["label"]
+        except (ValueError, TypeError, LookupError):
+            return self._refusal()
+        if not isinstance(label, str) or len(label) > 20:
+            return self._refusal()
+        self.valves.append({"id": self.created, "label": label, "state": "open", "flow": 0.5})
+        self.created += 1
+        return web.json_response(self.valves[-1], status=201)
+
+    def _found(self, request):
+        return next((one for one in self.valves if str(one["id"]) == request.match_info["id"]), None)
+
+    async def _get(self, request):
+        found = self._found(request)
+        return error(404, "no such valve") if found is None else web.json_response(found)
+
+    async def _delete(self, request):
+        found = self._found(request)
+        if found is None:
+            return error(404, "no such valve")
+        self.valves.remove(found)
+        self.deleted += 1
+        return web.Response(status=204)
+
+
+def _certified(collections, out):
+    """Certify a device with these collections by its description; return what is blamed of lists, by operation."""
+    paths = {path: item for one in collections for path, item in one.described().items()}
+    routes = {path: methods for one in collections for path, methods in one.routes().items()}
+    calls = [
+        f"--call={method} {path}" for path in paths for method in ("POST", "DELETE") if method.lower() in paths[path]
+    ]
+    with small_device(described(paths, "3.1.0"), routes) as url:
+        return certified(url, out, *calls, "--class", "description")
+
+
+def test_right_lists_of_every_style_are_not_blamed(tmp_path):
+    done = _certified([_Collection(f"/{style}/valves", style) for style in _STYLES], tmp_path / "out")
+    assert [done.requirement(id_)["verdict"] for id_ in (LIMIT, FILTER, ORDER, TOTAL, PAGES)] == ["pass"] * 5, done.text
+
+
+def test_each_fault_is_found(tmp_path):
+    faulty = {f"/{fault.replace(' ', '-')}/{style}": (style, fault, id_) for style, fault, id_ in _FAULTS}
+    done = _certified([_Collection(path, style, fault) for path, (style, fault, _) in faulty.items()], tmp_path / "out")
+    blamed = {
+        (shown["operation"].removeprefix("GET "), id_)
+        for id_ in (LIMIT, FILTER, ORDER, TOTAL, PAGES)
+        for failure in done.requirement(id_)["failures"]
+        for shown in failure["operations"]
+    }
+    expected = {(path, id_) for path, (_, _, id_) in faulty.items()}
+    assert expected <= blamed, expected - blamed
+    # What a limit shows too much of, pages repeat.
+    assert {id_ for _, id_ in blamed - expected} <= {PAGES}, blamed - expected
