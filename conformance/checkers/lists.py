@@ -119,7 +119,7 @@ class Lists:
         default = flat(sort.schema).get("default", "") if sent.keys() <= listing.known else ""
         text = sent.get(sort.name, str(default))
         sorting = listing.sortings.get(text.split(",")[0])
-        if sorting is None or sorting.member in _LEVELS:
+        if sorting is None:
             return
         schema, descending = flat(listing.members[sorting.member]), sorting.descending
         if listing.direction is not None:

@@ -9,6 +9,7 @@ from typing import Final
 
 from conformance.api.rest.listing import COUNTS, Listing, Page, number_of
 from conformance.checkers.occasion import Occasion
+from conformance.documents.representation import flat
 from conformance.verdict.case import Case
 
 #: A total may be kept apart from the list, and be late after a change, s. Wrong so often while nothing changes, it is
@@ -90,7 +91,7 @@ class Totals:
                 continue
             if name in COUNTS and (total == shown or not (count.is_of_all or total < shown)):
                 continue
-            least, sure = offset + shown, whole and not self._is_cut(label, shown)
+            least, sure = offset + shown, whole and not self._is_cut(listing, shown, sent)
             if (shown and total < least and not _is_cap(total)) or (sure and total != least):
                 if count.is_sure(page, occasion.response.received_s, self._changed_s, whole=whole and offset == 0):
                     expected = (
@@ -102,10 +103,13 @@ class Totals:
                     count.last, count.wrong_since_s = frozenset(page.identities), 0.0
                 yield _case(occasion, name, "", "the number of items that are shown", holds=True)
 
-    def _is_cut(self, label: str, shown: int) -> bool:
-        """Return whether a server may have cut a list, at a round number of items that no list exceeded."""
-        is_round = shown % _CUTS[0] == 0 or shown % _CUTS[1] == 0
-        return shown >= max(_FEWEST_CUT, self._longest[label]) and is_round
+    def _is_cut(self, listing: Listing, shown: int, sent: Mapping[str, str]) -> bool:
+        """Return whether a server may have cut a list at its own bound: a round number that no list exceeded."""
+        limit, is_round = listing.limit, shown % _CUTS[0] == 0 or shown % _CUTS[1] == 0
+        has_parts = not all(one is None for one in (limit, listing.offset, listing.page, listing.cursor))
+        is_declared = limit is not None and limit.name in sent and "maximum" in flat(limit.schema)
+        longest = self._longest[listing.operation.label]
+        return has_parts and not is_declared and is_round and shown >= max(_FEWEST_CUT, longest)
 
 
 def _is_cap(total: int) -> bool:

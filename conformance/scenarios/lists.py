@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from itertools import islice
 from typing import Any, Final
 
 from conformance.api.rest.applicable import allowed
-from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.listing import Listing, Page, fitting, listing_of, members_of, page_of
 from conformance.api.rest.references import in_link
 from conformance.api.rest.values import Values
@@ -19,6 +22,7 @@ from conformance.documents.json_schema import kinds_of
 from conformance.documents.openapi import operations_of
 from conformance.documents.parameters import Parameter, plain_name
 from conformance.documents.representation import flat
+from conformance.documents.writing import text_of
 from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange, NoAnswerError
@@ -31,6 +35,8 @@ _MOST_VALUES: Final = 12
 _TRIES: Final = 4
 _TWICE: Final = 2
 _STEADY: Final = 3
+# Fewer items have no pages to compare.
+_FEWEST: Final = 2
 # So far beyond the end a part of a list is asked for, as far as the schema allows.
 _BEYOND: Final = (1000, 100, 10, 1)
 _DEPTH: Final = 3
@@ -72,10 +78,35 @@ def pages_of_lists(api: RestInterface, values: Values) -> tuple[Paged, ...]:
             is_possible = True
             api.run.limit.check()
             with suppress(NoAnswerError):  # the survey tells what breaks a connection
-                found += _Parts(Reader(api, values, listing)).all()
+                found += _pages_of(Reader(api, values, listing))
     if not is_possible:
         raise NotPossibleError("no list that may be read has parameters for its pages")
     return tuple(found)
+
+
+def _pages_of(reader: Reader) -> Iterator[Paged]:
+    """Yield what is seen of a list in parts: as it is, sorted by a member that no two items share, and filtered."""
+    page = reader.page()
+    for query in ({}, *_selections(reader.listing, page)) if page is not None else ():
+        yield from _Parts(replace(reader, always=query)).all()
+
+
+def _selections(listing: Listing, page: Page) -> Iterator[dict[str, Any]]:
+    """Yield one value of the sort, and one of a filter that leaves several items, where the list has such."""
+    items = [members_of(one) for one in page.items]
+    if listing.sort is not None and listing.direction is None and "array" not in kinds_of(listing.sort.schema):
+        sorts = [
+            text
+            for text, one in listing.sortings.items()
+            if len({str(item.get(one.member)) for item in items}) == len(items)
+        ]
+        yield from ({listing.sort.name: text} for text in sorts[-1:])
+    for name, parameter in listing.filters.items():
+        there = Counter(text_of(item.get(name)) for item in items if not isinstance(item.get(name), list | dict))
+        chosen = [one for one in _choices(parameter, name, page) if _FEWEST <= there[text_of(one)] < len(items)]
+        if chosen:
+            yield {parameter.name: chosen[-1]}
+            break
 
 
 def vary_lists(api: RestInterface, values: Values) -> None:
@@ -86,6 +117,7 @@ def vary_lists(api: RestInterface, values: Values) -> None:
             reader = Reader(api, values, listing)
             page = reader.page()
             if page is not None and page.items:
+                reader.refused()
                 for query in _queries(listing, page, _VALUES.get(api.run.effort.name, _MOST_VALUES)):
                     reader.read(query)
                 _settled(reader)
@@ -93,18 +125,35 @@ def vary_lists(api: RestInterface, values: Values) -> None:
 
 @dataclass(frozen=True)
 class Reader:
-    """Reads one list."""
+    """Reads one list.
+
+    Attributes:
+        api, values: of the device.
+        listing: the list.
+        always: values of query parameters, by name, that each request has.
+    """
 
     api: RestInterface
     values: Values
     listing: Listing
+    always: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def usual(self) -> Inputs:
+        """The values of its usual request."""
+        return usual_inputs(self.listing.operation, self.values)[0]
 
     def read(self, query: dict[str, Any] | None = None) -> Exchange:
         """Send the usual request with further values of query parameters, by name."""
-        inputs = usual_inputs(self.listing.operation, self.values)[0]
-        for name, value in (query or {}).items():
+        inputs = self.usual
+        for name, value in {**self.always, **(query or {})}.items():
             inputs = inputs.having("query", name, value)
         return written(self.listing.operation, inputs).send(self.api)
+
+    def refused(self) -> None:
+        """Send an invalid request, after which the valid ones have to be answered as before."""
+        for one in islice(invalid_variations(self.listing.operation, self.usual), 1):
+            written(self.listing.operation, one.inputs).send(self.api)
 
     def page(self) -> Page | None:
         """Return the list as it is without optional parameters; None if it is not answered."""
@@ -136,12 +185,14 @@ def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]
             turned = {listing.direction.name: directions[number % len(directions)]} if listing.direction else {}
             rows.append({listing.sort.name: value, **turned})
     few = next((one for one in (2, 1) if fitting(listing.limit, one)), None)
-    for number, row in enumerate(rows):
+    part = {listing.limit.name: few} if listing.limit is not None and few is not None else {}
+    later = {listing.offset.name: 1} if listing.offset is not None and fitting(listing.offset, 1) else {}
+    for number, row in enumerate(rows or [{}]):
         yield row
-        if number % 2 == 0 and listing.limit is not None and few is not None:
-            yield {**row, listing.limit.name: few}
-    if not rows and listing.limit is not None and few is not None:
-        yield {listing.limit.name: few}
+        if part and number % 2 == 0:
+            yield {**row, **part}
+        elif later:
+            yield {**row, **part, **later}
 
 
 def _choices(parameter: Parameter, name: str, page: Page) -> list[Any]:
@@ -164,7 +215,7 @@ class _Parts:
     def all(self) -> Iterator[Paged]:
         """Yield what each way to read the list in parts has shown."""
         whole = self.reader.page()
-        if whole is None or len(set(whole.identities)) < max(2, len(whole.items)):
+        if whole is None or len(set(whole.identities)) < max(_FEWEST, len(whole.items)):
             return
         for walk in (self._shifted, self._beyond, self._by_offset, self._by_page, self._by_cursor):
             found = self._twice(walk, whole)

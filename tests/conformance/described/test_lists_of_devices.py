@@ -1,5 +1,8 @@
 """Devices with lists in every style are certified: right ones are not blamed, and each fault is found at quick."""
 
+import random
+import time
+
 from aiohttp import web
 from small_device import REFUSED, answers, certified, described, error, small_device
 
@@ -29,6 +32,10 @@ _STYLES = {
     "JSON-API": {"limit": "page[size]", "page": "page[number]", "first": 1, "in": "data",
                  "around": lambda _, of: {"meta": {"total": of}}},
     "none": {"in": "results", "around": lambda _, of: {"count": of}},
+    "shuffled": {"in": "results", "around": lambda _, of: {"count": of}},
+    "sliding": {"limit": "limit", "offset": "offset", "in": "items", "around": lambda _, of: {"total": of}},
+    "late": {"limit": "limit", "offset": "skip", "in": "items", "around": lambda _, of: {"total": of}},
+    "last": {"limit": "limit", "page": "page", "first": 1, "in": "items", "around": lambda _, of: {"total": of}},
 }  # fmt: skip
 _FAULTS = [
     ("offset", "limit off by one", LIMIT),
@@ -51,7 +58,8 @@ class _Collection:
     """One collection of valves, in one style and with one fault."""
 
     def __init__(self, path, style, fault=""):
-        self.path, self.style, self.fault = path, _STYLES[style], fault
+        self.path, self.style, self.fault, self.manner = path, _STYLES[style], fault, style
+        self.told, self.told_s = 7, 0.0
         self.valves = [
             {"id": one, "label": f"valve {'gcafbde'[one]}", "state": _STATES[one % 3], "flow": one * 7 % 5 / 2}
             for one in range(7)
@@ -105,7 +113,7 @@ class _Collection:
         found = self._chosen(query)
         begin = self._begin(sum(where) + (page - first) * size, len(found))
         end = begin + size + (self.fault == "limit off by one" and limit > 0)
-        total = len(found)
+        total = self._counted(len(found)) if "state" not in query else len(found)
         total += self.deleted if self.fault == "total counts the deleted" else 0
         total += self.fault == "total counts the refused" and self.refused > 9
         part = found[begin:end]
@@ -115,8 +123,22 @@ class _Collection:
         following = {"next": f"c{end}"} if "cursor" in self.style and end < len(found) else {}
         return web.json_response({self.style["in"]: part, **self.style["around"](part, total), **following})
 
+    def _counted(self, total):
+        """Return the total, which one device counts anew each second only."""
+        if self.manner != "late" or time.monotonic() - self.told_s > 1:
+            self.told, self.told_s = total, time.monotonic()
+        return self.told
+
+    def _changing(self):
+        """Return all valves: one device shows events, which come and go, and another one has no order."""
+        if self.manner == "sliding" and self.reads % 3 == 0:
+            gone = self.valves.pop(0)
+            self.valves.append({**gone, "id": self.created})
+            self.created += 1
+        return random.sample(self.valves, len(self.valves)) if self.manner == "shuffled" else list(self.valves)
+
     def _chosen(self, query):
-        found, state, sort = list(self.valves), query.get("state"), query.get("sort")
+        found, state, sort = self._changing(), query.get("state"), query.get("sort")
         ignores = {
             "filter ignored for one value": state == "moving",
             "filter ignored beside a limit": self.style.get("limit") in query,
@@ -130,6 +152,8 @@ class _Collection:
         return found
 
     def _begin(self, begin, end):
+        if self.manner == "last" and begin >= end > 0:
+            return end - 1
         begin -= self.fault == "page repeated" and begin >= 2
         begin += self.fault == "item left out" and begin > 0
         return 0 if self.fault == "first page beyond the end" and begin > end else begin
