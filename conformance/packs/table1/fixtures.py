@@ -12,6 +12,7 @@ from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliverie
 from conformance.packs.table1.robot.clock import Clock
 from conformance.packs.table1.robot.delivery_sender import DeliverySender
 from conformance.packs.table1.robot.probe.client import RosProbe
+from conformance.packs.table1.robot.refused_requests import RefusedRequests
 from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.robot.standstill import Standstill
 from conformance.packs.table1.robot.stopping import bring_to_rest
@@ -92,6 +93,14 @@ def accepted(_accepted: list[AcceptedDeliveries]) -> AcceptedDeliveries:
     if not _accepted:
         raise NotPossibleError("there is no REST interface whose list shows the deliveries")
     return _accepted[0]
+
+
+@pytest.fixture
+def refused(api: RestInterface) -> RefusedRequests:
+    """Return what keeps the requests that were refused in the run."""
+    if not isinstance(api.device, Device):
+        raise TypeError("the run judges another kind of device")
+    return api.device.refused[0]
 
 
 @pytest.fixture(autouse=True)

@@ -15,6 +15,7 @@ from conformance.transport.exchange import Listener
 
 if TYPE_CHECKING:
     from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliveries
+    from conformance.packs.table1.robot.refused_requests import RefusedRequests
 
 _TEMPLATE = """
 [limits]
@@ -85,6 +86,11 @@ class Device(device.Device):
         return []
 
     @cached_property
+    def refused(self) -> "list[RefusedRequests]":
+        """What keeps the requests that were refused in the run; empty without a REST interface."""
+        return []
+
+    @cached_property
     def _examples(self) -> Examples:
         from conformance.packs.table1.robot.examples import Examples  # noqa: PLC0415 - see the class
 
@@ -138,12 +144,14 @@ class Device(device.Device):
         from conformance.packs.table1.robot.list_observer import ListObserver  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.observer import Observer  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.plan_observer import PlanObserver  # noqa: PLC0415 - see the class
+        from conformance.packs.table1.robot.refused_requests import RefusedRequests  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.soap_pose_observer import SoapPoseObserver  # noqa: PLC0415 - see the class
 
-        accepted = AcceptedDeliveries(api)
+        accepted, refused = AcceptedDeliveries(api), RefusedRequests(api)
         self.accepted.append(accepted)
+        self.refused.append(refused)
         others = (GoalObserver, PlanObserver, ListObserver, SoapPoseObserver)
-        return (Observer(api, self.clock), *(one(api) for one in others), accepted)
+        return (Observer(api, self.clock), *(one(api) for one in others), accepted, refused)
 
     def halt(self, api: device.Rest) -> None:
         """Cancel and stop what the robot may be doing, without waiting until it stands still."""

@@ -21,7 +21,7 @@ _DELETE, _PUT_GOAL, _POST = rest("DELETE", GOAL), rest("PUT", GOAL), rest("POST"
 _SILENT_S, _LOOK_S = 0.12, 0.04
 
 
-class _Remembering:
+class Remembering:
     """A change that remembers the last accepted velocity, counts commands, and knows when the last request came."""
 
     def __init__(self) -> None:
@@ -31,6 +31,7 @@ class _Remembering:
         self.lock = threading.Lock()
 
     def __call__(self, request: Request, forward: Forward) -> Response:
+        """Forward a request, and take note of it."""
         self.asked = time.monotonic()
         response = forward(request)
         if _PUT_GOAL(request) and success(response):
@@ -51,7 +52,7 @@ class _Remembering:
 
 
 @_mutant("safety-asleep", "hold-ends", "A velocity command ends only while clients send requests.")
-class _Asleep(_Remembering):
+class _Asleep(Remembering):
     def put(self, request: Request, response: Response, forward: Forward) -> None:
         super().put(request, response, forward)
         if success(response) and self.last and "angular" in self.last:
@@ -66,7 +67,7 @@ class _Asleep(_Remembering):
 
 
 @_mutant("safety-renewed-by-refusal", "hold-ends", "A refused velocity command renews the previous one.")
-class _Renewed(_Remembering):
+class _Renewed(Remembering):
     def put(self, request: Request, response: Response, forward: Forward) -> None:
         super().put(request, response, forward)
         driving = (
@@ -77,7 +78,7 @@ class _Renewed(_Remembering):
 
 
 @_mutant("safety-renewed-by-soap", "hold-ends", "A SOAP message that only reads renews the velocity.")
-class _RenewedBySoap(_Remembering):
+class _RenewedBySoap(Remembering):
     def __call__(self, request: Request, forward: Forward) -> Response:
         response = super().__call__(request, forward)
         if request.side == "soap" and self.last and "angular" in self.last:
@@ -86,7 +87,7 @@ class _RenewedBySoap(_Remembering):
 
 
 @_mutant("safety-linear-deaf", "renewal", "A PUT of a linear velocity that is there already does not renew it.")
-class _LinearDeaf(_Remembering):
+class _LinearDeaf(Remembering):
     def __call__(self, request: Request, forward: Forward) -> Response:
         value: Any = parsed(request.body) if _PUT_LINEAR(request) else None
         if isinstance(value, dict) and self.last and self.last.get("linear") == value:
@@ -130,7 +131,7 @@ def _goal_stops(request: Request, forward: Forward) -> Response:
     "rest-resources/linear-keeps-angular",
     "PUT of a linear velocity restarts a turning that had ended.",
 )
-class _Revived(_Remembering):
+class _Revived(Remembering):
     def put(self, request: Request, response: Response, forward: Forward) -> None:
         super().put(request, response, forward)
         if _PUT_LINEAR(request) and success(response) and self.last and "angular" in self.last:
@@ -140,7 +141,7 @@ class _Revived(_Remembering):
 @_mutant(
     "safety-resuming", "cancel-stays", "After DELETE of the goal, the robot drives the velocity from before the goal."
 )
-class _Resuming(_Remembering):
+class _Resuming(Remembering):
     def __call__(self, request: Request, forward: Forward) -> Response:
         response = super().__call__(request, forward)
         if _DELETE(request) and response.status == 204 and self.last and "angular" in self.last:
@@ -150,7 +151,7 @@ class _Resuming(_Remembering):
 
 
 @_mutant("safety-deaf", "hold", "While a velocity command holds, sending it again does not renew it.")
-class _Deaf(_Remembering):
+class _Deaf(Remembering):
     _HOLD_S = 1.0
 
     def __init__(self) -> None:

@@ -58,13 +58,15 @@ class DeliverySender:
     # However its XML is written, a message has the same values.
     _styles: Iterator[XmlStyle] = field(default_factory=lambda: cycle(value_styles()))
     _collected: float = 0.0
+    _judged: int = 0
 
     def __post_init__(self) -> None:
         """Disregard what arrived before."""
         self.observer.mark()
 
-    def trace(self, first: int = 0) -> Deliveries:
-        """Return the record so far, to be judged from a batch on."""
+    def trace(self) -> Deliveries:
+        """Return the record so far, of which the batches since the last call are to be judged."""
+        first, self._judged = self._judged, len(self.batches)
         return Deliveries(tuple(self.batches), self.observer.exact, first)
 
     def send(self, orders: Sequence[Order]) -> None:

@@ -92,12 +92,11 @@ def deliveries_last(senders: list[DeliverySender]) -> Deliveries:
 def _watched(senders: list[DeliverySender], seconds: float) -> Deliveries:
     """Return what arrives after the batches of the run's sender, if the run has one."""
     for sender in senders:
-        first = len(sender.batches)
         try:
             sender.watch(seconds)
         except (NoObserverError, ProbeError) as error:
             raise NotPossibleError(str(error)) from error
-        return sender.trace(first)
+        return sender.trace()
     return Deliveries()
 
 

@@ -1,6 +1,7 @@
-"""Turning: at the highest speed, renewed also after rejected commands, along an arc, and at last not renewed."""
+"""Turning: at the highest speed, renewed also after rejected commands, along an arc; and velocities not renewed."""
 
 import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -15,6 +16,7 @@ from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART
 from conformance.packs.table1.robot.goals import make_room
 from conformance.packs.table1.robot.letting_go import LetGo, Way, certain_s, ends_by
 from conformance.packs.table1.robot.no_commands import no_commands
+from conformance.packs.table1.robot.refused_requests import Refused, RefusedRequests, is_refused, send_known
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 from conformance.packs.table1.robot.soap_services import ask
 from conformance.packs.table1.robot.undisturbed import arc, renewed
@@ -23,7 +25,7 @@ from conformance.packs.table1.robot.velocity_range import along_arc, both, faste
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S, SEVERAL
 from conformance.packs.table1.scenarios.trace import Driven
 from conformance.scenarios.scenario import PartialTraceError, scenario
-from conformance.scenarios.stage import Need
+from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
 
@@ -52,17 +54,31 @@ _SAMPLES_S: Final = (SEVERAL + 1) * LONGEST_SAMPLE_S
 
 
 @scenario(needs={Need.REST, Need.MOTION})
-def turn(robot: Robot, run: Run, soap: SoapServices) -> Driven:
-    """Turn for about four seconds, in several ways, and let the last velocity end by itself.
+def turn(robot: Robot, soap: SoapServices) -> Driven:
+    """Turn for about two seconds, in several ways.
 
     A robot that cannot turn on the spot turns in its narrowest circle; one that cannot turn at all drives.
     """
     make_room(robot)
-    turning = _Turning(robot, Drive(robot), no_commands(robot, soap.subscribers, str(run.seed)))
+    turning = _Turning(robot, Drive(robot))
     if soap.subscribers is not None and robot.usual_s <= _QUICK_S:
         turning.drive.aside = partial(turning.read_over_soap, soap.subscribers)
     try:
-        turning.play(run)
+        turning.play()
+    except Exception as error:
+        raise PartialTraceError(turning.recorded) from error
+    return turning.recorded
+
+
+@scenario(needs={Need.REST, Need.MOTION}, stage=Stage.LATE)
+def letting_go(robot: Robot, run: Run, soap: SoapServices, refused: RefusedRequests) -> Driven:
+    """Let velocities end by themselves, while requests are sent that were refused in the run or only read."""
+    make_room(robot)
+    send_known(robot, soap, refused)
+    again = deque(refused.chosen(soap.there.values(), run.effort))
+    turning = _Turning(robot, Drive(robot), no_commands(robot, soap.subscribers, str(run.seed)), refused=again)
+    try:
+        turning.play_letting_go(run)
     except Exception as error:
         raise PartialTraceError(turning.recorded) from error
     return turning.recorded
@@ -85,17 +101,22 @@ def further_axes(robot: Robot, run: Run, soap: SoapServices) -> Driven:
 
 @dataclass
 class _Turning:
-    """One play of the scenario; ``idle`` are requests that must not renew a velocity."""
+    """One play of a scenario.
+
+    Requests that must not renew a velocity are ``idle``; those in ``refused`` were refused before.
+    """
 
     robot: Robot
     drive: Drive
     idle: list[Callable[[], object]] = field(default_factory=list)
+    refused: deque[Refused] = field(default_factory=deque)
     tries: list[tuple[LetGo, ...]] = field(default_factory=list)
     not_tested: list[tuple[str, str]] = field(default_factory=list)
     over_soap: list[Exchange] = field(default_factory=list)
     fastest: Velocity = STILL  # the fastest turn to the left that the robot has reached
     pause_s: float = 0.0  # for so long after a hold time the suite is silent at least
     brief: bool = True  # whether the robot was at rest after each brief silence so far
+    taken: bool = False  # whether the robot has taken a request that it had refused before
 
     @property
     def _ends_s(self) -> float:
@@ -112,8 +133,8 @@ class _Turning:
         if turn % _BESIDE == 0:
             self.over_soap.append(ask(subscribers, _STATES[turn // _BESIDE % len(_STATES)]))
 
-    def play(self, run: Run) -> None:
-        """Turn left by whole numbers, as fast as the robot can, renewed, along an arc, and straight on."""
+    def play(self) -> None:
+        """Turn left by whole numbers, as fast as the robot can, renewed, and along an arc."""
         robot, drive = self.robot, self.drive
         drive.look()
         left = robot.only(ABOUT, _WHOLE if fastest(robot, ABOUT) > 1.1 * _WHOLE else 0.0)
@@ -136,6 +157,16 @@ class _Turning:
             # A small circle: either part has to end. The linear part is commanded last, and ends as well.
             bent, before = along_arc(robot, bent, _ASIDE)
             arc(robot, drive, bent, before)
+
+    def play_letting_go(self, run: Run) -> None:
+        """Drive along an arc, and let several velocities end by themselves; then drive straight on."""
+        robot = self.robot
+        self.drive.look()
+        fast = both(robot) if robot.statement.motion.wheel_separation_m is not None else STILL
+        self.fastest = fast if any(fast) or not robot.actuated(ABOUT) else robot.only(ABOUT, fastest(robot, ABOUT))
+        bent = robot.drivable(Velocity(*(-part for part in handy(robot, 0.6))))
+        if robot.actuated(AHEAD) and robot.actuated(ABOUT):
+            bent, _ = along_arc(robot, bent, _ASIDE)
         ways = self._unrenewed(bent, run)
         for number, (velocity, by) in enumerate(ways, 1):
             self.pause_s = _PAUSE_S if number == len(ways) and run.effort.name != "quick" else 0.0
@@ -222,9 +253,13 @@ class _Turning:
         """
         limits, tries = self.robot.limits, []
         for _ in range(_ATTEMPTS if limits.hold_s else 1):
+            self.taken = False
             let_go = self._watch(turning, by)
             if let_go is None:
                 break
+            if self.taken:
+                self.robot.put_velocity(STILL)
+                continue
             tries.append(let_go)
             if not let_go.rests(limits):
                 self.robot.put_velocity(STILL)
@@ -247,6 +282,16 @@ class _Turning:
             send()
             if self.drive.clock.now() > until:
                 break
+
+    def _send_refused(self) -> None:
+        """Send the next request that was refused before; one that the robot takes now is not sent again."""
+        if self.refused and self.robot.usual_s <= _QUICK_S:
+            one = self.refused.popleft()
+            exchange = one.send()
+            if one.acts and exchange.response.ok and not is_refused(exchange):
+                self.taken = True
+            else:
+                self.refused.append(one)
 
     def _watch(self, turning: Velocity, by: Way) -> LetGo | None:
         """Command a velocity, and look until the robot rests or its time is over; return None if it is rejected.
@@ -279,6 +324,8 @@ class _Turning:
         silent_from = math.inf if limits.hold_s is None else full + 0.95 * limits.hold_s
         while True:
             drive.glance() if drive.paces and resumed is None else drive.look()
+            if resumed is None:
+                self._send_refused()
             let_go = LetGo(turning, full, answered, drive.trace.turns[first:], resumed, due, by)
             if let_go.is_decided(limits, ends):
                 return let_go

@@ -2,6 +2,7 @@ import math
 import re
 import struct
 from collections import deque
+from dataclasses import replace
 from itertools import count
 
 import pytest
@@ -101,8 +102,9 @@ def order(number, how) -> Order:
 
 def judged(sender, first=0) -> Judge:
     judge = Judge([rule.requirement for rule in _RULES])
+    trace = replace(sender.trace(), first=first)
     for rule in _RULES:
-        record(judge, rule.requirement, rule.outcomes(sender.trace(first), {}))
+        record(judge, rule.requirement, rule.outcomes(trace, {}))
     return judge
 
 

@@ -1,13 +1,19 @@
 """Rules on requests that the robot must reject: they must change neither the velocity nor the goal."""
 
 from collections.abc import Iterator
+from http import HTTPStatus
 from typing import Final
 
+from conformance.packs.table1.robot.delivery_trace import key_of
+from conformance.packs.table1.robot.goal import CANCELED, NEW, outcome_fault
+from conformance.packs.table1.robot.robot import GOAL_PATH
 from conformance.packs.table1.robot.standstill_trace import Rest, Standing, stays
 from conformance.packs.table1.scenarios.invalid_goals import InvalidGoal, invalid_goals
 from conformance.packs.table1.scenarios.invalid_velocities import invalid_velocities
+from conformance.packs.table1.scenarios.refused_again import RefusedAgain, refused_again
 from conformance.packs.table1.scenarios.standing import standing
-from conformance.scenarios.rule import Outcome, rule
+from conformance.scenarios.rule import Note, Outcome, rule
+from conformance.transport.exchange import SAFE_METHODS
 from conformance.verdict.case import Case
 
 _VELOCITY: Final = "strict-input/velocity-refused"
@@ -23,6 +29,107 @@ def velocity_refused(trace: tuple[Rest, ...]) -> Iterator[Outcome]:
 def velocity_refused_later(trace: tuple[Standing, ...]) -> Iterator[Outcome]:
     """Judge that the robot stays at rest after all invalid velocities."""
     return stays(trace, _VELOCITY)
+
+
+@rule(_VELOCITY, on=(refused_again,))
+def refused_again_at_rest(trace: RefusedAgain) -> Iterator[Outcome]:
+    """Judge that the robot stays at rest, without a goal, when what it has refused is sent again."""
+    return (rest.case for rest in trace.rests)
+
+
+@rule("strict-input/goal-refused", on=(refused_again,))
+def goal_refused_again(trace: RefusedAgain) -> Iterator[Outcome]:
+    """Judge that the robot keeps its goal when goals and cancels that it has refused are sent again."""
+    yield from goal_refused.judge([one for one in trace.during if _about_goal(one)])
+
+
+@rule("rest-resources/goal-get", on=(refused_again,))
+def goal_kept(trace: RefusedAgain) -> Iterator[Outcome]:
+    """Judge that the robot keeps its goal when anything else that it has refused is sent again."""
+    yield from goal_refused.judge([one for one in trace.during if not _about_goal(one)])
+
+
+def _about_goal(one: InvalidGoal) -> bool:
+    return GOAL_PATH.rstrip("/") in one.exchange.request.url and one.exchange.request.method not in SAFE_METHODS
+
+
+@rule("rest-resources/goal-drives", on=(refused_again,))
+def drives_on(trace: RefusedAgain) -> Iterator[Outcome]:
+    """Judge that the robot drives on to its goal while it refuses requests."""
+    held_up = len(trace.stands) > 1
+    if trace.drives or held_up:
+        exchange = trace.stands[-1] if held_up else trace.during[-1].exchange
+        found = f"a robot that stands still while it refuses requests, {len(trace.stands)} times" if held_up else ""
+        yield Case(not held_up, exchange, "a robot that drives to its goal", found, "held up by refused requests")
+
+
+@rule("rest-resources/goal-preempt", on=(refused_again,))
+def same_pose_other_id(trace: RefusedAgain) -> Iterator[Outcome]:
+    """Judge that the active goal's pose under another id is another goal."""
+    put = trace.renamed
+    if put is not None and not put.ended:
+        problem = "" if put.exchange.response.status in NEW else put.exchange.came
+        expected = "201 or 202 for the active goal's pose under another id, which is then the active goal"
+        yield Case(not (problem or put.differs), put.exchange, expected, problem or put.differs, "same pose")
+
+
+@rule("rest-resources/goal-conflict", on=(refused_again,))
+def conflict(trace: RefusedAgain) -> Iterator[Outcome]:
+    """Judge that another pose or heading under the active goal's id is refused in either format, without effect."""
+    for put in trace.conflicts:
+        problem = "" if put.exchange.response.status == HTTPStatus.CONFLICT else put.exchange.came
+        expected = "409 for another pose under the active goal's id, and the goal as it was"
+        yield Case(not (problem or put.differs), put.exchange, expected, problem or put.differs)
+
+
+@rule("rest-resources/goal-outcome", on=(refused_again,))
+def outcome(trace: RefusedAgain) -> Iterator[Outcome]:
+    """Judge that the 404 after a cancelled goal tells of that goal, and not of the one that it replaced."""
+    if trace.cancelled is not None:
+        read, _, id_ = trace.cancelled
+        fault = outcome_fault(read, CANCELED, id_) if read.response.status == HTTPStatus.NOT_FOUND else read.came
+        yield Case(not fault, read, f"a 404 with last_goal {{goal_id, status}} of the goal {id_!r}, code 5", fault)
+
+
+@rule("http/head", on=(refused_again,))
+def head(trace: RefusedAgain) -> Iterator[Outcome]:
+    """Judge that HEAD of the goal has the status of GET after the goal was cancelled."""
+    if trace.cancelled is not None and trace.cancelled[0].response.status == HTTPStatus.NOT_FOUND:
+        seen = trace.cancelled[1]
+        yield Case(seen.response.status == HTTPStatus.NOT_FOUND, seen, "404, as GET has it after a cancelled goal")
+
+
+@rule("strict-input/delivery-refused", on=(refused_again,))
+def no_delivery(trace: RefusedAgain) -> Iterator[Outcome]:
+    """Judge that no delivery is ordered when what the robot has refused is sent again."""
+    if trace.unseen:
+        yield Note(f"deliveries are not seen: {trace.unseen}")
+    if trace.ordered:
+        last, always = trace.ordered[-1], all(one.unknown for one in trace.ordered)
+        found = f"{len(last.unknown)} messages more, among them {last.unknown[0]}" if always else ""
+        yield Case(not always, last.refused, "no message for requests that are refused", found, "sent again")
+
+
+@rule("equivalence/delivery-rest", on=(refused_again,))
+def rest_orders(trace: RefusedAgain) -> Iterator[Outcome]:
+    """Judge that a delivery over REST directly after a refused request arrives once."""
+    return _once(trace, "PUT")
+
+
+@rule("equivalence/delivery-soap", on=(refused_again,))
+def soap_orders(trace: RefusedAgain) -> Iterator[Outcome]:
+    """Judge that a delivery over SOAP directly after a refused request arrives once."""
+    return _once(trace, "POST")
+
+
+def _once(trace: RefusedAgain, method: str) -> Iterator[Outcome]:
+    for ordered in trace.ordered:
+        arrived = [key_of(delivery, exact=ordered.exact) for delivery in ordered.seen]
+        for delivery, exchange in ordered.orders:
+            if exchange.request.method == method:
+                count = arrived.count(key_of(delivery, exact=ordered.exact))
+                expected = f"exactly one message for {delivery}, directly after a refused request"
+                yield Case(count == 1, exchange, expected, f"{count} messages", "after a refused request")
 
 
 @rule("strict-input/goal-refused", on=(invalid_goals,))
