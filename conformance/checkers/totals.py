@@ -30,6 +30,7 @@ class _Count:
         agrees: whether it was the number of items the first time that a whole list was shown; None: none was.
         is_of_all: whether it was more than the items on a page, so that it is not the number of those.
         by_filter: whether it counts what a filter leaves, by the first list with a filter; None: there was none.
+        all: the number of all items when it agreed last.
         last: what identified the items of the last whole list that it agreed with.
         wrong_since_s: when it was wrong first after that; 0: it was not.
         times: how often it was wrong while nothing changed.
@@ -38,17 +39,19 @@ class _Count:
     agrees: bool | None = None
     is_of_all: bool = False
     by_filter: bool | None = None
+    all: int = 0
     last: frozenset[str] = frozenset()
     wrong_since_s: float = 0.0
     times: int = 0
 
-    def learn(self, total: int, page: Page, *, plain: bool) -> None:
-        """Note what a total means beside a whole list."""
-        shown = len(page.items)
-        if plain and shown and self.agrees is None:
-            self.agrees = total == shown
-        elif not plain and 0 < shown < len(self.last) and self.by_filter is None:
-            self.by_filter = total == shown
+    def learn(self, total: int, least: int, *, plain: bool, sure: bool) -> None:
+        """Note what a total means beside the end of a list; where a server may have cut it, only what agrees counts."""
+        if plain and self.agrees is None and (sure or total == least):
+            self.agrees = total == least
+        if plain and total == least:
+            self.all = total
+        elif not plain and least < self.all and self.by_filter is None and sure:
+            self.by_filter = total == least
 
     def is_sure(self, page: Page, now_s: float, changed_s: float, *, whole: bool) -> bool:
         """Note a wrong total; return whether no change that is under way explains it."""
@@ -84,14 +87,14 @@ class Totals:
         whole = not page.goes_on and (not most or shown < most) and (shown > 0 or offset == 0)
         for name, total in page.totals.items():
             count = self._counts[label, name]
+            least, sure = offset + shown, whole and not self._is_cut(listing, shown, sent)
             count.is_of_all |= total > shown > 0
-            if whole and offset == 0:
-                count.learn(total, page, plain=plain)
+            if whole and shown:
+                count.learn(total, least, plain=plain, sure=sure)
             if not count.agrees or not (plain or count.by_filter):
                 continue
             if name in COUNTS and (total == shown or not (count.is_of_all or total < shown)):
                 continue
-            least, sure = offset + shown, whole and not self._is_cut(listing, shown, sent)
             if (shown and total < least and not _is_cap(total)) or (sure and total != least):
                 if count.is_sure(page, occasion.response.received_s, self._changed_s, whole=whole and offset == 0):
                     expected = (

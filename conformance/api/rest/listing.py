@@ -32,7 +32,7 @@ _REVERSING: Final = frozenset({"reverse", "reversed", "desc", "descending"})
 _WRAPPERS: Final = ("items", "data", "results", "value", "records", "entries", "content", "rows", "list", "embedded")
 _NO_ITEMS: Final = frozenset({"errors", "warnings", "links", "included", "facets", "messages"})
 #: Members and header fields that tell how many items there are; the third group may tell those on the page as well.
-_TOTALS: Final = frozenset(
+TOTALS: Final = frozenset(
     {"total", "totalcount", "totalitems", "totalelements", "totalresults", "totalrecords", "totalsize", "totalrows",
      "totalhits", "odatacount", "hydratotalitems", "numfound", "nbhits", "recordsfiltered"}
 )  # fmt: skip
@@ -243,7 +243,7 @@ def page_of(response: Response) -> Page | None:
         plain: one
         for part in reversed(beside)
         for name, one in part.items()
-        if (plain := plain_name(name)) in _TOTALS | COUNTS and isinstance(one, int) and not isinstance(one, bool)
+        if (plain := plain_name(name)) in TOTALS | COUNTS and isinstance(one, int) and not isinstance(one, bool)
     }
     for name in _HEADERS:
         totals |= {plain_name(name): int(one) for one in [response.header(name) or ""] if one.strip().isdecimal()}

@@ -58,7 +58,7 @@ class Input:
                 if value is not NOTHING:
                     holder[self.steps[-1]] = value
             return request.copy(body=json.dumps(whole).encode())
-        text = value if isinstance(value, str) else json.dumps(value)
+        text = value if isinstance(value, str) else "" if value is NOTHING else json.dumps(value)
         if self.where == "query":
             pairs = [
                 (key, item) for key, item in parse_qsl(request.query, keep_blank_values=True) if key != self.steps[0]

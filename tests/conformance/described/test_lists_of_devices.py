@@ -21,6 +21,7 @@ _VALVE = {
     },
 }
 _WHOLE, _ANY = {"type": "integer", "minimum": 0, "maximum": 100}, {"type": "object"}
+_TOTALS = {"total": {"type": "integer"}, "count": {"type": "integer"}}
 _VALVES = {"type": "array", "items": _VALVE}
 # Names of the parameters of each style, the members around its lists, and how to make them of a part and the total.
 _STYLES = {
@@ -71,7 +72,9 @@ class _Collection:
         given = [(self.style[role], _WHOLE) for role in ("limit", "offset", "page") if role in self.style]
         given += [("state", {"type": "string", "enum": _STATES}), ("sort", {"type": "string", "enum": _SORTED})]
         given += [(self.style["cursor"], {"type": "string"})] if "cursor" in self.style else []
-        shown = {"type": "object", "properties": {self.style["in"]: _VALVES}} if "in" in self.style else _VALVES
+        shown = (
+            {"type": "object", "properties": {self.style["in"]: _VALVES, **_TOTALS}} if "in" in self.style else _VALVES
+        )
         key = {"in": "path", "name": "id", "required": True, "schema": {"type": "integer"}}
         bad, body = {"4XX": REFUSED}, {"required": True, "content": {"application/json": {"schema": _NEW}}}
         return {

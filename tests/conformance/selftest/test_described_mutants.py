@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from urllib.parse import parse_qsl
 
 import pytest
 
@@ -24,10 +25,20 @@ _LAMP = {
     },
 }
 _JSON = {"application/json": {"schema": _LAMP}}
+_LIST = {"type": "object", "properties": {"items": {"type": "array", "items": _LAMP}, "total": {"type": "integer"}}}
+_LISTED = {"200": {"description": "all", "content": {"application/json": {"schema": _LIST}}}}
+_WHOLE, _STATE = {"type": "integer"}, {"type": "string", "enum": ["on", "off"]}
+_NAMES = {"limit": _WHOLE, "offset": _WHOLE, "state": _STATE, "sort": {"type": "string", "enum": ["-id"]}}
 _DESCRIPTION = {
     "openapi": "3.1.0",
     "info": {"title": "Lamps", "version": "1"},
     "paths": {
+        "/lamps": {
+            "get": {
+                "parameters": [{"name": name, "in": "query", "schema": schema} for name, schema in _NAMES.items()],
+                "responses": _LISTED,
+            }
+        },
         "/lamps/{id}": {
             "get": {
                 "parameters": [
@@ -36,7 +47,7 @@ _DESCRIPTION = {
                 ],
                 "responses": {"200": {"description": "it", "content": _JSON}, "404": {"description": "none"}},
             }
-        }
+        },
     },
 }
 _GOOD = {"id": 3, "state": "on", "note": None}
@@ -115,6 +126,41 @@ def test_requests_are_treated_otherwise_than_described(
 def test_a_valid_request_is_left_as_it_is(mutants: dict[str, GeneratedMutant]) -> None:
     """Let a lenient mutant treat valid requests as the device does."""
     assert _sent(mutants["takes-above:lamp:path.id"], "/v1/lamps/3")[1] == 0
+
+
+def _listed(request: Request) -> Response:
+    """Return the lamps 1 to 4 as the parameters of a request say."""
+    asked = dict(parse_qsl(request.query))
+    lamps = [{"id": one, "state": "on" if one % 2 else "off"} for one in range(1, 5)]
+    found = sorted(lamps, key=lambda one: -int(str(one["id"]))) if "sort" in asked else lamps
+    found = [one for one in found if one["state"] == asked.get("state", one["state"])]
+    begin = int(asked.get("offset", 0))
+    body = {"items": found[begin : begin + int(asked.get("limit", 9))], "total": len(found)}
+    return Response(200, [("Content-Type", "application/json")], json.dumps(body).encode())
+
+
+@pytest.mark.parametrize(
+    ("name", "query", "ids", "total"),
+    [
+        ("limit-ignored:GET /lamps:query.limit", "limit=2&state=on", [1, 3], 2),
+        ("limit-ignored:GET /lamps:query.limit", "limit=1&sort=-id", [4, 3, 2, 1], 4),
+        ("page-repeated:GET /lamps:query.offset", "offset=2&limit=2", [1, 2], 4),
+        ("filter-ignored:GET /lamps:query.state", "state=off", [1, 2, 3, 4], 4),
+        ("order-ignored:GET /lamps:query.sort", "sort=-id", [1, 2, 3, 4], 4),
+        ("total-later:GET /lamps:answer", "limit=1", [1], 5),
+    ],
+)
+def test_parameters_and_totals_of_lists_go_wrong(
+    mutants: dict[str, GeneratedMutant], name: str, query: str, ids: list[int], total: int
+) -> None:
+    """Leave a parameter out where that shows; tell a wrong total after many right ones."""
+    tally = Tally()
+    change = mutants[name].make(tally)
+    for _ in range(11):
+        response = change(Request("rest", "GET", f"/v1/lamps?{query}"), _listed)
+    found = json.loads(response.body)
+    assert ([one["id"] for one in found["items"]], found["total"]) == (ids, total)
+    assert bool(tally.altered) == ((ids, total) != ([1, 3], 2))
 
 
 def test_the_page_has_all_tools_in_one_table_and_names_what_only_another_kills(
