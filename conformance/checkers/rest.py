@@ -5,8 +5,11 @@ from typing import Final
 
 from conformance.api.rest.request_context import RequestContext
 from conformance.checkers import conditional, content, declared, fields, problem, refusals
+from conformance.checkers.entity_tags import EntityTags
 from conformance.checkers.lists import Lists
 from conformance.checkers.occasion import Occasion
+from conformance.checkers.resources import Resources
+from conformance.checkers.texts import Texts
 from conformance.contract.pack import Contract
 from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
 from conformance.verdict.case import Case
@@ -31,7 +34,9 @@ class RestCheckers:
     def __init__(self, contract: Contract, base_url: str, elsewhere: Iterable[str] = ()) -> None:
         self._contract, self._base_url = contract, base_url
         self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
-        self._conditional, self._lists = conditional.Conditional(), Lists()
+        # These know what the run has shown so far; the second ones judge described devices alone.
+        described = (Lists(), Resources(), EntityTags(), Texts()) if contract.described else ()
+        self._over_time = (conditional.Conditional(), *described)
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Yield the cases of one exchange; none if it went to another interface."""
@@ -48,8 +53,7 @@ class RestCheckers:
         occasion = Occasion(self._contract, attempt, context)
         for check in _ANY:
             yield from check(occasion)
-        yield from self._conditional(occasion)
-        if self._contract.described:
-            yield from self._lists(occasion)
+        for checker in self._over_time:
+            yield from checker(occasion)
         for check in () if context.is_own_of(attempt.response) else _DOCUMENTS:
             yield from check(occasion)

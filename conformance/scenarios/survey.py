@@ -64,6 +64,8 @@ _SLOW_SHARE: Final = 4
 # Statuses of an operation that is not there.
 _NOT_FOUND: Final = 404
 _NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
+#: Statuses by which a request is refused for what is in it, or for the thing's state.
+REFUSALS: Final = frozenset({400, 404, 405, 409, 411, 412, 413, 415, 422})
 # What differs between two responses to one request: times, and ids of requests.
 _VARYING: Final = re.compile(r"[0-9a-fA-F]*\d[0-9a-fA-F]*")
 # How often one request is sent again and again; and cases of Schemathesis, as many of each kind, of one operation.
@@ -206,8 +208,21 @@ class Surveyor:
         """What was recorded so far."""
         return Survey(tuple(self.probes), elsewhere=self.elsewhere)
 
-    def send(self, operation: Operation, variation: Variation, request: GeneratedRequest | None = None) -> Probe:
+    def send(
+        self,
+        operation: Operation,
+        variation: Variation,
+        request: GeneratedRequest | None = None,
+        *,
+        fresh: bool | None = None,
+    ) -> Probe:
         """Send one request and record it.
+
+        Args:
+            operation: that it is for.
+            variation: what is special about it.
+            request: as it is written; None: by the variation's inputs.
+            fresh: on a connection of its own; None: the usual requests, and one of several others.
 
         Raises:
             PartialTraceError: the device does not respond any more.
@@ -216,7 +231,8 @@ class Surveyor:
         probe, losses = self._described(operation, variation, request), self.api.run.losses
         try:
             # A device may treat the first request on a connection in another way than those after it.
-            fresh = variation.kind is Kind.USUAL or len(self.probes) % _FRESH == 0
+            if fresh is None:
+                fresh = variation.kind is Kind.USUAL or len(self.probes) % _FRESH == 0
             exchange = self._recorded(request, fresh=fresh)
         except (NotPossibleError, TimeIsOverError) as refused:
             raise PartialTraceError(self.trace) from refused
@@ -243,6 +259,8 @@ class Surveyor:
         if exchange.response.ok:
             self.values.learn(operation, exchange)
             self.values.accepted(operation, request)
+        elif exchange.response.status in REFUSALS:
+            self.api.refused.setdefault((exchange.response.status, operation.label), request)
         return self.probes[-1]
 
     def _described(self, operation: Operation, variation: Variation, request: GeneratedRequest) -> Probe:

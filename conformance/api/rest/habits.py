@@ -35,6 +35,8 @@ class Habits:
         operation = context.operation
         if operation is None or context.is_own_of(answer):
             return
+        if exchange.request.method == "GET":
+            api.reads[operation.label] += 1
         if answer.elapsed_ms > _SLOW_MS:
             api.slow.add(operation.label)
         if api.values is not None and not operation.safe:

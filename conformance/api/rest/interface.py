@@ -1,5 +1,6 @@
 """The REST interface of a device in one run."""
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -29,6 +30,8 @@ class RestInterface:
         working: requests that the survey of a described API found to be answered 2xx, by operation.
         first: the usual exchange of each of these operations at the beginning of the run.
         usual_status: status of the survey's last usual request to each operation; 0 without a response.
+        refused: requests that the survey of a described API found to be refused, by status and operation.
+        reads: how often each operation that reads was answered.
         streams: operations whose responses do not end.
         slow: operations that once took more than a second to respond.
         stop_device: stops a device by its motion map, and returns why it may still move, or an empty text; None: it has
@@ -49,6 +52,8 @@ class RestInterface:
     working: dict[str, Any] = field(default_factory=dict)
     first: dict[str, Exchange] = field(default_factory=dict)
     usual_status: dict[str, int] = field(default_factory=dict)
+    refused: dict[tuple[int, str], Any] = field(default_factory=dict)
+    reads: Counter[str] = field(default_factory=Counter)
     streams: set[str] = field(default_factory=set)
     slow: set[str] = field(default_factory=set)
     stop_device: Callable[[], str] | None = None

@@ -15,7 +15,9 @@ from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.documents.patterns import SlowPatternError
 from conformance.documents.value_formats import wrong_formats
 from conformance.rules.told_once import Fault, held_back, told_once, without_numbers
+from conformance.scenarios.neighbours import neighbours
 from conformance.scenarios.other_exchanges import others
+from conformance.scenarios.own_things import own_things
 from conformance.scenarios.rule import NotSeen, Outcome, rule
 from conformance.scenarios.survey import Probe, Survey, generated_requests, survey
 from conformance.transport.exchange import Response
@@ -23,11 +25,13 @@ from conformance.verdict.run import Run
 
 # Such responses have no content (RFC 9110 15.3.5, 15.3.6, 15.4.5).
 _BODILESS = frozenset({204, 205, 304})
-_ON = (survey, generated_requests, others)
+_ON = (survey, generated_requests, neighbours, own_things, others)
 # HTTP lets any server or gateway send these, whatever the operation: conditions, ranges, rates, sizes, upgrades.
 _ANY_TIME = frozenset({100, 101, 206, 304, 401, 407, 408, 411, 412, 413, 414, 416, 417, 421, 425, 426, 429, 431})
 # ... and these, unless the request was the operation's usual one.
 _OF_REQUEST = frozenset({405, 406, 415, 501})
+# ... of which these come from the application, in the media type that it declares for them by their number.
+_OF_APPLICATION = frozenset({412, 415, 428})
 # By these a device says that it does not know what a request refers to.
 _NO_SUCH_THING = frozenset({400, 404, 409, 422})
 # Of these, HTTP knows these only as responses to requests with one of these fields (RFC 9110 13, 14).
@@ -124,7 +128,10 @@ def media_type(trace: Survey, run: Run) -> Iterable[Outcome]:
     judged: dict[int, tuple[dict[str, Schema], Response]] = {}
     for probe, operation, answer in _answered(trace, run):
         content = operation.declared(answer.status)
-        if content and answer.body and answer.status not in CRASHES and _in_question(probe, answer.status):
+        is_in_question = _in_question(probe, answer.status) or (
+            answer.status in _OF_APPLICATION and str(answer.status) in operation.responses
+        )
+        if content and answer.body and answer.status not in CRASHES and is_in_question:
             judged[id(probe)] = content, answer
 
     def fault(probe: Probe) -> Fault | None:

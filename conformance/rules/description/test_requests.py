@@ -116,7 +116,8 @@ def optional(trace: Survey) -> Iterable[Outcome]:
     for label in {one.operation: None for one in trace.probes}:
         least = trace.of(label, Kind.USUAL)
         more = [one for one in trace.of(label, Kind.OPTIONAL) if one.ok]
-        refused = [one for one in least if one.status in _REFUSED and not one.invents]
+        # What is required nowhere may be so together (minProperties, anyOf).
+        refused = [one for one in least if one.status in _REFUSED and not one.invents and one.validity != INVALID]
 
         def fault(
             probe: Probe, refused: list[Probe] = refused, least: list[Probe] = least, more: list[Probe] = more

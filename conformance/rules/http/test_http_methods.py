@@ -37,7 +37,9 @@ def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
     for resource in resources_of(api.run.contract):
         if api.run.contract.described and not any(allowed(api, item) for item in resource.operations.values()):
             continue
-        first = example_call(api, next(iter(resource.operations.values())))
+        # Of a described API, the survey may have found what is there.
+        working = (api.working[item.label] for item in resource.operations.values() if item.label in api.working)
+        first = next(working, None) or example_call(api, next(iter(resource.operations.values())))
         # Only the address is used: a request with a body, or one that moves the robot, is never sent from here.
         call = Call(first.operation, first.values)
         if resource.optional:

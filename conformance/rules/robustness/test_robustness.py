@@ -11,7 +11,9 @@ from conformance.api.rest.statuses import CRASHES
 from conformance.api.rest.variations import Kind
 from conformance.documents.traceback import inside_shown, path_shown
 from conformance.rules.told_once import Fault, told_once
+from conformance.scenarios.neighbours import neighbours
 from conformance.scenarios.other_exchanges import others
+from conformance.scenarios.own_things import own_things
 from conformance.scenarios.rule import NotTested, Outcome, rule
 from conformance.scenarios.survey import TIMED, Probe, Survey, generated_requests, survey
 from conformance.scenarios.timed_again import TimedAgain, timed_again
@@ -19,7 +21,7 @@ from conformance.transport.exchange import Exchange, NoAnswer
 from conformance.verdict.case import Case
 from conformance.verdict.finding import Showing, likeness
 
-_ON = (survey, generated_requests)
+_ON = (survey, generated_requests, neighbours, own_things)
 # A response time has grown when its median is so many times, and so many ms, above that of the first requests.
 _TIMES, _MS, _FEWEST = 3.0, 50.0, 15
 # A body that has become so many times as long takes longer, rightly.

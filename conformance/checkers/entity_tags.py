@@ -1,0 +1,201 @@
+"""What entity tags promise: one name for one content, and conditions that hold (RFC 9110 8.8.1, 13.1)."""
+
+import re
+from collections.abc import Iterator
+from http import HTTPStatus
+from typing import Any, Final, NamedTuple
+
+from conformance.checkers.occasion import Occasion
+from conformance.documents.json_text import read_json, shown
+from conformance.documents.openapi import Operation, is_json
+from conformance.transport.exchange import SAFE_METHODS, Response
+from conformance.verdict.case import Case
+
+_TAG: Final = re.compile(r'(?:W/)?"[^"]*"')
+_GONE: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
+_CONDITIONS: Final = frozenset({"if-match", "if-none-match", "if-modified-since", "if-unmodified-since", "range"})
+_TAGS, _MATCH = "description/entity-tag", "description/if-match"
+# So many tags are remembered, with contents of so many bytes.
+_MOST, _LARGEST = 4000, 65_536
+
+
+class _Condition(NamedTuple):
+    """A request with If-Match that waits for the next read.
+
+    Attributes:
+        occasion: the request.
+        tag: the current one before it.
+        matches: whether it was the one in If-Match.
+        before: the content before it.
+    """
+
+    occasion: Occasion
+    tag: str
+    matches: bool
+    before: Response
+
+
+class EntityTags:
+    """Judges entity tags and conditions; what is current it knows from the last read, if nothing was written since."""
+
+    def __init__(self) -> None:
+        self._named: dict[object, Response] = {}
+        self._now: dict[str, Response] = {}
+        self._wrote: dict[str, Occasion] = {}
+        self._waiting: dict[str, _Condition] = {}
+        # Whether the device has answered 304 and 412, and what is judged once it has.
+        self._has_304 = self._has_412 = False
+        self._ignored: list[Case] = []
+        self._performed: list[Case] = []
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange, and of earlier ones that it decides."""
+        request, answer = occasion.request, occasion.response
+        if request.raw is not None or answer.cut:
+            return
+        asked = {name.lower(): value for name, value in request.headers if name.lower() in _CONDITIONS}
+        if request.method not in SAFE_METHODS:
+            yield from self._write(occasion, asked.get("if-match"))
+        elif request.method == "GET" and "range" not in asked:
+            if "if-none-match" in asked:
+                yield from self._cached(occasion, asked)
+            yield from self._read(occasion)
+
+    def _read(self, occasion: Occasion) -> Iterator[Case]:
+        """Compare a content with the one that had the same tag, and with what was written just before."""
+        url, answer = occasion.request.url, occasion.response
+        waiting, wrote = self._waiting.pop(url, None), self._wrote.pop(url, None)
+        if waiting is not None:
+            yield from _effect(waiting, answer)
+        tag = answer.header("etag") or ""
+        if answer.status != HTTPStatus.OK or not _TAG.fullmatch(tag):
+            return
+        self._now[url] = answer
+        if tag.startswith("W/"):
+            return
+        fields = tuple(pair for pair in occasion.request.headers if pair[0].lower() not in _CONDITIONS)
+        key = (url, tag, answer.media_type, answer.header("content-encoding") or "", fields)
+        if key in self._named:
+            other = _difference(self._named[key], answer)
+            expected = f"another entity tag than {tag} for another content"
+            yield occasion.case(_TAGS, not other, expected, other, cause=f"{_label(occasion.operation)} one tag")
+        elif len(self._named) < _MOST and len(answer.body) < _LARGEST:
+            self._named[key] = answer
+        then = wrote.response.header("etag") if wrote is not None else None
+        if wrote is not None and then and not then.startswith("W/") and wrote.response.body == answer.body:
+            expected, found = f"ETag: {tag}, which a read right after gets with the same content", f"ETag: {then}"
+            yield wrote.case(_TAGS, then == tag, expected, found, cause=f"{_label(wrote.operation)} after")
+
+    def _cached(self, occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
+        """Judge a read by a client that has a copy: if it is current, it gets 304."""
+        answer, label = occasion.response, _label(occasion.operation)
+        tags = {one.removeprefix("W/") for one in _TAG.findall(asked["if-none-match"])}
+        expected = "status 304, because If-None-Match has the current entity tag"
+        if answer.status == HTTPStatus.NOT_MODIFIED:
+            self._has_304 = True
+            yield occasion.case(_TAGS, True, expected)  # noqa: FBT003
+            yield from self._ignored
+            self._ignored.clear()
+        elif answer.status == HTTPStatus.OK and (answer.header("etag") or "").removeprefix("W/") in tags:
+            case = occasion.case(
+                _TAGS, False, expected, f"status 200 with ETag: {answer.header('etag')}", cause=f"{label} 304"  # noqa: FBT003
+            )  # fmt: skip
+            if self._has_304:
+                yield case
+            else:
+                self._ignored.append(case)
+        elif answer.status == HTTPStatus.PRECONDITION_FAILED and "if-match" not in asked:
+            expected = "status 304 or 200 for a GET with If-None-Match"
+            yield occasion.case(_TAGS, False, expected, cause=f"{label} 412")  # noqa: FBT003
+
+    def _write(self, occasion: Occasion, wanted: str | None) -> Iterator[Case]:
+        """Judge a request that acts, by its If-Match and what was current before it."""
+        url, answer = occasion.request.url, occasion.response
+        now, is_refused = self._now.get(url), 400 <= answer.status < 500  # noqa: PLR2004 - RFC 9110 15.5
+        self._wrote.pop(url, None)
+        self._waiting.pop(url, None)
+        if not is_refused:
+            # An action may change anything.
+            self._now.clear()
+            self._wrote.clear()
+            self._waiting.clear()
+            if answer.ok and occasion.request.method in {"PUT", "PATCH"}:
+                self._wrote[url] = occasion
+        if wanted is None or wanted.strip() == "*" or now is None or not _TAG.findall(wanted):
+            return
+        tag = now.header("etag") or ""
+        matches = tag.removeprefix("W/") in {one.removeprefix("W/") for one in _TAG.findall(wanted)}
+        if is_refused:
+            if answer.status == HTTPStatus.PRECONDITION_FAILED and not matches:
+                self._has_412 |= not tag.startswith("W/")
+                yield occasion.case(_MATCH, True, _refusal(tag))  # noqa: FBT003
+                yield from self._performed
+                self._performed.clear()
+            self._waiting[url] = _Condition(occasion, tag, matches, now)
+        elif answer.ok and answer.status != HTTPStatus.ACCEPTED and not matches:
+            label = _label(occasion.operation)
+            case = occasion.case(_MATCH, False, _refusal(tag), cause=f"{label} performed")  # noqa: FBT003
+            # Without the field, 412 may mean the state of the device.
+            if self._has_412 or _declares(occasion.operation, with_status=not tag.startswith("W/")):
+                yield case
+            else:
+                self._performed.append(case)
+
+
+def _effect(waiting: _Condition, after: Response) -> Iterator[Case]:
+    """Judge a refused request by what a read shows after it."""
+    occasion, label = waiting.occasion, _label(waiting.occasion.operation)
+    status = occasion.response.status
+    if waiting.matches:
+        # A weak tag never matches here (RFC 9110 13.1.1).
+        is_sure = after.header("etag") == waiting.tag and not waiting.tag.startswith("W/")
+        if is_sure and status == HTTPStatus.PRECONDITION_FAILED:
+            expected = f"another status than 412, because {waiting.tag} was current before and after"
+            yield occasion.case(_MATCH, False, expected, cause=f"{label} current")  # noqa: FBT003
+        return
+    acted = ""
+    if occasion.request.method == "DELETE":
+        acted = "nothing there any more" if after.status in _GONE else ""
+    elif after.ok:
+        sent, old, new = (read_json(one).value for one in (occasion.request.body, waiting.before.body, after.body))
+        if all(isinstance(one, dict) for one in (sent, old, new)):
+            changed = [name for name, value in sent.items() if name in old and old[name] != value]
+            if changed and all(new.get(name) == sent[name] for name in changed):
+                acted = f"{changed[0]} as it was sent, {shown(sent[changed[0]])}"
+    expected = f"no effect of a request that was refused with status {status}"
+    yield occasion.case(_MATCH, not acted, expected, acted, cause=f"{label} effect")
+
+
+def _refusal(tag: str) -> str:
+    return f"a refusal with 412, because If-Match does not name the current entity tag {tag}"
+
+
+def _declares(operation: Operation | None, *, with_status: bool) -> bool:
+    """Return whether the description has If-Match for an operation, or 412 if that is enough."""
+    if operation is None:
+        return False
+    named = (item.name.lower() for item in operation.parameter("header"))
+    return (with_status and "412" in operation.responses) or "if-match" in named
+
+
+def _difference(one: Response, other: Response) -> str:
+    """Return how two contents differ, as a noun phrase; empty if they say the same."""
+    if one.body == other.body:
+        return ""
+    if not (is_json(one.media_type) and is_json(other.media_type)):
+        return f"{len(one.body)} bytes, and others before" if one.media_type == other.media_type else ""
+    old, new = read_json(one.body).value, read_json(other.body).value
+    if old == new:
+        return ""
+    if isinstance(old, dict) and isinstance(new, dict):
+        name = next(name for name in (*old, *new) if old.get(name, old) != new.get(name, new))
+        return f"{name} {_said(new, name)}, and {_said(old, name)} before"
+    return "another content than before"
+
+
+def _said(value: dict[str, Any], name: str) -> str:
+    return shown(value[name]) if name in value else "missing"
+
+
+def _label(operation: Operation | None) -> str:
+    return operation.label if operation else ""

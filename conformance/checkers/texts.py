@@ -1,0 +1,84 @@
+"""Texts beyond ASCII that were written: a read after the write shows them, and not what another encoding makes."""
+
+import re
+import unicodedata
+from collections.abc import Iterator
+from http import HTTPStatus
+from typing import Any, Final, NamedTuple
+from urllib.parse import urlsplit
+
+from conformance.checkers.occasion import Occasion
+from conformance.documents.json_text import read_json, shown
+from conformance.documents.openapi import is_json
+from conformance.transport.exchange import SAFE_METHODS, Request
+from conformance.transport.reach import joined
+from conformance.verdict.case import Case
+
+# So many URLs are remembered.
+_MOST: Final = 1000
+_SPACE: Final = re.compile(r"\s+")
+
+
+class _Write(NamedTuple):
+    """A write whose texts a read has to show: the request, its texts beyond ASCII, and what was there before."""
+
+    request: Request
+    texts: dict[str, str]
+    before: dict[str, Any]
+
+
+class Texts:
+    """Judges the first read after a write. What still shows the old text is not judged: a device may store it later."""
+
+    def __init__(self) -> None:
+        self._shown: dict[str, dict[str, Any]] = {}
+        self._written: dict[str, _Write] = {}
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        request, answer = occasion.request, occasion.response
+        url = request.url
+        if request.raw is not None or not answer.ok:
+            return
+        if request.method == "GET" and answer.status == HTTPStatus.OK:
+            value = _members(answer.body, answer.media_type)
+            write = self._written.pop(url, None)
+            if write is not None and len(self._shown) < _MOST:
+                yield from self._read(occasion, write, value)
+            self._shown[url] = value
+        elif request.method not in SAFE_METHODS:
+            sent = _members(request.body, request.media_type)
+            texts = {name: one for name, one in sent.items() if isinstance(one, str) and not one.isascii()}
+            at = url
+            if request.method == "POST":
+                location = answer.header("location")
+                at = joined(url, location) if location and answer.status == HTTPStatus.CREATED else ""
+            self._written.clear()
+            if texts and at and answer.status != HTTPStatus.ACCEPTED:
+                self._written[at] = _Write(request, texts, self._shown.get(at, {}))
+
+    def _read(self, occasion: Occasion, write: _Write, value: dict[str, Any]) -> Iterator[Case]:
+        for name, text in write.texts.items():
+            seen = value.get(name)
+            if not isinstance(seen, str) or seen == write.before.get(name):
+                continue
+            expected = f"{name} {shown(text)}, as {write.request.method} {urlsplit(write.request.url).path} wrote it"
+            label = occasion.operation.label if occasion.operation else ""
+            same = _plain(seen) in {_plain(text), _ascii(text)}
+            cause = f"{label} {name} text"
+            yield occasion.case("description/written-is-read", same, expected, f"{name} {shown(seen)}", cause=cause)
+
+
+def _members(body: bytes, media_type: str) -> dict[str, Any]:
+    value = read_json(body).value if body and is_json(media_type) else None
+    return value if isinstance(value, dict) else {}
+
+
+def _plain(text: str) -> str:
+    """Return a text as it is compared: in one normal form, without regard to case and white space."""
+    return _SPACE.sub(" ", unicodedata.normalize("NFKC", text)).strip().casefold()
+
+
+def _ascii(text: str) -> str:
+    """Return what is left of a text where a device takes letters of ASCII alone."""
+    return _plain(unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode())

@@ -1,0 +1,111 @@
+"""Reads in company: directly after refusals, with HEAD between two GETs, with queries, and with conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import cycle, islice
+from typing import Final
+
+from conformance.api.rest.applicable import allowed
+from conformance.api.rest.generated_request import GeneratedRequest
+from conformance.api.rest.inputs import Inputs, usual_inputs, written
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.values import Values
+from conformance.api.rest.variations import Kind, Variation, valid_variations
+from conformance.documents.openapi import Operation, operations_of
+from conformance.scenarios.scenario import scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.scenarios.survey import REFUSALS, Survey, Surveyor
+
+#: No content has this entity tag.
+NO_TAG: Final = '"roaas-nothing-has-this-tag"'
+# As many values of an id are tried; and as many queries of one operation, and of all at quick.
+_TRIED, _QUERIES, _AT_QUICK = 3, 3, 8
+# Each operation is read so often in a run, so that a fault in one of twenty responses is met.
+_READS: Final = 20
+# Operations are read more often where the device usually responds in so many ms.
+_QUICK_MS: Final = 50.0
+_FEW_READS: Final = 2
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.ACTING)
+def neighbours(api: RestInterface, values: Values) -> Survey:
+    """Read each operation directly after refused requests, by HEAD between two GETs, and again and again."""
+    slow = api.streams | api.slow
+    reads = [
+        item
+        for item in operations_of(api.run.contract)
+        if item.method == "GET" and allowed(api, item) and item.label not in slow
+    ]
+    surveyor = Surveyor(api, values)
+    refusals = cycle(_refusals(api) or [None])
+    queries = _AT_QUICK if api.run.effort.name == "quick" else len(reads) * _QUERIES
+    for read in api.run.effort.subsample(reads, _FEW_READS):
+        usual = _after(surveyor, read, usual_inputs(read, values)[:_TRIED], refusals)
+        if usual is None:
+            continue
+        _head(surveyor, read, usual)
+        _cached(surveyor, read, usual)
+        _after(surveyor, read, [usual], refusals)
+        for inputs in islice(_queries(read, usual, values), min(queries, _QUERIES)):
+            queries -= 1
+            if surveyor.send(read, Variation(Kind.AGAIN, "", "", inputs)).ok:
+                _head(surveyor, read, inputs)
+                surveyor.send(read, Variation(Kind.AGAIN, "", "", inputs))
+        if not (read.parameters or api.run.effort.slow) and api.run.effort.usual_ms < _QUICK_MS:
+            for turn in range(api.reads[read.label], _READS):
+                surveyor.send(read, Variation(Kind.AGAIN, "", "", usual), fresh=turn % 2 == 0)
+    return surveyor.trace
+
+
+def _refusals(api: RestInterface) -> list[tuple[Operation, GeneratedRequest]]:
+    """Return requests that the device has refused: one of each status first, those with content before others."""
+    by_label = {item.label: item for item in operations_of(api.run.contract)}
+    by_status: dict[int, list[tuple[Operation, GeneratedRequest]]] = {}
+    for (status, label), request in sorted(api.refused.items(), key=lambda one: not one[1].body):
+        if label in by_label and status in REFUSALS:
+            by_status.setdefault(status, []).append((by_label[label], request))
+    most = max(map(len, by_status.values()), default=0)
+    return [found[turn] for turn in range(most) for found in by_status.values() if turn < len(found)]
+
+
+def _after(
+    surveyor: Surveyor,
+    read: Operation,
+    tried: list[Inputs],
+    refusals: Iterator[tuple[Operation, GeneratedRequest] | None],
+) -> Inputs | None:
+    """Send a refused request, and read on the same connection; return what was read with, if that was answered 2xx."""
+    for inputs in tried:
+        refused = next(refusals)
+        if refused is not None:
+            surveyor.send(refused[0], Variation(Kind.ODD, "", "", Inputs()), refused[1], fresh=False)
+        if surveyor.send(read, Variation(Kind.AGAIN, "", "", inputs), fresh=False).ok:
+            return inputs
+    return None
+
+
+def _cached(surveyor: Surveyor, read: Operation, inputs: Inputs) -> None:
+    """Where the last read had an entity tag, read by conditions of clients that have that copy, or another one."""
+    last = surveyor.probes[-2].exchange
+    tag = (last.response.header("etag") or "") if last is not None else ""
+    request = written(read, inputs)
+    for tags in (tag, f"{NO_TAG}, {tag}", f"W/{tag.removeprefix('W/')}", NO_TAG) if tag else ():
+        conditional = replace(request, headers=(*request.headers, ("If-None-Match", tags)))
+        surveyor.send(read, Variation(Kind.ODD, "", "", inputs), conditional, fresh=False)
+
+
+def _head(surveyor: Surveyor, read: Operation, inputs: Inputs) -> None:
+    """Send HEAD in place of a GET."""
+    request = replace(written(read, inputs), method="HEAD")
+    surveyor.send(read, Variation(Kind.ODD, "", "", inputs), request, fresh=False)
+
+
+def _queries(read: Operation, usual: Inputs, values: Values) -> Iterator[Inputs]:
+    """Yield the usual request with one parameter more in its query, each once."""
+    seen: set[str] = set()
+    for one in valid_variations(read, usual, values):
+        if one.place.startswith("query ") and one.place not in seen:
+            seen.add(one.place)
+            yield one.inputs

@@ -1,0 +1,208 @@
+"""Conditions, single members and undeclared methods, at what the run has created or may write."""
+
+from __future__ import annotations
+
+import re
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any, Final
+from urllib.parse import quote, urlsplit
+
+from conformance.api.rest.applicable import allowed
+from conformance.api.rest.generated_request import GeneratedRequest
+from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.references import is_free_text
+from conformance.api.rest.samples import fits
+from conformance.api.rest.things import another, collection_of, identified
+from conformance.api.rest.values import Values
+from conformance.api.rest.variations import Kind, Variation
+from conformance.documents.json_schema import Schema
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation, is_json, operations_of
+from conformance.documents.representation import flat
+from conformance.documents.resources import resources_of
+from conformance.scenarios.neighbours import NO_TAG
+from conformance.scenarios.scenario import scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.scenarios.survey import Probe, Survey, Surveyor
+from conformance.scenarios.writing import Writer, members
+from conformance.transport.exchange import NoAnswerError, NotPermittedError
+from conformance.transport.reach import is_same, joined, path_of
+
+_STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
+# With an umlaut, a combining mark and a character beyond the Basic Multilingual Plane.
+_TEXT: Final = "Zo\u00eb e\u0301 \U0001f916"
+# So many members of a resource are written one by one.
+_MEMBERS: Final = 6
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
+def own_things(api: RestInterface, values: Values) -> Survey:
+    """Create a thing of each collection; write to it by right and wrong conditions, and ask by undeclared methods."""
+    operations = {
+        (item.method, item.template.rstrip("/")): item for item in operations_of(api.run.contract) if allowed(api, item)
+    }
+    surveyor = Surveyor(api, values)
+    for (method, path), read in operations.items():
+        if method != "GET" or read.label in api.streams:
+            continue
+        api.run.limit.check()
+        changes = [operations[name, path] for name in ("PATCH", "PUT") if (name, path) in operations]
+        create, delete = operations.get(("POST", collection_of(path))), operations.get(("DELETE", path))
+        with api.run.limit.lifted(), suppress(NoAnswerError):
+            if not read.parameter("path"):
+                if changes:
+                    _Thing(surveyor, read, path_of_usual(read, values)).written(changes)
+            elif create is not None and collection_of(path):
+                thing = _created(surveyor, create, read)
+                if thing is not None:
+                    thing.asked()
+                    thing.written(changes)
+                    thing.deleted(delete)
+    return surveyor.trace
+
+
+def path_of_usual(read: Operation, values: Values) -> str:
+    """Return the target of an operation's usual request."""
+    return written(read, usual_inputs(read, values)[0]).target
+
+
+def _created(surveyor: Surveyor, create: Operation, read: Operation) -> _Thing | None:
+    """Create a thing; return it if the response says where it is."""
+    made: Probe | None = None
+    usual = usual_inputs(create, surveyor.values)[:2]
+    body = _with_texts(create, usual[0].body)
+    for inputs in (*([replace(usual[0], body=body)] if body else []), *usual):
+        made = surveyor.send(create, Variation(Kind.AGAIN, "", "", inputs))
+        if made.ok:
+            break
+    if made is None or made.exchange is None or made.status != 201:  # noqa: PLR2004 - RFC 9110 15.3.2
+        return None
+    sent, answer = made.exchange.request.url, made.exchange.response
+    location, target = answer.header("location"), ""
+    if location and is_same(joined(sent, location), sent):
+        target = path_of(joined(sent, location)).removeprefix(surveyor.api.client.prefix)
+    elif id_ := identified(read_json(answer.body).value, read)[1]:
+        base = urlsplit(sent).path.removeprefix(surveyor.api.client.prefix).rstrip("/")
+        target = f"{base}/{quote(str(id_), safe='')}{'/' if read.template.endswith('/') else ''}"
+    pattern = re.sub(r"\\{[^{}]*\\}", "[^/]+", re.escape(read.template))
+    return _Thing(surveyor, read, target) if re.fullmatch(pattern, target) else None
+
+
+@dataclass
+class _Thing:
+    """A thing that the run has created, or a resource that it may write."""
+
+    surveyor: Surveyor
+    read: Operation
+    target: str
+    tag: str = ""
+
+    @property
+    def api(self) -> RestInterface:
+        """The interface that it is at."""
+        return self.surveyor.api
+
+    def get(self, *fields: tuple[str, str], place: str = "") -> Probe:
+        """Read it, and note its entity tag."""
+        probe = self._send(self.read, None, *fields, place=place)
+        if probe.ok and probe.exchange is not None:
+            self.tag = probe.exchange.response.header("etag") or ""
+        return probe
+
+    def _send(self, operation: Operation, body: Any, *fields: tuple[str, str], place: str = "") -> Probe:
+        inputs = usual_inputs(operation, self.surveyor.values)[0]
+        inputs = inputs if body is None else replace(inputs, body=body)
+        request = written(operation, inputs)
+        given = {name.lower() for name, _ in fields}
+        headers = (*(one for one in request.headers if one[0].lower() not in given), *fields)
+        kind = Kind.ODD if given or place else Kind.AGAIN
+        request = replace(request, target=self.target, headers=headers)
+        return self.surveyor.send(operation, Variation(kind, "", place, inputs), request)
+
+    def asked(self) -> None:
+        """Send to it, and to what is below it, methods that the description does not have."""
+        if not self.get().ok:
+            return
+        template = self.read.template.rstrip("/")
+        for resource in resources_of(self.api.run.contract):
+            below = resource.template.removeprefix(template)
+            if not resource.template.startswith(template) or "{" in below:
+                continue
+            for method in ("OPTIONS", *(one for one in _STANDARD if one not in resource.methods)):
+                with suppress(NotPermittedError):
+                    GeneratedRequest(method, self.target.rstrip("/") + below, "", b"").send(self.api)
+        self.get()
+
+    def written(self, changes: list[Operation]) -> None:
+        """Write to it by wrong conditions and by right ones, one member at a time."""
+        first = self.get()
+        if not first.ok or first.exchange is None:
+            return
+        for change in changes:
+            bodies = self._bodies(change, members(first.exchange, ()))
+            for body in bodies[:1] if self.tag else ():
+                self._send(change, body, ("If-Match", NO_TAG))
+                self.get()
+            alone = bodies if self.tag and change is changes[0] else bodies[-1:]
+            for body in alone if self.tag else [one for one in bodies if _is_beyond_ascii(one)][:1] + alone:
+                if self._send(change, body, *self._current()).ok:
+                    self.get()
+
+    def _current(self) -> tuple[tuple[str, str], ...]:
+        """Return If-Match with its entity tag; a weak one matches none (RFC 9110 13.1.1)."""
+        return (("If-Match", self.tag),) if self.tag and not self.tag.startswith("W/") else ()
+
+    def deleted(self, delete: Operation | None) -> None:
+        """Delete it by a wrong condition, and then by a right one."""
+        if delete is None:
+            return
+        if self.tag:
+            self._send(delete, None, ("If-Match", NO_TAG))
+            if not self.get().ok:
+                return
+        self._send(delete, None, *self._current())
+        self.get(place="path of what was deleted")
+
+    def _bodies(self, change: Operation, now: dict[str, Any]) -> list[Any]:
+        """Return bodies that change one member each, and one at the end that restores them."""
+        writer = Writer(self.api, self.surveyor.values)
+        made = writer.bodies(change, 1, now)
+        media_type = next(iter(change.bodies), "")
+        if len(made) < 2 or not is_json(media_type):  # noqa: PLR2004 - see bodies()
+            return []
+        schema, base = change.bodies[media_type].schema, made[1]
+        whole = {**base, **{name: now[name] for name in made[0] if name in now and name in base}}
+        values = another(schema, whole, 1, self.surveyor.values.collections)
+        chosen = {name: value for name, value in values.items() if value != whole.get(name)}
+        chosen |= {name: one for name, one in _texts(schema, values).items() if name in chosen}
+        found = []
+        for name, value in chosen.items():
+            body = {name: value} if change.method == "PATCH" else {**whole, name: value}
+            found += [body] if fits(schema, body) else []
+        return [*found[:_MEMBERS], *([whole] if found and fits(schema, whole) else [])]
+
+
+def _with_texts(create: Operation, body: Any) -> Any:
+    """Return a JSON object with texts beyond ASCII in the place of its texts; None where that is none."""
+    media_type = next(iter(create.bodies), "")
+    if not is_json(media_type) or not isinstance(body, dict):
+        return None
+    schema = create.bodies[media_type].schema
+    changed = {**body, **_texts(schema, body)}
+    return changed if changed != body and fits(schema, changed) else None
+
+
+def _texts(schema: Schema, value: dict[str, Any]) -> dict[str, str]:
+    """Return a text beyond ASCII for each free text of an object."""
+    parts = flat(schema).get("properties", {})
+    return {
+        name: _TEXT
+        for name, one in value.items()
+        if isinstance(one, str) and name in parts and is_free_text(parts[name]) and fits(parts[name], _TEXT)
+    }
+
+
+def _is_beyond_ascii(body: dict[str, Any]) -> bool:
+    return any(isinstance(one, str) and not one.isascii() for one in body.values())
