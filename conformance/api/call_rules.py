@@ -13,8 +13,8 @@ from conformance.documents.openapi import Operation
 from conformance.statement.motion_map import shape_of
 from conformance.verdict.finding import counted
 
-# Words in a path or operationId that say that a call may do harm, whatever its method.
-_HARMFUL: Final = frozenset(
+#: Words in a path or operationId that say that a call may do harm, whatever its method.
+HARMFUL: Final = frozenset(
     {
         "shutdown", "poweroff", "reboot", "restart", "delete", "erase", "wipe", "purge", "destroy", "format", "install",
         "uninstall", "firmware", "flash", "factory", "reset", "upgrade", "downgrade", "update", "upload", "shell",
@@ -22,7 +22,7 @@ _HARMFUL: Final = frozenset(
         "login", "logout", "token", "password", "secret", "credentials",
     }
 )  # fmt: skip
-_SEVERAL: Final = frozenset(f"{word}s" for word in _HARMFUL - {"format"})
+_SEVERAL: Final = frozenset(f"{word}s" for word in HARMFUL - {"format"})
 # The id of an operation often says what its method does.
 _OF_METHODS: Final = {method: frozenset(words) for method, words in {
     "DELETE": ("delete", "deletes"), "PUT": ("update", "updates"), "PATCH": ("update", "updates")
@@ -106,7 +106,7 @@ def harmful_words(operation: Operation) -> list[str]:
     # Tags name a group: of what only reads in it, nothing is to be feared.
     text += "" if operation.safe else f" {' '.join(operation.tags)}"
     words = words_of(text) - _OF_METHODS.get(operation.method, frozenset())
-    return sorted(words & (_HARMFUL | _SEVERAL))
+    return sorted(words & (HARMFUL | _SEVERAL))
 
 
 def words_of(text: str) -> set[str]:

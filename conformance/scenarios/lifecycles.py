@@ -1,10 +1,12 @@
-"""The life of things that an API creates: create one, read it, change it, delete it, read it again."""
+"""The life of things that an API creates: create some, read, change and delete them, and look at the others."""
 
 from __future__ import annotations
 
 import re
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from http import HTTPStatus
 from typing import Any, Final
 from urllib.parse import quote, unquote, urlsplit
@@ -16,51 +18,34 @@ from conformance.api.rest.samples import fits
 from conformance.api.rest.statuses import HELD, held_text
 from conformance.api.rest.things import collection_of, identified
 from conformance.api.rest.values import Values
-from conformance.documents.json_text import read_json
+from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, operations_of
+from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
+from conformance.scenarios.living import ABSENT, Kind, Life, Living, Look, State, Thing
+from conformance.scenarios.refusing import is_refused, refuse_changes, refuse_creation, refuse_deletion
 from conformance.scenarios.scenario import NotPossibleError, NotSeenError, scenario
+from conformance.scenarios.singletons import singletons
 from conformance.scenarios.stage import Leaves, Need, Stage
-from conformance.scenarios.writing import Write, Writer
+from conformance.scenarios.writing import Write, Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.transport.reach import is_same, joined, path_of
 
 # So many things of a collection are created: where nothing deletes them, at quick, and at the other efforts.
 _KEPT, _FEW, _MANY = 2, 3, 20
-_ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
+# As many times an exploration's time the looks at one collection take.
+_BUDGETS: Final = 3
+# So many operations of things are called.
+_ACTIONS: Final = 3
+# A thing is left alone for at most so long, s.
+_ALONE_S: Final = 6.0
+# The turns of changes, of refused requests, and of an identifier that is never created, so that their values differ.
+_CHANGED, _REFUSED, _NEVER = 30, 60, 99
 # Identifiers that a client may choose for what it creates.
 _CHOSEN: Final = ("roaas-{}", "roaas{}", "3fa85f64-5717-4562-b3fc-2c963f66af{:02}")
 _CHOSEN_NUMBER: Final = 987_001
-
-
-@dataclass(frozen=True)
-class Life:
-    """One thing that was created.
-
-    Attributes:
-        create, read, delete: labels of the operations; an empty one was not sent.
-        created: the request that created it.
-        found: the GET after it.
-        deleted: the DELETE, or None.
-        gone: the GET after that, or None.
-        id: what identifies it by the response that created it; empty if that does not say it.
-        found_id: what identifies it by the GET; empty if that does not say it.
-        listing: the list of the collection after the DELETE, or None.
-        is_listed: whether it is in that list.
-        writes: what was written to it, the creation first.
-    """
-
-    create: str
-    read: str
-    created: Exchange
-    found: Exchange
-    delete: str = ""
-    deleted: Exchange | None = None
-    gone: Exchange | None = None
-    id: str = ""
-    found_id: str = ""
-    listing: Exchange | None = None
-    is_listed: bool = False
-    writes: tuple[Write, ...] = ()
+# Members that say when something was changed.
+_TIMES: Final = re.compile(r"(?:created|updated|modified|changed|timestamp|time|at|on|version|revision|etag)$")
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.INPUT)
@@ -75,15 +60,32 @@ def lifecycles(api: RestInterface, values: Values) -> tuple[Life, ...]:
         create = operations.get(("POST", collection)) or operations.get(("PUT", path))
         if method == "GET" and collection and create is not None:
             api.run.limit.check()
-            cycle = _Cycle(Writer(api, values), create, read, operations, held)
             # What was created is deleted.
             with api.run.limit.lifted():
-                lives += cycle.run()
+                lives += _seen_twice(partial(_Cycle, Writer(api, values), create, read, operations, held))
+    lives += singletons(Writer(api, values), operations)
     if held and not lives:
         raise NotSeenError(held_text(held, set(held.values())))
     if not lives:
         raise NotPossibleError("no POST or PUT that may be called creates a thing that a GET reads")
     return tuple(lives)
+
+
+def _seen_twice(cycle: Callable[[int], _Cycle]) -> list[Life]:
+    """Return the lives of a cycle, with what it found wrong if the second one finds such a thing as well.
+
+    Another client may have changed or deleted something once. Things that change or end without any request are told by
+    one that is left alone for as long.
+    """
+    lives = cycle(0).run()
+    wrong = [look for life in lives for look in life.looks if look.other and look.kind is not Kind.CRASH]
+    if not wrong:
+        return lives
+    kinds = {Kind.CRASH}
+    if not cycle(1).changes_alone(min(_ALONE_S, max(look.after_s for look in wrong))):
+        kinds |= {look.kind for life in cycle(2).run() for look in life.looks if look.other}
+    kept = [tuple(look for look in life.looks if not look.other or look.kind in kinds) for life in lives]
+    return [replace(life, looks=looks) for life, looks in zip(lives, kept, strict=True)]
 
 
 @dataclass
@@ -95,45 +97,167 @@ class _Cycle:
     read: Operation
     operations: dict[tuple[str, str], Operation]
     held: dict[str, int]
-    things: list[tuple[str, Life]] = field(default_factory=list)
-    # Paths of things that were there before, which are neither changed nor deleted.
-    others: set[str] = field(default_factory=set)
+    round: int
+    living: Living = field(init=False)
+
+    def __post_init__(self) -> None:
+        lister = self.operations.get(("GET", collection_of(self.read.template)))
+        until = time.monotonic() + _BUDGETS * self.writer.api.run.effort.budget_s
+        self.living = Living(self.writer, self.read, lister, until)
+        self.item = self.read.template.rstrip("/")
+        changes = (self.operations.get((name, self.item)) for name in ("PUT", "PATCH"))
+        self._changes = [one for one in changes if one is not None]
 
     def run(self) -> list[Life]:
         """Return what became of the things."""
-        effort, path = self.writer.api.run.effort, self.read.template.rstrip("/")
-        delete = self.operations.get(("DELETE", path))
-        changes = [one for one in (self.operations.get((name, path)) for name in ("PUT", "PATCH")) if one]
+        effort, things = self.writer.api.run.effort, self.living.things
+        delete = self.operations.get(("DELETE", self.item))
         count = _KEPT if delete is None else _FEW if effort.name == "quick" or effort.slow else _MANY
-        until = time.monotonic() + effort.budget_s
         try:
-            for turn in range(count):
-                if time.monotonic() > until or not self._create(turn):
-                    break
-            for turn, (path, life) in enumerate(self.things):
-                if path in self.others:
-                    continue
-                done = [self.writer.change(one, self.read, path, turn + 1) for one in changes if life.found.response.ok]
-                self.things[turn] = path, replace(life, writes=(*life.writes, *(one for one in done if one)))
-            for turn, (path, life) in enumerate(self.things):
-                if delete is not None and path not in self.others:
-                    self.things[turn] = path, self._deleted(life, delete, path)
+            self._create_all(count)
+            self._change_all()
+            self._act()
+            if delete is not None:
+                self._delete_all(delete)
         except NoAnswerError:
             pass  # the survey tells what breaks a connection
-        return [life for _, life in self.things]
+        collection = f"{self.create.method} {collection_of(self.item)}"
+        crashed = (Look(Kind.CRASH, collection, one, "a status below 500", one.came) for one in self.writer.crashed)
+        looks = (*self.living.looks, *crashed)
+        self.writer.crashed.clear()
+        return [replace(one.life, looks=looks if one is things[0] else ()) for one in things]
+
+    def changes_alone(self, seconds: float) -> bool:
+        """Return whether a thing that was created changes, or is gone, after a time without any request."""
+        things, delete = self.living.things, self.operations.get(("DELETE", self.item))
+        try:
+            self._create(_FEW * self.round)
+            time.sleep(seconds)
+            found = [self.living.other(one, self.writer.send(self.read, one.path)) for one in things]
+            if delete is not None:
+                for one in things:
+                    self._deleted(one, delete)
+        except NoAnswerError:
+            return True
+        return any(found)
+
+    def _create_all(self, count: int) -> None:
+        """Create things; after each, the others are read. The last one but few comes after a change and a refusal."""
+        until = time.monotonic() + self.writer.api.run.effort.budget_s
+        for turn in range(count):
+            if turn == max(1, min(2, count - 1)):
+                self._change(self.living.things[0], 0)
+                if self.create.method == "POST" and not self.living.is_over:
+                    refuse_creation(self.living, self.create, _REFUSED + 2 * self.round)
+            if time.monotonic() > until or not self._create(count * self.round + turn):
+                break
+            thing = self.living.things[-1]
+            self.living.look(thing.life.created, self.create.label, thing)
+
+    def _change_all(self) -> None:
+        """Refuse changes of one thing, and then change the others."""
+        for turn, thing in enumerate(self.living.of(State.ALIVE)):
+            if turn == 0:
+                for change in self._changes if not self.living.is_over else ():
+                    refuse_changes(self.living, change, thing, _REFUSED + 1 + 2 * self.round)
+            else:
+                self._change(thing, turn)
+
+    def _change(self, thing: Thing, turn: int) -> None:
+        """Change a thing by each operation that does, and read the others."""
+        done = list[Write]()
+        for change in self._changes if thing.state is State.ALIVE and thing.is_own else ():
+            write = self.writer.change(change, self.read, thing.path, _CHANGED + turn)
+            if write is not None:
+                done.append(write)
+                self.living.remember(thing, write, change)
+        thing.life = replace(thing.life, writes=(*thing.life.writes, *done))
+        if done:
+            self.living.look(done[-1].sent, done[-1].operation, thing)
+
+    def _act(self) -> None:
+        """Call the operations below a thing that answer with it, and read whether it is as they say."""
+        acting = [
+            one
+            for (method, path), one in self.operations.items()
+            if method == "POST" and path.startswith(f"{self.item}/")
+        ]
+        usable = [one for one in acting if one.template.count("{") == self.item.count("{")]
+        for action in usable[:_ACTIONS]:
+            thing = next(reversed(self.living.of(State.ALIVE)), None)
+            if thing is not None and not self.living.is_over:
+                self._act_on(action, thing)
+
+    def _act_on(self, action: Operation, thing: Thing) -> None:
+        """Call an operation of a thing, and read the thing until it shows what the response says has changed."""
+        living, before, said = self.living, self.writer.send(self.read, thing.path), dict[str, Any]()
+        sent = self.writer.send(action, thing.path.rstrip("/") + action.template[len(self.item) :])
+        if is_refused(sent):
+            living.check(thing, sent, action.label, Kind.REFUSED)
+        elif sent.response.ok and before.response.ok:
+            was = members(before, ())
+            said = _news(was, members(sent, was)) if _is_alike(action, self.read) else {}
+
+            def unseen(found: Exchange) -> list[str]:
+                now = members(found, said) if found.response.ok else {}
+                return [f"{shown(was[name])} as {name}, as before it" for name in said if now.get(name) == was[name]]
+
+            found = self.writer.settled(lambda: self.writer.send(self.read, thing.path), unseen)
+            told = ", ".join(f"{shown(one)} as {name}" for name, one in said.items()) or "the thing"
+            expected = f"{told}, as {action.label} with status {sent.response.status} said"
+            living.note(Kind.KEPT, action.label, found.exchange, expected, "; ".join(found.wrong), thing)
+            # An action may change what was written, and end the thing.
+            wrong = living.other(thing, found.exchange)
+            thing.state = thing.state if found.exchange.response.ok else State.UNKNOWN
+            thing.kept = {} if wrong else thing.kept
+        living.look(sent, action.label, thing, said)
+
+    def _delete_all(self, delete: Operation) -> None:
+        """Delete each thing; after each, the others and the deleted ones are read."""
+        living = self.living
+        alive = living.of(State.ALIVE)
+        if alive and not living.is_over:
+            refuse_deletion(living, delete, alive[-1], self._absent(alive[-1].path))
+        for number, thing in enumerate(living.things):
+            if not thing.is_own:
+                continue
+            deleted = self._deleted(thing, delete)
+            if number == 0 and thing.state is State.GONE and not living.is_over:
+                self.writer.send(delete, thing.path)
+                if self.create.method == "PUT":
+                    self._create_again(thing, delete)
+            living.look(deleted, delete.label, thing)
+
+    def _create_again(self, thing: Thing, delete: Operation) -> None:
+        """Create what was deleted once more, by the same request."""
+        first = thing.life.created
+        sent = self.writer.send(self.create, thing.path, read_json(first.request.body).value)
+        if sent.response.ok:
+            is_same = first.response.status != HTTPStatus.CREATED or sent.response.status == HTTPStatus.CREATED
+            expected = f"status 201 for what was created by {self.create.label} and deleted before"
+            self.living.note(Kind.THERE, self.create.label, sent, expected, "" if is_same else sent.came, thing)
+            there = self.writer.until(
+                lambda: self.writer.send(self.read, thing.path), lambda one: one.response.status not in ABSENT
+            )
+            other = there.came if there.response.status in ABSENT else ""
+            self.living.note(Kind.THERE, self.create.label, there, "the thing that was created again", other, thing)
+            write = self.writer.read_back(self.create, self.read, thing.path, sent)
+            thing.life = replace(thing.life, writes=(*thing.life.writes, write))
+            self.writer.send(delete, thing.path)
 
     def _create(self, turn: int) -> bool:
         """Create one thing and read it; return whether another one may be tried."""
         path, before = "", self._ids()
+        things = self.living.things
         if self.create.method == "PUT":
             path = self._chosen(turn)
-            if not path or self.writer.send(self.read, path).response.status not in _ABSENT:
+            if not path or self.writer.send(self.read, path).response.status not in ABSENT:
                 return False
-        usual = [None] if turn == 0 and self.create.method == "POST" else []
+        usual = [None] if not things and self.create.method == "POST" else []
         for body in [*usual, *self.writer.bodies(self.create, turn)]:
             created = self.writer.send(self.create, path, body)
             status = created.response.status
-            if status in HELD and not self.things:
+            if status in HELD and not things:
                 self.held[self.create.label] = status
             if created.response.ok or status == HTTPStatus.SEE_OTHER:
                 break
@@ -147,58 +271,58 @@ class _Cycle:
         id_ = str(identified(read_json(created.response.body).value, self.read)[1] or "")
         is_new = status in {HTTPStatus.CREATED, HTTPStatus.SEE_OTHER} or (
             # A POST that is answered 200 may search, or log in.
-            status == HTTPStatus.OK and before is not None and bool(id_) and id_ not in before
+            status == HTTPStatus.OK and before is not None and bool(id_) and id_.casefold() not in before
         )
         paths = dict.fromkeys(self._paths(created, id_)) if is_new else {}
         for one in paths:
-            if unquote(one.rstrip("/").rpartition("/")[2]) in (before or ()):
-                self.others.add(one)
+            again = next((thing for thing in self.living.of(State.ALIVE) if thing.path == one), None)
+            if again is not None:
+                expected, sent = f"another path than {one}, where an earlier thing is", again.life.created.request.body
+                other = f"{one} once more" if sent != created.request.body else ""
+                self.living.note(Kind.THERE, self.create.label, created, expected, other, again)
+                return False
             self._found(created, one, id_)
+            # Two paths may lead to one thing.
+            is_known = any(thing.life.created is created for thing in self.living.of(State.ALIVE)[:-1])
+            is_old = is_known or unquote(one.rstrip("/").rpartition("/")[2]).casefold() in (before or ())
+            self.living.things[-1].is_own = not is_old
         return bool(paths)
 
     def _found(self, created: Exchange, path: str, id_: str) -> None:
         """Read a thing that was created, and compare it with the request."""
         absent = self.writer.until(
-            lambda: self.writer.send(self.read, path), lambda one: one.response.status not in _ABSENT
+            lambda: self.writer.send(self.read, path), lambda one: one.response.status not in ABSENT
         )
         write = None if not absent.response.ok else self.writer.read_back(self.create, self.read, path, created)
         found = absent if write is None else write.found
         found_id = str(identified(read_json(found.response.body).value, self.read)[1] or "") if write else ""
         writes = (write,) if write else ()
         life = Life(self.create.label, self.read.label, created, found, id=id_, found_id=found_id, writes=writes)
-        self.things.append((path, life))
+        thing = Thing(path, life, found, state=State.ALIVE if found.response.ok else State.UNKNOWN)
+        self.living.things.append(thing)
+        self.living.remember(thing, write, self.create)
 
-    def _deleted(self, life: Life, delete: Operation, path: str) -> Life:
-        """Delete a thing, read it again, and look for it in the list."""
-        deleted = self.writer.send(delete, path)
-        if deleted.response.status not in {HTTPStatus.OK, HTTPStatus.NO_CONTENT}:
-            return replace(life, delete=delete.label, deleted=deleted, gone=self.writer.send(self.read, path))
-        gone = self.writer.until(lambda: self.writer.send(self.read, path), lambda one: not one.response.ok)
-        life = replace(life, delete=delete.label, deleted=deleted, gone=gone)
-        lister = self.operations.get(("GET", collection_of(self.read.template)))
-        if lister is None or not life.found_id:
-            return life
-        listing = self.writer.until(
-            lambda: self.writer.send(lister, self._base(path)), lambda one: life.found_id not in self._ids_of(one)
+    def _deleted(self, thing: Thing, delete: Operation) -> Exchange:
+        """Delete a thing, and read it again."""
+        deleted = self.writer.conditional(delete, self.read, thing.path)
+        is_done = deleted.response.status in {HTTPStatus.OK, HTTPStatus.NO_CONTENT}
+        gone = self.writer.until(
+            lambda: self.writer.send(self.read, thing.path), lambda one: not is_done or not one.response.ok
         )
-        return replace(life, listing=listing, is_listed=life.found_id in self._ids_of(listing))
-
-    def _base(self, path: str) -> str:
-        """Return the path of the collection that an item is in, as the list's operation writes it."""
-        lister = self.operations[("GET", collection_of(self.read.template))]
-        return path.rstrip("/").rpartition("/")[0] + ("/" if lister.template.endswith("/") else "")
+        thing.state = State.GONE if is_done and gone.response.status in ABSENT else State.UNKNOWN
+        thing.life = replace(thing.life, delete=delete.label, deleted=deleted, gone=gone)
+        return deleted
 
     def _ids(self) -> set[str] | None:
         """Return the identifiers in the list of the collection; None if it cannot be read."""
-        lister = self.operations.get(("GET", collection_of(self.read.template)))
-        if lister is None or self.create.method == "PUT":
+        if self.living.lister is None or self.create.method == "PUT":
             return None
-        listing = self.writer.send(lister)
-        return self._ids_of(listing) if listing.response.ok else None
-
-    def _ids_of(self, listing: Exchange) -> set[str]:
+        if self.living.listing is not None:
+            return set(self.living.listing.ids)
+        listing = self.writer.send(self.living.lister)
         items = listed(read_json(listing.response.body).value) or []
-        return {str(identified(one, self.read)[1]) for one in items if isinstance(one, dict)}
+        ids = {str(identified(one, self.read)[1]).casefold() for one in items if isinstance(one, dict)}
+        return ids if listing.response.ok else None
 
     def _paths(self, created: Exchange, id_: str) -> list[str]:
         """Return the paths of a created thing: by its Location, and by an identifier in the body of the same kind."""
@@ -223,6 +347,12 @@ class _Cycle:
         # Two identifiers of another kind may both be right: a number, and a readable name.
         return [there, by_id] if by_id and is_item and last != id_ and last.isdigit() and id_.isdigit() else [there]
 
+    def _absent(self, path: str) -> str:
+        """Return the path of a thing that hardly exists, beside another one; empty if none can be made."""
+        found = self._chosen(_NEVER)
+        above, _, last = path.rstrip("/").rpartition("/")
+        return found and f"{above}/{found.rstrip('/').rpartition('/')[2]}{path[len(above) + 1 + len(last) :]}"
+
     def _chosen(self, turn: int) -> str:
         """Return the path of a thing that does not exist, with an identifier that the client chooses; else empty."""
         parameter = self.read.parameter("path")[-1]
@@ -231,6 +361,19 @@ class _Cycle:
         if id_ is None or len(self.read.parameter("path")) > 1:
             return ""
         return self.read.template.replace(f"{{{parameter.name}}}", str(id_))
+
+
+def _news(was: dict[str, Any], said: dict[str, Any]) -> dict[str, Any]:
+    """Return the texts and truth values that a response has in another way than they were read before."""
+    changed = {name: one for name, one in said.items() if name in was and one != was[name]}
+    usable = [name for name, one in changed.items() if isinstance(one, str | bool)]
+    return {name: changed[name] for name in usable if not _TIMES.search(plain_name(name))}
+
+
+def _is_alike(action: Operation, read: Operation) -> bool:
+    """Return whether an action answers with the thing itself, by its schema."""
+    one, other = (set(flat(item.shape or {}).get("properties", {})) for item in (action, read))
+    return bool(one) and one == other
 
 
 def _end_of(path: str, template: str) -> str:

@@ -316,7 +316,7 @@ class _Parts:
         for number in range(_PAGES):
             query = where(len(joined), number)
             if query is None and last is not None:
-                following = next(_cursors(self.reader.listing, *last), "")
+                following = next(cursors(self.reader.listing, *last), "")
                 query = {way: following} if following else None
             if query is None:
                 # Only a device that named a next page before has said that this is the last one.
@@ -349,7 +349,7 @@ def _difference(expected: tuple[str, ...], found: tuple[str, ...]) -> str:
     return f"{len(found)} items instead of {len(expected)}"
 
 
-def _cursors(listing: Listing, exchange: Exchange, page: Page) -> Iterator[str]:
+def cursors(listing: Listing, exchange: Exchange, page: Page) -> Iterator[str]:
     """Yield what a response names as the beginning of the next page."""
     name = listing.cursor.name if listing.cursor is not None else ""
     links = [one for one in (exchange.response.header("link") or "").split(",") if "next" in one]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any, Final
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, TypeVar
 
 from conformance.api.rest.inputs import usual_inputs, whole_body, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits
+from conformance.api.rest.statuses import CRASHES
 from conformance.api.rest.things import another, differences, represented
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json
@@ -25,6 +26,9 @@ _PAUSE_S: Final = 0.2
 # What differs in the last so many reads is on its way, as a valve that moves is.
 _LAST: Final = 5
 _ACCEPTED: Final = 202
+# By these a device asks for a condition, or says that the one in the request does not hold.
+_WANTS_CONDITION: Final = frozenset({412, 428})
+_Read = TypeVar("_Read")
 
 
 @dataclass(frozen=True)
@@ -46,19 +50,60 @@ class Write:
 
 
 @dataclass(frozen=True)
+class Settled:
+    """A read, and what is wrong in it and in those before it, as noun phrases."""
+
+    exchange: Exchange
+    wrong: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Writer:
-    """Sends requests to things of a described API."""
+    """Sends requests to things of a described API.
+
+    Attributes:
+        api: the device.
+        values: those that the run knows.
+        crashed: the exchanges in which the device failed.
+    """
 
     api: RestInterface
     values: Values
+    crashed: list[Exchange] = field(default_factory=list)
 
-    def send(self, operation: Operation, path: str = "", body: Any = None) -> Exchange:
-        """Send an operation's usual request, to another path or with another JSON body if they are given."""
+    def send(
+        self,
+        operation: Operation,
+        path: str = "",
+        body: Any = None,
+        *,
+        query: Mapping[str, Any] | None = None,
+        headers: tuple[tuple[str, str], ...] = (),
+        media_type: str = "",
+        fresh: bool = False,
+    ) -> Exchange:
+        """Send an operation's usual request, with another path, JSON body or query, and further headers, if given.
+
+        Args:
+            operation: the operation.
+            path: instead of that of the usual request.
+            body: instead of the usual one.
+            query: members of the query that differ from the usual ones.
+            headers: beside the usual ones.
+            media_type: by which the body is called, instead of its own.
+            fresh: on a connection of its own.
+        """
         inputs = usual_inputs(operation, self.values)[0]
         inputs = inputs if body is None else replace(inputs, body=body)
+        inputs = inputs if query is None else replace(inputs, query={**inputs.query, **query})
         request = written(operation, inputs)
-        query = request.target.partition("?")[1:]
-        return (replace(request, target=path + "".join(query)) if path else request).send(self.api)
+        rest = "".join(request.target.partition("?")[1:])
+        request = replace(request, headers=(*request.headers, *headers))
+        request = replace(request, content_type=media_type) if media_type else request
+        exchange = (replace(request, target=path + rest) if path else request).send(self.api, fresh=fresh)
+        if exchange.response.status in CRASHES:
+            self.crashed.append(exchange)
+        return exchange
 
     def bodies(self, operation: Operation, turn: int, now: dict[str, Any] | None = None) -> list[dict[str, Any]]:
         """Return JSON objects to send with an operation: with other values in each turn, then the usual one.
@@ -81,26 +126,35 @@ class Writer:
         first = full if fits(schema, full) else base
         return [another(schema, first, turn, self.values.collections), first, usual.body]
 
-    def until(self, read: Callable[[], Exchange], holds: Callable[[Exchange], bool]) -> Exchange:
+    def until(self, read: Callable[[], _Read], holds: Callable[[_Read], bool]) -> _Read:
         """Return the first read for which something holds, or the last one after a few seconds."""
         patience = Patience(self.api.client.connection.pace, _SETTLES_S)
         while True:
-            exchange = read()
-            if holds(exchange) or patience.over:
-                return exchange
+            found = read()
+            if holds(found) or patience.over:
+                return found
             time.sleep(_PAUSE_S)
 
-    def read_back(self, operation: Operation, read: Operation, path: str, sent: Exchange) -> Write:
-        """Read a thing until it shows what a request has written."""
-        seen: list[tuple[str, ...]] = []
+    def settled(self, read: Callable[[], Exchange], wrong: Callable[[Exchange], Sequence[str]]) -> Settled:
+        """Return the first read in which nothing is wrong, or the last one and what was wrong in the last few."""
+        seen: list[Sequence[str]] = []
 
         def holds(exchange: Exchange) -> bool:
-            seen.append(self.differing(operation, read, sent, exchange))
+            seen.append(wrong(exchange))
             return not seen[-1]
 
-        found = self.until(lambda: self.send(read, path), holds)
-        settled = set(seen[-1]).intersection(*seen[-_LAST:])
-        return Write(operation.label, read.label, sent, found, tuple(one for one in seen[-1] if one in settled))
+        found = self.until(read, holds)
+        lasting = set(seen[-1]).intersection(*seen[-_LAST:])
+        return Settled(found, tuple(one for one in seen[-1] if one in lasting))
+
+    def read_back(
+        self, operation: Operation, read: Operation, path: str, sent: Exchange, *, fresh: bool = False
+    ) -> Write:
+        """Read a thing until it shows what a request has written; fresh: on connections of their own."""
+        found = self.settled(
+            lambda: self.send(read, path, fresh=fresh), lambda exchange: self.differing(operation, read, sent, exchange)
+        )
+        return Write(operation.label, read.label, sent, found.exchange, found.wrong)
 
     def differing(self, operation: Operation, read: Operation, sent: Exchange, found: Exchange) -> tuple[str, ...]:
         """Return what differs between the content of a request and a response; none if they cannot be compared."""
@@ -114,11 +168,18 @@ class Writer:
         """Write other values to a thing, and read them back; None if the device does not accept them, or only later."""
         before = self.send(read, path)
         for body in self.bodies(operation, turn, members(before, ())) if before.response.ok else ():
-            sent = self.send(operation, path, body)
+            sent = self.conditional(operation, read, path, body)
             if sent.response.ok:
                 is_later = sent.response.status == _ACCEPTED
                 return None if is_later else self.read_back(operation, read, path, sent)
         return None
+
+    def conditional(self, operation: Operation, read: Operation, path: str, body: Any = None) -> Exchange:
+        """Send a request; if the device wants a condition, send it again with the entity tag that it has now."""
+        sent = self.send(operation, path, body)
+        if sent.response.status in _WANTS_CONDITION and (tag := self.send(read, path).response.header("etag")):
+            return self.send(operation, path, body, headers=(("If-Match", tag),))
+        return sent
 
 
 def members(exchange: Exchange, names: Any) -> dict[str, Any]:

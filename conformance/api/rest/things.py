@@ -61,7 +61,7 @@ def another(schema: Schema, body: dict[str, Any], turn: int, collections: frozen
     """Return a body with another value of each member that the client may choose, as far as the schema allows it."""
     changed = dict(body)
     for name, part in flat(schema).get("properties", {}).items():
-        if name in body and not _is_devices(name, part, collections):
+        if name in body and not is_devices(name, part, collections):
             for value in _others(part, body[name], turn, collections):
                 if value != body[name] and fits(part, value) and fits(schema, {**changed, name: value}):
                     changed[name] = value
@@ -103,9 +103,9 @@ def differences(
     shared = _parts(answer or {}, sent)
     for name, value in sent.items():
         part, other = parts.get(name), seen.get(name)
-        if part is None or name not in seen or _is_devices(name, part, collections):
+        if part is None or name not in seen or is_devices(name, part, collections):
             continue
-        if (shared and name not in shared) or _is_devices(name, shared.get(name, {}), collections):
+        if (shared and name not in shared) or is_devices(name, shared.get(name, {}), collections):
             continue
         if isinstance(value, dict) and isinstance(other, dict):
             yield from (f"{one} in {name}" for one in differences(value, other, part, shared.get(name), collections))
@@ -121,7 +121,7 @@ def _parts(schema: Schema, names: Collection[str]) -> dict[str, Any]:
     return max([outer, *inner], key=lambda one: len(set(one) & set(names)))
 
 
-def _is_devices(name: str, part: Any, collections: frozenset[str]) -> bool:
+def is_devices(name: str, part: Any, collections: frozenset[str]) -> bool:
     """Return whether a member is the device's: it sets, hides or checks it."""
     given = flat(part) if isinstance(part, dict) else {}
     marked = given.get("readOnly") or given.get("writeOnly") or given.get("format") in {"password", "byte", "binary"}

@@ -1,19 +1,29 @@
-"""What an API creates or writes can be read, and is gone when it was deleted (RFC 9110 15.3.2, 9.3.4, 9.3.5)."""
+"""What an API creates or writes can be read, whatever is done to others, and is gone when it was deleted.
 
-from collections.abc import Iterable
+RFC 9110 15.3.2, 9.3.4, 9.3.5, 13.1.1.
+"""
+
+from collections.abc import Iterable, Iterator
 from http import HTTPStatus
 
-from conformance.scenarios.lifecycles import Life, lifecycles
+from conformance.scenarios.lifecycles import lifecycles
+from conformance.scenarios.living import Kind, Life
 from conformance.scenarios.rule import Outcome, rule
 from conformance.verdict.case import Case
 
 _DONE = frozenset({HTTPStatus.OK, HTTPStatus.NO_CONTENT})
 
 
+def _looks(trace: tuple[Life, ...], kind: Kind) -> Iterator[Case]:
+    """Yield a case for each look of a kind."""
+    for look in (look for life in trace for look in life.looks if look.kind is kind):
+        yield Case(not look.other, look.found, look.expected, look.other, cause=f"{look.operation} {kind}")
+
+
 @rule("description/created-is-there", on=(lifecycles,))
 def created_is_there(trace: tuple[Life, ...]) -> Iterable[Outcome]:
-    """Judge whether what was created is found under its identifier, with this identifier."""
-    for life in trace:
+    """Judge whether what was created is found under its identifier, with this identifier, and stays there."""
+    for life in (life for life in trace if life.create):
         there = life.found.response.status not in {HTTPStatus.NOT_FOUND, HTTPStatus.GONE}
         expected = f"the thing that {life.create} has created with status {life.created.response.status}"
         yield Case(there, life.found, expected, cause=life.read)
@@ -21,23 +31,40 @@ def created_is_there(trace: tuple[Life, ...]) -> Iterable[Outcome]:
             expected = f"the thing with the identifier {life.id}, which {life.create} has created"
             same = life.id.casefold() == life.found_id.casefold()
             yield Case(same, life.found, expected, f"the thing with the identifier {life.found_id}", cause=life.read)
+    yield from _looks(trace, Kind.THERE)
 
 
 @rule("description/written-is-read", on=(lifecycles,))
 def written_is_read(trace: tuple[Life, ...]) -> Iterable[Outcome]:
-    """Judge whether what was written is read."""
+    """Judge whether what was written is read, also later."""
     for write in (write for life in trace for write in life.writes):
         expected = f"what {write.operation} wrote with status {write.sent.response.status}"
         yield Case(not write.other, write.found, expected, "; ".join(write.other), cause=write.operation)
+    yield from _looks(trace, Kind.KEPT)
 
 
 @rule("description/deleted-is-gone", on=(lifecycles,))
 def deleted_is_gone(trace: tuple[Life, ...]) -> Iterable[Outcome]:
     """Judge whether what was deleted is not served any more, by itself or in the list."""
     for life in trace:
-        if life.deleted is None or life.gone is None or life.deleted.response.status not in _DONE:
-            continue
-        yield Case(not life.gone.response.ok, life.gone, f"status 404 or 410 after {life.delete}", cause=life.read)
-        if life.listing is not None and not life.gone.response.ok:
-            expected = f"a list without the thing {life.found_id} after {life.delete}"
-            yield Case(not life.is_listed, life.listing, expected, "a list with it", cause=f"{life.read} list")
+        if life.deleted is not None and life.gone is not None and life.deleted.response.status in _DONE:
+            yield Case(not life.gone.response.ok, life.gone, f"status 404 or 410 after {life.delete}", cause=life.read)
+    yield from _looks(trace, Kind.GONE)
+
+
+@rule("description/refused-keeps", on=(lifecycles,))
+def refused_keeps(trace: tuple[Life, ...]) -> Iterable[Outcome]:
+    """Judge whether requests that were answered 4xx have changed nothing."""
+    yield from _looks(trace, Kind.REFUSED)
+
+
+@rule("description/failed-condition", on=(lifecycles,))
+def failed_condition(trace: tuple[Life, ...]) -> Iterable[Outcome]:
+    """Judge whether requests whose If-Match does not hold have changed nothing."""
+    yield from _looks(trace, Kind.CONDITION)
+
+
+@rule("robustness/no-server-error", on=(lifecycles,))
+def no_server_error(trace: tuple[Life, ...]) -> Iterable[Outcome]:
+    """Judge whether a request of a life made the device fail with 500, 502 or 504."""
+    yield from _looks(trace, Kind.CRASH)

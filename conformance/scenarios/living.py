@@ -1,0 +1,315 @@
+"""What a cycle has created, as it was last read, and looks at it after each request to something else."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import partial
+from http import HTTPStatus
+from typing import Any, Final
+
+from conformance.api.rest.things import differences
+from conformance.documents.json_schema import Schema
+from conformance.documents.json_text import read_json, shown
+from conformance.documents.openapi import Operation
+from conformance.documents.parameters import plain_name
+from conformance.scenarios.whole_list import WholeList, chooses, read_whole
+from conformance.scenarios.writing import Write, Writer, members
+from conformance.transport.exchange import Exchange
+
+ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
+# So many things are read after one step.
+_LOOKED: Final = 4
+# Members that one of several things has: another one gets it, or gets another place in an order.
+_SHARED: Final = re.compile(r"(?:default|primary|active|selected|current|order|index|rank|priority|position|sequence)$")
+# The states of things that end by themselves, and may be removed then.
+_ENDED: Final = frozenset(
+    {"done", "finished", "completed", "complete", "ended", "failed", "cancelled", "canceled", "succeeded", "expired"}
+)
+# A collection that keeps the newest so many things drops the oldest.
+_RING: Final = 3
+
+
+class Kind(StrEnum):
+    """What a look shows if it is not as expected."""
+
+    THERE = "there"  # what was created is lost, not listed, or has the identifier of something else
+    KEPT = "kept"  # what was written reads otherwise later
+    GONE = "gone"  # what was deleted is back, or still listed
+    REFUSED = "refused"  # a refused request has changed something
+    CONDITION = "condition"  # a request whose condition does not hold has
+    CRASH = "crash"  # a request was answered 500, 502 or 504
+
+
+@dataclass(frozen=True)
+class Look:
+    """One read after a request to something else, or after a refused one.
+
+    Attributes:
+        kind: what it would show.
+        operation: label of the request before it.
+        found: the response that shows it.
+        expected: what should have been found, as a noun phrase.
+        other: what was found instead; empty: it was as expected.
+        after_s: how long after the creation it was.
+    """
+
+    kind: Kind
+    operation: str
+    found: Exchange
+    expected: str
+    other: str = ""
+    after_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Life:
+    """One thing that was created, or one that is always there and was written.
+
+    Attributes:
+        create, read, delete: labels of the operations; an empty one was not sent.
+        created: the request that created it.
+        found: the GET after it.
+        deleted: the DELETE, or None.
+        gone: the GET after that, or None.
+        id: what identifies it by the response that created it; empty if that does not say it.
+        found_id: what identifies it by the GET; empty if that does not say it.
+        writes: what was written to it, the creation first.
+        looks: what was seen later, of this thing and of others.
+    """
+
+    create: str
+    read: str
+    created: Exchange
+    found: Exchange
+    delete: str = ""
+    deleted: Exchange | None = None
+    gone: Exchange | None = None
+    id: str = ""
+    found_id: str = ""
+    writes: tuple[Write, ...] = ()
+    looks: tuple[Look, ...] = ()
+
+
+class State(StrEnum):
+    """What is known of a thing."""
+
+    ALIVE = "alive"
+    GONE = "gone"
+    UNKNOWN = "unknown"
+
+
+@dataclass
+class Thing:
+    """A thing, its life so far, and what is known of it now.
+
+    Attributes:
+        path: where it is.
+        life: what was done with it.
+        last: the last read of it.
+        kept: the members that read as they were written.
+        schema: that of the body which wrote them.
+        state: whether it is there.
+        is_own: whether the run has created it.
+        is_told: whether the list was found wrong about it.
+        made_s: when it was made, s on the monotonic clock.
+    """
+
+    path: str
+    life: Life
+    last: Exchange
+    kept: dict[str, Any] = field(default_factory=dict)
+    schema: Schema = field(default_factory=dict)
+    state: State = State.ALIVE
+    is_own: bool = True
+    is_told: bool = False
+    made_s: float = field(default_factory=time.monotonic)
+
+    @property
+    def id(self) -> str:
+        """What identifies it, in lower case; empty if nothing does."""
+        return (self.life.found_id or self.life.id).casefold()
+
+
+@dataclass
+class Living:
+    """The things of one collection.
+
+    Attributes:
+        writer: sends the requests.
+        read: the operation that reads one of them.
+        lister: the operation that lists them, or None.
+        until: no further looks are taken after this, s on the monotonic clock.
+        things: all of them.
+        looks: what was seen.
+        listing: the last reading of the list, or None.
+        evaluates: whether the device has refused a condition that does not hold.
+    """
+
+    writer: Writer
+    read: Operation
+    lister: Operation | None
+    until: float
+    things: list[Thing] = field(default_factory=list)
+    looks: list[Look] = field(default_factory=list)
+    listing: WholeList | None = None
+    evaluates: bool = False
+    _shown: bool = False
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the time for looks is over."""
+        return time.monotonic() > self.until
+
+    def of(self, state: State) -> list[Thing]:
+        """Return the things of the run in a state."""
+        return [one for one in self.things if one.is_own and one.state is state]
+
+    def remember(self, thing: Thing, write: Write | None, operation: Operation) -> None:
+        """Keep what a request has written, as far as it reads as it was written."""
+        thing.kept = {}
+        thing.last = write.found if write else thing.last
+        if write is None or not operation.bodies:
+            return
+        body, now = read_json(write.sent.request.body).value, members(write.found, ())
+        thing.schema = next(iter(operation.bodies.values())).schema
+        if isinstance(body, dict):
+            now = members(write.found, body)
+            usable = {name: one for name, one in body.items() if name in now and not _SHARED.search(plain_name(name))}
+            thing.kept = {name: one for name, one in usable.items() if not self._differ(thing, {name: one}, now)}
+
+    def _differ(self, thing: Thing, kept: dict[str, Any], now: dict[str, Any]) -> list[str]:
+        return list(differences(kept, now, thing.schema, self.read.shape, self.writer.values.collections))
+
+    def other(self, thing: Thing, found: Exchange, said: Mapping[str, Any] | None = None) -> list[str]:
+        """Return in what a thing reads otherwise than before, as noun phrases.
+
+        Args:
+            thing: what is known of it.
+            found: a read of it.
+            said: what an action has changed in another thing, and was not so in this one.
+        """
+        if found.response.status in ABSENT:
+            return [f"status {found.response.status}"]
+        now = members(found, thing.kept) if found.response.ok else {}
+        lost = [f"no {name}" for name in thing.kept if name not in now] if now else []
+        was = members(thing.last, said or ())
+        alike = [name for name, one in (said or {}).items() if was.get(name) != one == now.get(name)]
+        return [*lost, *self._differ(thing, thing.kept, now), *(f"{shown(now[name])} as {name}" for name in alike)]
+
+    def check(
+        self,
+        thing: Thing,
+        after: Exchange,
+        operation: str,
+        kind: Kind | None = None,
+        said: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Read a thing until it reads as before, and note what does not.
+
+        Args:
+            thing: a living one.
+            after: the request before.
+            operation: the label of that.
+            kind: what it shows if the thing has changed; by default: that it was lost, or what was written.
+            said: see other().
+        """
+        settled = self.writer.settled(partial(self._read, thing), lambda one: self.other(thing, one, said))
+        found, wrong = settled.exchange, settled.wrong
+        is_lost = found.response.status in ABSENT
+        if is_lost:
+            thing.state = State.UNKNOWN
+            wrong = () if self._is_ended(thing) or self._is_dropped(thing, after) else wrong
+        elif wrong:
+            now = members(found, thing.kept)
+            thing.kept = {name: one for name, one in thing.kept.items() if not self._differ(thing, {name: one}, now)}
+        thing.last = found if found.response.ok else thing.last
+        expected = f"the thing as it was read before {_said(after)}"
+        kind = kind or (Kind.THERE if is_lost else Kind.KEPT)
+        self.note(kind, operation, found, expected, "; ".join(wrong), thing)
+
+    def _read(self, thing: Thing) -> Exchange:
+        return self.writer.send(self.read, thing.path)
+
+    def note(self, kind: Kind, operation: str, found: Exchange, expected: str, other: str, thing: Thing) -> None:
+        """Add a look; see Look."""
+        self.looks.append(Look(kind, operation, found, expected, other, time.monotonic() - thing.made_s))
+
+    @staticmethod
+    def _is_ended(thing: Thing) -> bool:
+        """Return whether a thing has ended by itself, by what was last read of it."""
+        now = members(thing.last, ("state", "status", "phase"))
+        return any(isinstance(one, str) and one.casefold() in _ENDED for one in now.values())
+
+    def _is_dropped(self, thing: Thing, after: Exchange) -> bool:
+        """Return whether a lost thing was the oldest of a full collection, and something was created."""
+        if self.listing is None or after.request.method not in {"POST", "PUT"} or self.lister is None:
+            return False
+        before = self.listing.ids
+        now = self.list_of(thing)
+        is_full = len(before) >= _RING and len(now.items) == len(before)
+        return is_full and thing.id in {before[0], before[-1]}
+
+    def look(
+        self, after: Exchange, operation: str, own: Thing | None = None, said: Mapping[str, Any] | None = None
+    ) -> None:
+        """Read the other things after a request to one of them, or to none, and the list; said: see other()."""
+        if self.is_over:
+            return
+        created = own.life.created if own else None
+        others = [one for one in self.of(State.ALIVE) if one.life.created is not created]
+        for thing in others if len(others) <= _LOOKED else (*others[:1], *others[1 - _LOOKED :]):
+            self.check(thing, after, operation, said=said)
+        deleted = [one for one in self.of(State.GONE) if one is not own]
+        for thing in deleted[-_LOOKED:]:
+            found = self.writer.until(partial(self._read, thing), lambda one: not one.response.ok)
+            other = f"status {found.response.status}" if found.response.ok else ""
+            thing.state = State.UNKNOWN if other else thing.state
+            self.note(Kind.GONE, operation, found, f"status 404 or 410, as before {_said(after)}", other, thing)
+        if self.lister is not None and self.of(State.ALIVE) + self.of(State.GONE):
+            self._look_at_list(after, operation)
+
+    def _look_at_list(self, after: Exchange, operation: str) -> None:
+        """Read the list until it has each living thing, once, and none that was deleted."""
+        thing = self.things[-1]
+        self.listing = listing = self.writer.until(lambda: self.list_of(thing), lambda one: not self._wrong(one))
+        wrong = self._wrong(listing)
+        self._shown = self._shown or any(one.id in listing.ids for one in self.of(State.ALIVE) if one.id)
+        if not wrong:
+            self.note(Kind.THERE, operation, listing.exchange, "a list of the living things", "", thing)
+        for thing, kind, expected, other in wrong:
+            self.note(kind, operation, listing.exchange, f"{expected} after {_said(after)}", other, thing)
+            thing.is_told = True
+
+    def list_of(self, thing: Thing) -> WholeList:
+        """Read the list that a thing is in."""
+        if self.lister is None:
+            raise ValueError("the collection has no list")
+        path = thing.path.rstrip("/").rpartition("/")[0] + ("/" if self.lister.template.endswith("/") else "")
+        return read_whole(self.writer, self.lister, self.read, path)
+
+    def _wrong(self, listing: WholeList) -> list[tuple[Thing, Kind, str, str]]:
+        """Return what is wrong in a list: the thing, what that shows, what was expected, and what was found."""
+        found: list[tuple[Thing, Kind, str, str]] = []
+        # A list that has never shown a created thing may leave out such things, if it can leave out any.
+        is_complete = listing.is_whole and (
+            self._shown or (self.lister is not None and not chooses(self.lister) and all(listing.ids))
+        )
+        for thing in self.things:
+            if not thing.id or not thing.is_own or thing.is_told:
+                continue
+            if thing.state is State.GONE and thing.id in listing.ids:
+                found.append((thing, Kind.GONE, f"a list without the thing {thing.id}", "a list with it"))
+            elif thing.state is State.ALIVE and is_complete and thing.id not in listing.ids:
+                found.append((thing, Kind.THERE, f"a list with the thing {thing.id}", "a list without it"))
+            elif thing.state is State.ALIVE and thing.id in listing.twice:
+                found.append((thing, Kind.THERE, f"a list with the thing {thing.id} once", "a list with it twice"))
+        return found
+
+
+def _said(after: Exchange) -> str:
+    """Return a request in words: "DELETE /valves/3 with status 204"."""
+    return f"{after.request.method} {after.request.target.partition('?')[0]} with status {after.response.status}"

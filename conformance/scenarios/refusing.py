@@ -1,0 +1,119 @@
+"""Send to a thing what the device should refuse, and read the thing and its list: a refused request changes nothing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from http import HTTPStatus
+from typing import Any, Final
+
+from conformance.api.rest.inputs import usual_inputs
+from conformance.api.rest.invalid_variations import invalid_variations
+from conformance.api.rest.variations import Kind as Variety
+from conformance.documents.openapi import Operation
+from conformance.documents.representation import flat
+from conformance.scenarios.living import ABSENT, Kind, Living, Look, State, Thing
+from conformance.scenarios.writing import members
+from conformance.transport.exchange import Exchange
+
+# Every current entity tag differs from this one.
+_NO_TAG: Final = (("If-Match", '"roaas"'),)
+# A proxy may have sent 408 after the device has acted; 406 is about the response.
+_UNCLEAR: Final = frozenset({HTTPStatus.NOT_ACCEPTABLE, HTTPStatus.REQUEST_TIMEOUT})
+_ERRORS: Final = range(400, 500)
+_TEXT: Final = "text/plain"
+# The turns of the values in a series of requests are so far apart.
+_STEP: Final = 10
+# Texts that no client but the suite writes, as `another` makes them.
+_OURS: Final = re.compile(r"(?:roaas |r)\d+")
+
+
+def is_refused(exchange: Exchange) -> bool:
+    """Return whether a device says that it has not done what a request asks."""
+    status = exchange.response.status
+    return status in _ERRORS and status not in _UNCLEAR
+
+
+def half_valid(living: Living, operation: Operation, turn: int, now: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield bodies with new valid values and one that the description forbids: of the last member, and of the first."""
+    valid = next(iter(living.writer.bodies(operation, turn, now)), None)
+    inputs = usual_inputs(operation, living.writer.values)[0]
+    if valid is None:
+        return
+    names = list(flat(operation.bodies[inputs.media_type].schema).get("properties", {}))
+    ordered = {name: valid[name] for name in sorted(valid, key=lambda one: names.index(one) if one in names else 0)}
+    by_place: dict[str, Any] = {}
+    for one in invalid_variations(operation, replace(inputs, body=ordered)):
+        if one.kind is Variety.INVALID and isinstance(one.inputs.body, dict):
+            by_place.setdefault(one.place, one.inputs.body)
+    wrong = [by_place[f"body /{name}"] for name in ordered if f"body /{name}" in by_place]
+    yield from {id(one): one for one in (wrong[-1:] + wrong[:1])}.values()
+
+
+def refuse_changes(living: Living, change: Operation, thing: Thing, turn: int) -> None:
+    """Send requests that should be refused to a thing, and read it after each."""
+    writer = living.writer
+    for step, kind in ((0, Kind.CONDITION), (1, Kind.REFUSED)):
+        valid = next(iter(writer.bodies(change, turn + _STEP * step, members(thing.last, ()))), None)
+        if valid is not None:
+            is_condition = kind is Kind.CONDITION
+            sent = writer.send(
+                change,
+                thing.path,
+                valid,
+                headers=_NO_TAG if is_condition else (),
+                media_type="" if is_condition else _TEXT,
+            )
+            _look(living, thing, change, sent, kind)
+    for body in half_valid(living, change, turn + 2 * _STEP, members(thing.last, ())):
+        _look(living, thing, change, writer.send(change, thing.path, body))
+
+
+def refuse_deletion(living: Living, delete: Operation, thing: Thing, absent: str) -> None:
+    """Send a DELETE whose condition does not hold, and one of a thing that does not exist; read the thing."""
+    writer = living.writer
+    if thing.last.response.header("etag") and thing.state is State.ALIVE:
+        sent = writer.send(delete, thing.path, headers=_NO_TAG)
+        if not is_refused(sent):
+            if sent.response.ok and living.evaluates:
+                expected = "status 412, as for another method with an If-Match that names no current entity tag"
+                living.note(Kind.CONDITION, delete.label, sent, expected, f"status {sent.response.status}", thing)
+            thing.state = State.UNKNOWN
+            return
+        _look(living, thing, delete, sent, Kind.CONDITION)
+    if absent and writer.send(living.read, absent).response.status in ABSENT:
+        _look(living, thing, delete, writer.send(delete, absent))
+
+
+def _look(living: Living, thing: Thing, operation: Operation, sent: Exchange, kind: Kind = Kind.REFUSED) -> None:
+    """Read a thing after a request that should be refused; one that was accepted has written it."""
+    if thing.state is not State.ALIVE:
+        return
+    if is_refused(sent):
+        is_condition = kind is Kind.CONDITION and sent.response.status == HTTPStatus.PRECONDITION_FAILED
+        living.evaluates |= is_condition
+        living.check(thing, sent, operation.label, Kind.CONDITION if is_condition else Kind.REFUSED)
+    elif operation.bodies:
+        living.remember(thing, living.writer.read_back(operation, living.read, thing.path, sent), operation)
+
+
+def refuse_creation(living: Living, create: Operation, turn: int) -> None:
+    """Send a creation that should be refused, and look in the list for what it asks for."""
+    body = next(half_valid(living, create, turn, {}), None)
+    if body is None or living.lister is None or living.listing is None or not living.things:
+        return
+    sent = living.writer.send(create, "", body)
+    ours = {name: one for name, one in body.items() if isinstance(one, str) and _OURS.fullmatch(one)}
+    if not is_refused(sent) or not ours:
+        return
+    before = living.listing.ids
+    listing = living.list_of(living.things[-1])
+    made = [
+        one
+        for one, id_ in zip(listing.items, listing.ids, strict=True)
+        if id_ and id_ not in before and any(one.get(name) == text for name, text in ours.items())
+    ]
+    other = f"a list with {', '.join(f'{name} {text!r}' for name, text in ours.items())}" if made else ""
+    expected = f"a list without what {create.label} with status {sent.response.status} asked for"
+    living.looks.append(Look(Kind.REFUSED, create.label, listing.exchange, expected, other))

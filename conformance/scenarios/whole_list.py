@@ -1,0 +1,110 @@
+"""The list of a collection, read page by page: the items in it, and whether they are all."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any, Final
+
+from conformance.api.rest.listing import Page, listing_of, page_of
+from conformance.api.rest.things import identified
+from conformance.documents.openapi import Operation
+from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
+from conformance.documents.writing import json_text
+from conformance.scenarios.lists import cursors
+from conformance.scenarios.writing import Writer
+from conformance.transport.exchange import Exchange
+
+_PAGES: Final = 5
+_LIMITS: Final = frozenset({"limit", "pagesize", "perpage", "size", "maxresults", "pagelimit"})
+# Servers that have a limit and do not say so have round ones.
+_ROUND, _FEWEST = 5, 10
+
+
+@dataclass(frozen=True)
+class WholeList:
+    """What one reading of a list has shown.
+
+    Attributes:
+        exchange: the last page.
+        ids: the identifier of each item, as a text in lower case; empty where it has none.
+        twice: the identifiers of items that occur more than once and are equal.
+        items: the items that are objects.
+        is_whole: whether these are all items.
+    """
+
+    exchange: Exchange
+    ids: tuple[str, ...] = ()
+    twice: frozenset[str] = frozenset()
+    items: tuple[dict[str, Any], ...] = ()
+    is_whole: bool = False
+
+
+def chooses(lister: Operation) -> bool:
+    """Return whether a list's operation has parameters by which items may be left out."""
+    listing = listing_of(lister)
+    parts = (
+        (listing.limit, listing.offset, listing.page, listing.cursor, listing.sort, listing.direction)
+        if listing
+        else ()
+    )
+    return any(one not in parts for one in lister.parameter("query"))
+
+
+def read_whole(writer: Writer, lister: Operation, item: Operation, path: str) -> WholeList:
+    """Read a list by a bounded number of pages.
+
+    Args:
+        writer: sends the requests.
+        lister: the operation that lists.
+        item: the operation that reads one of the items.
+        path: that of the collection.
+    """
+    exchange, found, is_whole = writer.send(lister, path), list[Any](), False
+    for number in range(1, _PAGES + 1):
+        page = page_of(exchange.response)
+        if page is None or (number > 1 and page.items and page.items[0] in found):
+            break
+        found += page.items
+        is_whole = not (page.goes_on or max(page.totals.values(), default=0) > len(found) or _seems_cut(lister, page))
+        query = None if is_whole else _next(lister, exchange, page, len(found), number)
+        if query is None:
+            break
+        exchange = writer.send(lister, path, query=query)
+    items = tuple(one for one in found if isinstance(one, dict))
+    ids = tuple(str(identified(one, item)[1]).casefold() for one in items)
+    equal = Counter((id_, json_text(one)) for id_, one in zip(ids, items, strict=True) if id_)
+    return WholeList(exchange, ids, frozenset(key[0] for key, count in equal.items() if count > 1), items, is_whole)
+
+
+def _next(lister: Operation, exchange: Exchange, page: Page, count: int, number: int) -> dict[str, Any] | None:
+    """Return the query of the next page; None if nothing leads to it.
+
+    Args:
+        lister: the operation that lists.
+        exchange: the last response.
+        page: the list in it.
+        count: how many items there were so far.
+        number: that of the page, from 1.
+    """
+    listing = listing_of(lister)
+    if listing is not None and listing.cursor is not None:
+        following = next(cursors(listing, exchange, page), None)
+        return {listing.cursor.name: following} if following else None
+    if listing is not None and listing.offset is not None:
+        return {listing.offset.name: count}
+    if listing is not None and listing.page is not None:
+        schema = flat(listing.page.schema)
+        return {listing.page.name: number + (0 if 0 in {schema.get("default"), schema.get("minimum")} else 1)}
+    return None
+
+
+def _seems_cut(lister: Operation, page: Page) -> bool:
+    """Return whether a page has as many items as a limit allows, said or not."""
+    count, listing = len(page.items), listing_of(lister)
+    said = [one for part in page.around for name, one in part.items() if plain_name(name) in _LIMITS]
+    most = listing.most({}) if listing is not None else 0
+    return bool(count) and (
+        count in {most, *(one for one in said if isinstance(one, int))} or (count >= _FEWEST and count % _ROUND == 0)
+    )
