@@ -22,7 +22,7 @@ from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
-from conformance.scenarios.living import ABSENT, Kind, Life, Living, Look, State, Thing
+from conformance.scenarios.living import ABSENT, Kind, Life, Living, State, Thing
 from conformance.scenarios.refusing import is_refused, refuse_changes, refuse_creation, refuse_deletion
 from conformance.scenarios.scenario import NotPossibleError, NotSeenError, scenario
 from conformance.scenarios.singletons import singletons
@@ -78,10 +78,10 @@ def _seen_twice(cycle: Callable[[int], _Cycle]) -> list[Life]:
     one that is left alone for as long.
     """
     lives = cycle(0).run()
-    wrong = [look for life in lives for look in life.looks if look.other and look.kind is not Kind.CRASH]
+    wrong = [look for life in lives for look in life.looks if look.other]
     if not wrong:
         return lives
-    kinds = {Kind.CRASH}
+    kinds = set[Kind]()
     if not cycle(1).changes_alone(min(_ALONE_S, max(look.after_s for look in wrong))):
         kinds |= {look.kind for life in cycle(2).run() for look in life.looks if look.other}
     kept = [tuple(look for look in life.looks if not look.other or look.kind in kinds) for life in lives]
@@ -121,11 +121,7 @@ class _Cycle:
                 self._delete_all(delete)
         except NoAnswerError:
             pass  # the survey tells what breaks a connection
-        collection = f"{self.create.method} {collection_of(self.item)}"
-        crashed = (Look(Kind.CRASH, collection, one, "a status below 500", one.came) for one in self.writer.crashed)
-        looks = (*self.living.looks, *crashed)
-        self.writer.crashed.clear()
-        return [replace(one.life, looks=looks if one is things[0] else ()) for one in things]
+        return [replace(one.life, looks=tuple(self.living.looks) if one is things[0] else ()) for one in things]
 
     def changes_alone(self, seconds: float) -> bool:
         """Return whether a thing that was created changes, or is gone, after a time without any request."""

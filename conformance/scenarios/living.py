@@ -41,7 +41,6 @@ class Kind(StrEnum):
     GONE = "gone"  # what was deleted is back, or still listed
     REFUSED = "refused"  # a refused request has changed something
     CONDITION = "condition"  # a request whose condition does not hold has
-    CRASH = "crash"  # a request was answered 500, 502 or 504
 
 
 @dataclass(frozen=True)

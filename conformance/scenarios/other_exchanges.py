@@ -8,14 +8,14 @@ from typing import Final
 from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.request_context import RequestContext
-from conformance.api.rest.statuses import HELD, held_text
+from conformance.api.rest.statuses import CRASHES, HELD, held_text
 from conformance.api.rest.validity import VALID, validity
 from conformance.api.rest.variations import Kind
 from conformance.contract.described import SOAP
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey
-from conformance.transport.exchange import Attempt, Exchange, Listener, NoAnswer, Request, Unanswered
+from conformance.transport.exchange import Attempt, Exchange, Listener, NoAnswer, Unanswered
 
 # Different responses that are kept, so that a long run needs no more memory.
 _MOST: Final = 2000
@@ -48,7 +48,7 @@ class OtherExchanges(Listener):
     def _keep(self, attempt: Attempt, shown: tuple[object, ...]) -> None:
         if self._api.is_recorded or len(self.probes) >= _MOST:
             return
-        label = self._operation_of(attempt.request)
+        label = self._operation_of(attempt)
         key = hash((label, shown))
         if not label or key in self._seen:
             return
@@ -56,8 +56,9 @@ class OtherExchanges(Listener):
         exchange, unanswered = (attempt, None) if isinstance(attempt, Exchange) else (None, attempt)
         self.probes.append(Probe(label, Kind.OTHER, exchange=exchange, unanswered=unanswered))
 
-    def _operation_of(self, request: Request) -> str:
+    def _operation_of(self, attempt: Attempt) -> str:
         """Return the operation of a usual and valid request, if it was answered 2xx before; or an empty text."""
+        request = attempt.request
         contract, base_url = self._api.run.contract, self._api.client.base_url
         context = RequestContext.of(contract, base_url, request)
         operation = context.operation if context else None
@@ -70,7 +71,9 @@ class OtherExchanges(Listener):
         content_type = next((value for name, value in request.headers if name.lower() == "content-type"), "")
         said = validity(contract, request.method, context.target, content_type, request.body)
         sent = GeneratedRequest(request.method, context.target, content_type, request.body)
-        invents = self._api.values is not None and self._api.values.invents(operation, sent)
+        # Whatever a request refers to, it is no reason to fail.
+        crashed = isinstance(attempt, Exchange) and attempt.response.status in CRASHES
+        invents = not crashed and self._api.values is not None and self._api.values.invents(operation, sent)
         return operation.label if said.verdict == VALID and not invents else ""
 
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Final, TypeVar
 
 from conformance.api.rest.inputs import usual_inputs, whole_body, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits
-from conformance.api.rest.statuses import CRASHES
 from conformance.api.rest.things import another, differences, represented
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json
@@ -64,12 +63,10 @@ class Writer:
     Attributes:
         api: the device.
         values: those that the run knows.
-        crashed: the exchanges in which the device failed.
     """
 
     api: RestInterface
     values: Values
-    crashed: list[Exchange] = field(default_factory=list)
 
     def send(
         self,
@@ -100,10 +97,7 @@ class Writer:
         rest = "".join(request.target.partition("?")[1:])
         request = replace(request, headers=(*request.headers, *headers))
         request = replace(request, content_type=media_type) if media_type else request
-        exchange = (replace(request, target=path + rest) if path else request).send(self.api, fresh=fresh)
-        if exchange.response.status in CRASHES:
-            self.crashed.append(exchange)
-        return exchange
+        return (replace(request, target=path + rest) if path else request).send(self.api, fresh=fresh)
 
     def bodies(self, operation: Operation, turn: int, now: dict[str, Any] | None = None) -> list[dict[str, Any]]:
         """Return JSON objects to send with an operation: with other values in each turn, then the usual one.

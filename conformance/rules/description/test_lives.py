@@ -62,9 +62,3 @@ def refused_keeps(trace: tuple[Life, ...]) -> Iterable[Outcome]:
 def failed_condition(trace: tuple[Life, ...]) -> Iterable[Outcome]:
     """Judge whether requests whose If-Match does not hold have changed nothing."""
     yield from _looks(trace, Kind.CONDITION)
-
-
-@rule("robustness/no-server-error", on=(lifecycles,))
-def no_server_error(trace: tuple[Life, ...]) -> Iterable[Outcome]:
-    """Judge whether a request of a life made the device fail with 500, 502 or 504."""
-    yield from _looks(trace, Kind.CRASH)

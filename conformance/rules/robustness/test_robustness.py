@@ -28,7 +28,7 @@ _TIMES, _MS, _FEWEST = 3.0, 50.0, 15
 _MORE = 1.5
 
 
-@rule("robustness/no-server-error", on=_ON)
+@rule("robustness/no-server-error", on=(*_ON, others))
 def no_server_error(trace: Survey) -> Iterable[Outcome]:
     """Judge whether any request makes the device fail with 500, 502 or 504."""
 
