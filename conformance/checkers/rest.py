@@ -7,6 +7,7 @@ from conformance.api.rest.request_context import RequestContext
 from conformance.checkers import conditional, content, declared, fields, problem, refusals
 from conformance.checkers.entity_tags import EntityTags
 from conformance.checkers.lists import Lists
+from conformance.checkers.memory import Memory
 from conformance.checkers.occasion import Occasion
 from conformance.checkers.resources import Resources
 from conformance.checkers.texts import Texts
@@ -35,7 +36,8 @@ class RestCheckers:
         self._contract, self._base_url = contract, base_url
         self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
         # These know what the run has shown so far; the second ones judge described devices alone.
-        described = (Lists(), Resources(), EntityTags(), Texts()) if contract.described else ()
+        self._memory = Memory(contract) if contract.described else None
+        described = (Lists(), Resources(), EntityTags(), Texts(), self._memory) if self._memory is not None else ()
         self._over_time = (conditional.Conditional(), *described)
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
@@ -46,6 +48,8 @@ class RestCheckers:
         if context is None:
             return
         if isinstance(attempt, Unanswered):
+            if self._memory is not None:
+                self._memory.forget()
             # A malformed request may be answered in any way.
             if context.usual and attempt.kind is NoAnswer.MALFORMED:
                 yield Case(False, attempt, fields.WELL_FRAMED, attempt.problem, requirement="http/framing")  # noqa: FBT003

@@ -98,9 +98,20 @@ def _object(schema: Schema, depth: int, room: tuple[int, int], *, whole: bool) -
     optional = [name for name in properties if name not in required and not properties[name].get("readOnly")]
     names = required if len(required) <= room[1] and depth < _DEPTH else []
     names = names + optional if whole and len(names) + len(optional) <= room[0] and depth < _DEPTH else names
+    if len(names) < room[1] and depth < _DEPTH:
+        names = _demanded(schema, names, optional)
     share = _share(room, len(names))
     made = {name: _made(properties.get(name, {}), depth + 1, share, whole=whole) for name in names}
     return {**made, **_discriminating(schema, made)}
+
+
+def _demanded(schema: Schema, names: list[str], optional: list[str]) -> list[str]:
+    """Return the names with those that other keywords than ``required`` demand."""
+    dependent, least = schema.get("dependentRequired", {}), schema.get("minProperties", 0)
+    found = dict.fromkeys(names)
+    for name in [*names, *optional[: max(0, int(least) - len(names))]]:
+        found |= dict.fromkeys([name, *(dependent.get(name, ()) if isinstance(dependent, dict) else ())])
+    return list(found)
 
 
 def _share(room: tuple[int, int], count: int) -> tuple[int, int]:

@@ -24,6 +24,10 @@ _OWN: Final = re.compile(
     r"(?:id|pk|url|href|status|state|version|revision|etag|created|updated|modified|changed|timestamp|time|at|on|by"
     r"|owner|author|user|password|secret|token|pin|key)$"
 )
+# Names and states of what is deleted and can still be read, and names of what says that it is not.
+_DELETED: Final = re.compile(r"delet|remov|archiv|retire|decommission|trash|tombstone|gone")
+_STATES: Final = ("status", "state", "lifecycle", "phase")
+_ALIVE: Final = frozenset({"active", "isactive", "alive"})
 # Formats of texts that are the same in every spelling but for case and punctuation.
 _COMPARED: Final = frozenset({"", "email", "uuid", "hostname", "date", "date-time"})
 _NEAR: Final = {"rel_tol": 0.02, "abs_tol": 0.01}
@@ -55,6 +59,22 @@ def represented(value: Any, names: Collection[str]) -> dict[str, Any]:
     found += [one for one in value.values() if isinstance(one, dict)] if found else []
     found += [one for inner in found[1:] for one in inner.values() if isinstance(one, dict)]
     return max(found, key=lambda one: len({plain_name(name) for name in one} & set(names)), default={})
+
+
+def is_marked_deleted(value: Any) -> bool:
+    """Return whether a representation says of itself that it is deleted, as one that can be restored does."""
+    if not isinstance(value, dict):
+        return False
+    inner = [one for one in value.values() if isinstance(one, dict)]
+    for name, one in [(name, one) for part in (value, *inner) for name, one in part.items()]:
+        plain = plain_name(name)
+        if _DELETED.search(plain) and one not in (None, False, 0, ""):
+            return True
+        if plain.endswith(_STATES) and isinstance(one, str) and _DELETED.search(plain_name(one)):
+            return True
+        if plain in _ALIVE and one is False:
+            return True
+    return False
 
 
 def another(schema: Schema, body: dict[str, Any], turn: int, collections: frozenset[str]) -> dict[str, Any]:

@@ -1,8 +1,10 @@
 """Parameters and forms are written and judged as the specification has them: a right device passes, a lax one fails."""
 
+import json
 import re
 from urllib.parse import unquote, unquote_plus
 
+import jsonschema_rs
 import pytest
 from aiohttp import web
 from small_device import REFUSED, answers, certified, constant, described, error, small_device
@@ -163,3 +165,24 @@ def test_an_idempotent_delete_may_succeed_for_what_a_path_cannot_name(tmp_path, 
         seen = certified(f"{url}/openapi.json", tmp_path / "out", "--call", "*")
 
     assert (seen.blamed.get("description/invalid-refused") == "fail") is blamed, seen.text
+
+
+@pytest.mark.parametrize("demanded", [{"minProperties": 1}, {"anyOf": [{"required": ["a"]}, {"required": ["b"]}]}])
+def test_a_body_without_all_optional_members_is_not_asked_for_where_one_is_demanded(tmp_path, demanded):
+    part = {"type": "object", "properties": {"a": {"type": "integer"}, "b": {"type": "string"}}, **demanded}
+    body = {"required": True, "content": {"application/json": {"schema": part}}}
+    responses = {"200": answers({"type": "object"}), "4XX": REFUSED}
+    document = described({"/settings": {"patch": {"requestBody": body, "responses": responses}}})
+    takes = jsonschema_rs.validator_for(part).is_valid
+
+    async def patch(request):
+        try:
+            right = request.content_type == "application/json" and takes(json.loads(await request.text()))
+        except ValueError:
+            right = False
+        return web.json_response({}) if right else error(422, "refused")
+
+    with small_device(document, {"/settings": {"PATCH": patch}}) as url:
+        seen = certified(f"{url}/openapi.json", tmp_path / "out", "--call", "*")
+
+    assert "description/optional" not in seen.blamed, seen.text

@@ -40,6 +40,8 @@ _LIST, _ONE = Operation("", "GET", "/jobs"), Operation("", "GET", "/jobs/{job_id
         {"allOf": [{"type": "object", "required": ["a"], "properties": {"a": {"const": 4}}}, {"required": ["c"]}]},
         {"oneOf": [{"type": "object", "required": ["k"], "properties": {"k": {"enum": ["x"]}}}, {"type": "array"}]},
         {"type": "object", "minProperties": 0, "additionalProperties": {"type": "string"}},
+        {"type": "object", "minProperties": 2, "properties": {"a": {}, "b": {"type": "integer"}, "c": {}}},
+        {"required": ["a"], "properties": {"a": {}, "b": {}}, "dependentRequired": {"a": ["b"]}},
     ],
 )  # fmt: skip
 def test_a_sample_fits_its_schema(schema):

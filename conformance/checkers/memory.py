@@ -1,0 +1,257 @@
+"""What became of things, by all reads of a run: what was deleted stays gone, what was created is there, writes last.
+
+A device may take a while, things may end and values may change by themselves, as a velocity that nobody renews does. So
+only what lasted for as long in another thing of the same collection has to last, and what is being changed is not
+judged.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from http import HTTPStatus
+from typing import Any, Final
+from urllib.parse import quote, unquote, urlsplit
+
+from conformance.api.rest.references import collections_of
+from conformance.api.rest.things import collection_of, differences, identified, is_marked_deleted, represented
+from conformance.checkers.occasion import Occasion
+from conformance.contract.pack import Contract
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
+from conformance.documents.parameters import plain_name
+from conformance.transport.exchange import Exchange
+from conformance.transport.reach import is_same, joined
+from conformance.verdict.case import Case
+
+# A device that writes later has so long, s.
+_SETTLES_S: Final = 3.0
+_ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
+_REFUSED: Final = range(400, 500)
+# Other clients and devices that answer from several processes: what differs counts when it is seen again.
+_SEEN: Final = 2
+_MOST_PENDING: Final = 20
+
+
+@dataclass
+class _Thing:
+    """One thing, by what this run did to it.
+
+    Attributes:
+        path: as it was written; of a device that knows case, another spelling is another thing.
+        last: the last request that changed it.
+        gone: whether that deleted it.
+        made: whether this run created it, and no read has shown it yet.
+        written: what it has to read, by member, with the operation that wrote it.
+        shown: the members that were read as written, with how much had been sent by then that may change something.
+        differs: how often a member was read in another way.
+    """
+
+    path: str
+    last: Exchange
+    gone: bool = False
+    made: bool = False
+    written: dict[str, tuple[Any, Operation]] = field(default_factory=dict)
+    shown: dict[str, int] = field(default_factory=dict)
+    differs: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+
+
+class Memory:
+    """Judges each read of a thing by what the run has created, written and deleted before.
+
+    Args:
+        contract: the description's.
+    """
+
+    def __init__(self, contract: Contract) -> None:
+        operations = operations_of(contract) if contract.openapi_path else ()
+        self._items = {
+            one.template.rstrip("/"): one
+            for one in operations
+            if one.method == "GET" and collection_of(one.template) and not one.parameter("query")
+        }
+        self._of_collections = {collection_of(template): one for template, one in self._items.items()}
+        self._actions = {one.template for one in operations if not self._items.keys().isdisjoint(_above(one.template))}
+        self._single = {one.template for one in operations if one.method == "GET"} - {
+            one.template for one in self._items.values()
+        }
+        self._collections = collections_of(operations)
+        self._things: dict[str, _Thing] = {}
+        self._acts = 0
+        # For how long something lasted by its value, s: things by their template, members by template and name.
+        self._lasted: dict[tuple[str, str], dict[str, float]] = defaultdict(lambda: defaultdict(float))
+        # What is a failure if something else lasts as long, with its age, s, and what was read instead.
+        self._pending: dict[tuple[str, str], list[tuple[float, str, Case]]] = defaultdict(list)
+
+    def forget(self) -> None:
+        """Forget all things: nobody knows what a request without a response has done."""
+        self._things.clear()
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        operation, method = occasion.operation, occasion.request.method
+        path = _path_in(occasion.context.target)
+        if method in SAFE:
+            item = self._items.get(operation.template.rstrip("/")) if operation is not None else None
+            if item is not None and method == "GET" and occasion.context.plain:
+                yield from self._read(occasion, item, path)
+            return
+        self._acts += 1
+        status = occasion.response.status
+        if status in _REFUSED:
+            return
+        item = self._items.get(operation.template.rstrip("/")) if operation is not None else None
+        made = self._of_collections.get(operation.template.rstrip("/")) if operation is not None else None
+        if operation is None or not occasion.response.ok:
+            self.forget()
+        elif item is not None and method in {"PUT", "PATCH", "DELETE"}:
+            self._changed(occasion, operation, path)
+        elif made is not None and method == "POST":
+            self._created(occasion, operation, made, path)
+        elif operation.template in self._actions:
+            # Its action may change it, and what is below it.
+            self._drop(lambda other: _is_below(path, other) or _is_below(other, path))
+        elif operation.template in self._single and method in {"PUT", "PATCH"}:
+            # Settings may change what things read, and neither create nor delete one.
+            for thing in self._things.values():
+                thing.written.clear()
+        else:
+            self.forget()
+
+    def _drop(self, concerns: Any) -> None:
+        self._things = {key: one for key, one in self._things.items() if not concerns(one.path)}
+
+    def _changed(self, occasion: Occasion, operation: Operation, path: str) -> None:
+        """Take a PUT, PATCH or DELETE of an item."""
+        self._drop(lambda other: other != path and (_is_below(other, path) or other.casefold() == path.casefold()))
+        before = self._things.pop(path.casefold(), None)
+        status = occasion.response.status
+        overlaps = before is not None and _sent_s(occasion) < before.last.response.received_s
+        if status == HTTPStatus.ACCEPTED or overlaps or not occasion.context.usual:
+            return
+        thing = _Thing(path, occasion.exchange, made=status == HTTPStatus.CREATED)
+        if occasion.request.method == "DELETE":
+            thing.gone = True
+        elif (body := _body_of(occasion, operation)) is not None:
+            if occasion.request.method == "PATCH" and before is not None and not before.gone:
+                thing.written, thing.shown = dict(before.written), dict(before.shown)
+            for name, value in body.items():
+                thing.written[name] = value, operation
+                thing.shown.pop(name, None)
+        self._things[path.casefold()] = thing
+
+    def _created(self, occasion: Occasion, operation: Operation, item: Operation, path: str) -> None:
+        """Take a POST to a collection."""
+        response = occasion.response
+        _, id_ = identified(read_json(response.body).value, item) if is_json(response.media_type) else ("", None)
+        location, target = response.header("location"), ""
+        if location is not None and is_same(joined(occasion.request.url, location), occasion.request.url):
+            base = occasion.request.url.removesuffix(occasion.context.target)
+            found = urlsplit(joined(occasion.request.url, location))
+            target = _path_in(found.path.removeprefix(urlsplit(base).path)) if not found.query else ""
+        elif id_ is not None and location is None:
+            target = _path_in(f"{path}/{quote(str(id_), safe='')}")
+        if not target or target.rpartition("/")[0] != path:
+            # It may be any of them.
+            self._drop(lambda other: _is_below(other, path))
+            return
+        self._things.pop(target.casefold(), None)
+        if response.status == HTTPStatus.CREATED:
+            body = _body_of(occasion, operation) or {}
+            written = {name: (value, operation) for name, value in body.items()}
+            self._things[target.casefold()] = _Thing(target, occasion.exchange, made=True, written=written)
+
+    def _read(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
+        thing = self._things.get(path.casefold())
+        response = occasion.response
+        if thing is None or thing.path != path:
+            return
+        age_s = _sent_s(occasion) - thing.last.response.received_s
+        if age_s < 0:
+            return  # it was sent before that
+        change = f"{thing.last.request.method} {urlsplit(thing.last.request.url).path}"
+        if thing.gone:
+            if response.ok and age_s > _SETTLES_S and not is_marked_deleted(read_json(response.body).value):
+                expected = f"status 404 or 410, {age_s:.0f} s after {change} was answered {thing.last.response.status}"
+                yield self._case("deleted-is-gone", occasion, expected, cause=item.label)
+            return
+        kept = item.template, ""
+        if response.status in _ABSENT and thing.made:
+            if age_s > _SETTLES_S:
+                expected = f"the thing that {change} has created {age_s:.0f} s before"
+                case = self._case("created-is-there", occasion, expected, cause=item.label)
+                yield from self._differs(kept, age_s, "none", case)
+        elif response.ok:
+            thing.made = False
+            yield from self._lasts(kept, age_s, "there")
+            yield from self._compared(occasion, item, thing, age_s)
+
+    def _lasts(self, kept: tuple[str, str], age_s: float, value: str) -> Iterator[Case]:
+        """Note for how long something has lasted; yield what should have lasted as well."""
+        ages = self._lasted[kept]
+        ages[value] = max(ages[value], age_s)
+        waiting = self._pending.pop(kept, [])
+        for age, seen, case in waiting:
+            if age <= age_s and seen != value:
+                yield case
+            else:
+                self._pending[kept].append((age, seen, case))
+
+    def _differs(self, kept: tuple[str, str], age_s: float, seen: str, case: Case) -> Iterator[Case]:
+        """Yield a case if another value lasted as long: not the one that is read now, to which they may all return."""
+        if any(age >= age_s for value, age in self._lasted[kept].items() if value != seen):
+            yield case
+        elif len(self._pending[kept]) < _MOST_PENDING:
+            self._pending[kept].append((age_s, seen, case))
+
+    def _compared(self, occasion: Occasion, item: Operation, thing: _Thing, age_s: float) -> Iterator[Case]:
+        """Judge whether the members of a thing read as they were written."""
+        value = read_json(occasion.response.body).value if is_json(occasion.response.media_type) else None
+        now = represented(value, {plain_name(name) for name in thing.written})
+        for name, (wanted, operation) in thing.written.items() if now else ():
+            schema = operation.bodies[next(iter(operation.bodies))].schema
+            other = next(differences({name: wanted}, now, schema, item.shape, self._collections), "")
+            kept = item.template, name
+            if not other:
+                thing.shown.setdefault(name, self._acts)
+                yield from self._lasts(kept, age_s, str(wanted))
+                continue
+            # It had been written, and something was sent since then; or it was never written.
+            was_lost = name in thing.shown and thing.shown[name] < self._acts
+            if was_lost or (name not in thing.shown and age_s > _SETTLES_S):
+                thing.differs[name] += 1
+                if thing.differs[name] >= _SEEN:
+                    when = "as it was read before" if was_lost else f"{age_s:.0f} s before"
+                    expected, cause = f"what {operation.label} wrote, {when}", f"{operation.label} {name}"
+                    case = self._case("written-is-read", occasion, expected, other, cause=cause)
+                    yield from self._differs(kept, age_s, str(now.get(name)), case)
+
+    @staticmethod
+    def _case(name: str, occasion: Occasion, expected: str, found: str = "", *, cause: str) -> Case:
+        return occasion.case(f"description/{name}", False, expected, found, cause=cause)  # noqa: FBT003
+
+
+def _above(template: str) -> Iterator[str]:
+    """Yield the paths that one is below."""
+    while template := template.rpartition("/")[0]:
+        yield template
+
+
+def _sent_s(occasion: Occasion) -> float:
+    return occasion.response.received_s - occasion.response.elapsed_ms / 1000
+
+
+def _path_in(target: str) -> str:
+    return unquote(target.partition("?")[0]).rstrip("/")
+
+
+def _is_below(path: str, other: str) -> bool:
+    return path.startswith(f"{other}/")
+
+
+def _body_of(occasion: Occasion, operation: Operation) -> dict[str, Any] | None:
+    """Return the object that a request has written; None if it is another content, or one that is not allowed."""
+    is_first = occasion.request.media_type == next(iter(operation.bodies), None)
+    value = read_json(occasion.request.body).value if is_first and is_json(occasion.request.media_type) else None
+    return value if isinstance(value, dict) and occasion.is_valid else None

@@ -1,0 +1,182 @@
+"""What was written, created or deleted: a device that forgets is blamed, and none whose things change or end."""
+
+import json
+
+import pytest
+from small_device import answers, described
+
+from conformance.checkers.rest import RestCheckers
+from conformance.contract.described import write_described_pack
+from conformance.contract.pack import Contract
+from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
+
+BASE = "http://device:8000/api"
+_MEMBERS = {
+    "id": {"type": "string"}, "name": {"type": "string"}, "rank": {"type": "integer"}, "state": {"type": "string"},
+}  # fmt: skip
+_JOB = {"type": "object", "properties": _MEMBERS}
+_BODY = {"required": True, "content": {"application/json": {"schema": _JOB}}}
+_ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
+_OK = {"200": answers(_JOB), "201": answers(_JOB), "204": {"description": "done"}, "4XX": {"description": "refused"}}
+_PATHS = {
+    "/jobs": {"post": {"requestBody": _BODY, "responses": _OK}},
+    "/jobs/{id}": {
+        "parameters": [_ID],
+        "get": {"responses": _OK},
+        "put": {"requestBody": _BODY, "responses": _OK},
+        "patch": {"requestBody": _BODY, "responses": _OK},
+        "delete": {"responses": _OK},
+    },
+    "/jobs/{id}/cancel": {"parameters": [_ID], "post": {"responses": _OK}},
+    "/reset": {"post": {"responses": _OK}},
+    "/mode": {"get": {"responses": _OK}, "put": {"requestBody": _BODY, "responses": _OK}},
+}
+GONE, THERE, READ = (
+    f"description/{name}" for name in ("deleted-is-gone", "created-is-there", "written-is-read")
+)  # fmt: skip
+
+
+def _job(id_, name="a", rank=1, **more):
+    return {"id": id_, "name": name, "rank": rank, **more}
+
+
+def _post(id_, status=201, **values):
+    return "POST", "/jobs", {"name": "a", "rank": 1, **values}, status, _job(id_, **values)
+
+
+def _put(id_, status=200, **values):
+    return "PUT", f"/jobs/{id_}", {"name": "a", "rank": 1, **values}, status, _job(id_, **values)
+
+
+def _patch(id_, status=200, **values):
+    return "PATCH", f"/jobs/{id_}", values, status, _job(id_, **values)
+
+
+def _get(id_, status=200, **values):
+    return "GET", f"/jobs/{id_}", None, status, _job(id_, **values)
+
+
+def _delete(id_, status=204):
+    return "DELETE", f"/jobs/{id_}", None, status, None
+
+
+_REFUSED = ("PATCH", "/jobs/9", {"rank": "x"}, 400, None)
+_RESET = ("POST", "/reset", None, 204, None)
+_MODE = ("PUT", "/mode", {"name": "home"}, 200, {"name": "home"})
+_CANCEL = ("POST", "/jobs/1/cancel", None, 200, _job("1"))
+_LOST = ("DELETE", "/jobs/2", None, None, None)
+# Another thing whose name and rank read as written for ten seconds.
+_LASTING = [_put("8", rank=5, name="c"), 10.0, _get("8", rank=5, name="c")]
+#: What is sent, one second after each other or after so many, and the requirement that is broken.
+BROKEN = {
+    "deleted, and read": ([_delete("1"), 5.0, _get("1")], GONE),
+    "deleted after an action": ([_post("1"), _CANCEL, _delete("1"), 4.0, _get("1")], GONE),
+    "deleted, and another one created": ([_delete("1"), _post("2"), 3.0, _get("1")], GONE),
+    "created, and never there": ([*_LASTING, _post("1"), 4.0, _get("1", 404)], THERE),
+    "created, and another one lasts": ([_post("1"), _post("8"), 4.0, _get("1", 404), _get("8")], THERE),
+    "created, and the mode was set": ([*_LASTING, _post("1"), _MODE, 4.0, _get("1", 404)], THERE),
+    "created after a refusal": ([*_LASTING, _REFUSED, _post("1"), 4.0, _get("1", 410)], THERE),
+    "created under a name of the client's": ([*_LASTING, _put("1", 201), 4.0, _get("1", 404)], THERE),
+    "lost after another's creation": (
+        [*_LASTING, _put("1", rank=7), _get("1", rank=7), _post("2"), _get("1"), _get("1")], READ,
+    ),
+    "lost after a refusal": (
+        [*_LASTING, _patch("1", rank=7), _get("1", rank=7), _REFUSED, _get("1", rank=3), _get("1", rank=3)], READ,
+    ),
+    "never written": ([*_LASTING, _patch("1", name="b"), 5.0, _get("1"), _get("1")], READ),
+    "one member of a PATCH before": (
+        [
+            *[*_LASTING, _patch("1", name="b"), _get("1", name="b"), _patch("1", rank=2)],
+            *[_get("1", rank=2), _get("1", rank=2)],
+        ],
+        READ,
+    ),
+}  # fmt: skip
+#: The same for right devices.
+RIGHT = {
+    "deleted a moment ago": [_delete("1"), _get("1"), _get("1", 404)],
+    "deleted, and marked so": [_delete("1"), 5.0, _get("1", deleted=True), _get("1", state="archived")],
+    "deleted, and put again": [_delete("1"), _put("1", 201), 5.0, _get("1")],
+    "deleted, and put in another case": [_delete("a"), _put("A", 201), 5.0, _get("a")],
+    "deleted, and created again": [_delete("1"), _post("1"), 5.0, _get("1")],
+    "deleted, and all is as before": [_delete("1"), _RESET, 5.0, _get("1")],
+    "deleted, and brought back": [_delete("1"), _CANCEL, 5.0, _get("1")],
+    "deleted, and a request got lost": [_delete("1"), _LOST, 5.0, _get("1")],
+    "a refused DELETE": [_delete("1", 409), 5.0, _get("1")],
+    "a DELETE for later": [_delete("1", 202), 5.0, _get("1")],
+    "things that end": [_post("8"), _get("8"), _post("1"), 9.0, _get("1", 404)],
+    "created, and deleted": [*_LASTING, _post("1"), _delete("1"), 5.0, _get("1", 404)],
+    "created, and reset": [*_LASTING, _post("1"), _RESET, 5.0, _get("1", 404)],
+    "created for later": [*_LASTING, _post("1", 202), 5.0, _get("1", 404)],
+    "a name is normalized": [*_LASTING, _put("1", name="A b"), 5.0, _get("1", name="a  B")],
+    "a value that expires": [
+        *[_put("1", rank=7), _get("1", rank=7), 3.0, _REFUSED, _get("1", rank=0), _get("1", rank=0)],
+        *[_put("2", rank=7), _get("2", rank=7), 3.0, _REFUSED, _get("2", rank=0), _get("2", rank=0)],
+    ],
+    "a value that expires, where zero lasts": [
+        *[_put("8", rank=0), 10.0, _get("8", rank=0), _put("1", rank=7), _get("1", rank=7), 3.0, _REFUSED],
+        *[_get("1", rank=0), _get("1", rank=0)],
+    ],
+    "a value that another operation changes": [
+        *_LASTING, _put("1", rank=7), _get("1", rank=7), _RESET, _get("1", rank=0), _get("1", rank=0),
+    ],
+    "a value that a mode changes": [
+        *_LASTING, _put("1", rank=7), _get("1", rank=7), _MODE, _get("1", rank=0), _get("1", rank=0),
+    ],
+    "a value that its action changes": [
+        *_LASTING, _put("1", rank=7), _get("1", rank=7), _CANCEL, _get("1", rank=0), _get("1", rank=0),
+    ],
+    "a value of the device's": [
+        *[_post("8", state="new"), 10.0, _get("8", state="new"), _post("1", state="new"), _get("1", state="new")],
+        *[_post("2"), _get("1", state="done"), _get("1", state="done")],
+    ],
+    "once, by another process": [
+        *_LASTING, _put("1", rank=7), _get("1", rank=7), _post("2"), _get("1"), _get("1", rank=7),
+    ],
+    "written by a PUT after it": [
+        *_LASTING, _patch("1", name="b"), _get("1", name="b"), _put("1"), _get("1"), _get("1"),
+    ],
+    "written at the same time": [
+        *[*_LASTING, _put("1", rank=7), 0.0, _put("1", rank=3), _get("1", rank=7), 5.0],
+        *[_get("1", rank=7), _get("1", rank=7)],
+    ],
+}  # fmt: skip
+
+
+@pytest.fixture(name="contract", scope="module")
+def _contract(tmp_path_factory):
+    document = described(_PATHS, "3.1.0")
+    return Contract.load(write_described_pack(tmp_path_factory.mktemp("pack"), document, document))
+
+
+def _broken(contract, steps):
+    """Return what is broken in exchanges of 10 ms each, one second after each other."""
+    checkers, now, after, broken = RestCheckers(contract, BASE), 1000.0, 1.0, set()
+    for step in steps:
+        if isinstance(step, float):
+            after = step
+            continue
+        method, path, sent, status, seen = step
+        now, after = now + after, 1.0
+        fields = [("Host", "device:8000"), *([("Content-Type", "application/json")] if sent else [])]
+        request = Request(method, BASE + path, tuple(fields), json.dumps(sent).encode() if sent else b"")
+        body = b"" if seen is None or status in {204, 404} else json.dumps(seen).encode()
+        content = (("Content-Type", "application/json"),) if body else ()
+        attempt = (
+            Unanswered(request, NoAnswer.TIMEOUT, "no response")
+            if status is None
+            else Exchange(request, Response(status, content, body, 10.0, received_s=now))
+        )
+        broken |= {case.requirement for case in checkers(attempt) if not case.holds}
+    return broken & {GONE, THERE, READ}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_device_that_forgets_is_blamed(contract, name):
+    steps, requirement = BROKEN[name]
+    assert _broken(contract, steps) == {requirement}
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_a_device_whose_things_change_or_end_is_not_blamed(contract, name):
+    assert _broken(contract, RIGHT[name]) == set()
