@@ -18,8 +18,9 @@ from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
 from conformance.verdict.case import Case
 
-# So many values that items had are remembered, and so many items of a list are compared with each other.
+# So many values that items had, and that a filter was asked for, are remembered; so many items are compared.
 _REMEMBERED: Final = 50_000
+_ASKED: Final = 1000
 _COMPARED: Final = 60
 # By these a client may ask for a value or more, as logs are filtered; by these it may ask for more items, not for these
 # alone, where the value is true.
@@ -84,8 +85,8 @@ class Lists:
             yield occasion.case(
                 "description/list-filter",
                 not wrong,
-                f"items whose {name} is {text}, which the parameter {parameter.name} asks for",
-                f"an item whose {name} is {', '.join(wrong)}",
+                f"items with {text}, which the parameter {parameter.name} asks for",
+                f"an item with {', '.join(wrong)}",
                 cause=f"{listing.operation.label} {parameter.name}",
             )
 
@@ -106,9 +107,9 @@ class Lists:
                 return others[:1] if min(ranks, default=0) < 0 < max(ranks, default=0) else []
             return others[:1] if values else None
         # What a text or number chooses shows only in pairs: one with the other's items, and the other with this one's.
-        if len(asked) != 1 or not values or len(self._others) > _REMEMBERED:
-            return None
         found = self._others[listing.operation.label, name]
+        if len(asked) != 1 or not values or len(found) > _ASKED:
+            return None
         found[asked[0]].update(others[:_COMPARED])
         return [one for one in others if asked[0] in found.get(one, ())][:1]
 
@@ -139,7 +140,7 @@ class Lists:
         yield occasion.case(
             "description/list-order",
             not wrong,
-            f"items in {way}order of {sorting.member}, which {text} as the parameter {sort.name} asks for",
+            f"items in {way}order by {text}, which the parameter {sort.name} asks for",
             f"{text_of(wrong[0][0])} before {text_of(wrong[0][1])}" if wrong else "",
             cause=f"{listing.operation.label} {sorting.member}",
         )

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from conformance.api.rest.listing import COUNTS, Listing, Page, number_of
 from conformance.checkers.occasion import Occasion
+from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.verdict.case import Case
 
@@ -20,6 +21,32 @@ _OFTEN: Final = 2
 _CUTS: Final = (5, 16)
 _FEWEST_CUT: Final = 10
 _CAP: Final = 50
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A part of a list in a response.
+
+    Attributes:
+        occasion: the exchange.
+        page: what it shows.
+        offset: how many items are before it.
+        plain: whether no filter was asked for.
+        whole: whether it goes to the end.
+        sure: whether it does so for certain: no server has cut it at a bound of its own.
+    """
+
+    occasion: Occasion
+    page: Page
+    offset: int
+    plain: bool
+    whole: bool
+    sure: bool
+
+    @property
+    def least(self) -> int:
+        """How many items there are at least."""
+        return self.offset + len(self.page.items)
 
 
 @dataclass
@@ -34,6 +61,7 @@ class _Count:
         last: what identified the items of the last whole list that it agreed with.
         wrong_since_s: when it was wrong first after that; 0: it was not.
         times: how often it was wrong while nothing changed.
+        other: the parts of the list, since it agreed last, that tell another total.
     """
 
     agrees: bool | None = None
@@ -43,23 +71,34 @@ class _Count:
     last: frozenset[str] = frozenset()
     wrong_since_s: float = 0.0
     times: int = 0
+    other: list[tuple[Occasion, int]] = field(default_factory=list)
 
-    def learn(self, total: int, least: int, *, plain: bool, sure: bool) -> None:
+    def learn(self, total: int, part: _Part) -> None:
         """Note what a total means beside the end of a list; where a server may have cut it, only what agrees counts."""
-        if plain and self.agrees is None and (sure or total == least):
-            self.agrees = total == least
-        if plain and total == least:
+        agrees = total == part.least
+        if part.plain and self.agrees is None and (part.sure or agrees):
+            self.agrees = agrees
+        if part.plain and agrees:
             self.all = total
-        elif not plain and least < self.all and self.by_filter is None and sure:
-            self.by_filter = total == least
+        elif not part.plain and part.least < self.all and self.by_filter is None and part.sure:
+            self.by_filter = agrees
 
-    def is_sure(self, page: Page, now_s: float, changed_s: float, *, whole: bool) -> bool:
+    def is_sure(self, part: _Part, changed_s: float) -> bool:
         """Note a wrong total; return whether no change that is under way explains it."""
+        now_s, shown = part.occasion.response.received_s, frozenset(part.page.identities)
         self.wrong_since_s = self.wrong_since_s or now_s
-        shown = frozenset(page.identities)
-        if now_s - changed_s >= SETTLES_S and (shown == self.last or (not whole and shown <= self.last)):
-            self.times += 1
+        is_same = shown == self.last if part.whole and not part.offset else shown <= self.last
+        self.times += is_same and now_s - changed_s >= SETTLES_S
         return self.times >= _OFTEN or now_s - self.wrong_since_s >= SETTLES_S
+
+    def agreed(self, page: Page, changed_s: float) -> Iterator[tuple[Occasion, int]]:
+        """Note the whole list that it agrees with; yield the parts that told another total, if the list is the same."""
+        self.wrong_since_s, before, self.last = 0.0, self.last, frozenset(page.identities)
+        if self.last == before:
+            told = [one for one in self.other if one[0].response.received_s - changed_s >= SETTLES_S]
+            self.times += len(told)
+            yield from told if self.times >= _OFTEN else ()
+        self.other.clear()
 
 
 class Totals:
@@ -85,26 +124,34 @@ class Totals:
         plain = sent.keys().isdisjoint(one.name for one in listing.filters.values())
         most = listing.most(sent)
         whole = not page.goes_on and (not most or shown < most) and (shown > 0 or offset == 0)
+        sure = whole and not self._is_cut(listing, shown, sent)
+        part = _Part(occasion, page, offset, plain=plain, whole=whole, sure=sure)
         for name, total in page.totals.items():
             count = self._counts[label, name]
-            least, sure = offset + shown, whole and not self._is_cut(listing, shown, sent)
             count.is_of_all |= total > shown > 0
             if whole and shown:
-                count.learn(total, least, plain=plain, sure=sure)
-            if not count.agrees or not (plain or count.by_filter):
-                continue
-            if name in COUNTS and (total == shown or not (count.is_of_all or total < shown)):
-                continue
-            if (shown and total < least and not _is_cap(total)) or (sure and total != least):
-                if count.is_sure(page, occasion.response.received_s, self._changed_s, whole=whole and offset == 0):
-                    expected = (
-                        f"{'' if sure else 'at least '}{least} as {name}, by the offset and the items that are shown"
-                    )
-                    yield _case(occasion, name, f"{total} as {name}", expected, holds=False)
-            elif whole and total == least:
-                if plain and offset == 0:
-                    count.last, count.wrong_since_s = frozenset(page.identities), 0.0
-                yield _case(occasion, name, "", "the number of items that are shown", holds=True)
+                count.learn(total, part)
+            if count.agrees and (plain or count.by_filter):
+                yield from self._judged(count, part, name, total)
+
+    def _judged(self, count: _Count, part: _Part, name: str, total: int) -> Iterator[Case]:
+        """Yield the cases of one total whose meaning is known."""
+        shown, least = len(part.page.items), part.least
+        is_of_page = plain_name(name) in COUNTS and not count.is_of_all and total >= shown
+        if part.whole and total == least:
+            for one, told in count.agreed(part.page, self._changed_s) if part.plain and not part.offset else ():
+                expected = f"{total} as {name}, as the whole list tells before and after"
+                yield _case(one, name, f"{told} as {name}", expected, holds=False)
+            yield _case(part.occasion, name, "", "the number of items that are shown", holds=True)
+        elif is_of_page:
+            return
+        elif (shown and total < least and not _is_cap(total)) or (part.sure and total != least):
+            if count.is_sure(part, self._changed_s):
+                number = f"{'' if part.sure else 'at least '}{least}"
+                expected = f"{number} as {name}, by the offset and the items that are shown"
+                yield _case(part.occasion, name, f"{total} as {name}", expected, holds=False)
+        elif part.plain and not part.whole and shown and count.is_of_all and total != count.all:
+            count.other.append((part.occasion, total))
 
     def _is_cut(self, listing: Listing, shown: int, sent: Mapping[str, str]) -> bool:
         """Return whether a server may have cut a list at its own bound: a round number that no list exceeded."""

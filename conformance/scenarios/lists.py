@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -40,6 +41,10 @@ _FEWEST: Final = 2
 # So far beyond the end a part of a list is asked for, as far as the schema allows.
 _BEYOND: Final = (1000, 100, 10, 1)
 _DEPTH: Final = 3
+# Plain names of members that have a link to the next page, or the cursor of it.
+_NEXT: Final = re.compile(
+    r"next(?:page)?(?:cursor|token|marker|link|url|href|key|after|id)?|end(?:cursor|token)|continuationtoken"
+)
 
 
 @dataclass(frozen=True)
@@ -148,7 +153,9 @@ class Reader:
         inputs = self.usual
         for name, value in {**self.always, **(query or {})}.items():
             inputs = inputs.having("query", name, value)
-        return written(self.listing.operation, inputs).send(self.api)
+        # A device may answer on a new connection in another way.
+        is_odd = len(query or {}) % 2 == 1
+        return written(self.listing.operation, inputs).send(self.api, fresh=is_odd)
 
     def refused(self) -> None:
         """Send an invalid request, after which the valid ones have to be answered as before."""
@@ -187,12 +194,13 @@ def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]
     few = next((one for one in (2, 1) if fitting(listing.limit, one)), None)
     part = {listing.limit.name: few} if listing.limit is not None and few is not None else {}
     later = {listing.offset.name: 1} if listing.offset is not None and fitting(listing.offset, 1) else {}
+    sorts = {listing.sort.name: rows[-1][listing.sort.name]} if listing.sort is not None and listing.sortings else {}
     for number, row in enumerate(rows or [{}]):
         yield row
         if part and number % 2 == 0:
             yield {**row, **part}
-        elif later:
-            yield {**row, **part, **later}
+        elif later or part:
+            yield {**sorts, **row, **part, **later}
 
 
 def _choices(parameter: Parameter, name: str, page: Page) -> list[Any]:
@@ -368,9 +376,7 @@ def _following(value: Any, depth: int, *, said: bool) -> Iterator[str]:
     """Yield the texts and numbers below members whose names tell of a next page."""
     if isinstance(value, dict) and depth <= _DEPTH:
         for name, one in value.items():
-            yield from _following(
-                one, depth + 1, said=said or "next" in name.lower() or plain_name(name) == "endcursor"
-            )
+            yield from _following(one, depth + 1, said=said or bool(_NEXT.fullmatch(plain_name(name))))
     elif isinstance(value, tuple):
         for one in value:
             yield from _following(one, depth, said=said)

@@ -161,7 +161,7 @@ class Page:
 
     Attributes:
         items: its items.
-        totals: how many items there are, by the plain name of each member and header that tells it.
+        totals: how many items there are, by the name of each member and header that tells it.
         goes_on: whether the response has something like a link to the next page.
         around: the objects that stand around the list, from outside.
     """
@@ -239,16 +239,14 @@ def page_of(response: Response) -> Page | None:
         around.append({key: one for key, one in inner.items() if key != name})
         inner = inner[name]
     beside = [one for part in around for one in (part, *part.values()) if isinstance(one, dict)]
-    totals = {
-        plain: one
-        for part in reversed(beside)
-        for name, one in part.items()
-        if (plain := plain_name(name)) in TOTALS | COUNTS and isinstance(one, int) and not isinstance(one, bool)
-    }
+    totals: dict[str, int] = {}
+    for part in reversed(beside):
+        totals |= {key: one for key, one in part.items() if plain_name(key) in TOTALS | COUNTS and type(one) is int}
     for name in _HEADERS:
-        totals |= {plain_name(name): int(one) for one in [response.header(name) or ""] if one.strip().isdecimal()}
+        if (told := (response.header(name) or "").strip()).isdecimal():
+            totals[name] = int(told)
     if within := _RANGE.fullmatch(response.header("content-range") or ""):
-        totals["contentrange"] = int(within[1])
+        totals["content-range"] = int(within[1])
     links = [response.header("link") or ""]
     names = [name for part in beside for name, one in part.items() if one not in (None, "", False)]
     goes_on = any(_NEXT.search(one) for one in (*links, *names))
@@ -284,7 +282,7 @@ def listing_of(operation: Operation) -> Listing | None:
         limit,
         next((counts[name] for name in _OFFSETS if name in counts), None),
         next((counts[name] for name in _PAGES if name in counts), None),
-        next((free[name] for name in _CURSORS if name in free and name not in counts), None),
+        next((one for name in _CURSORS if (one := free.get(name)) and "format" not in flat(one.schema)), None),
         sorts[0] if len(sorts) == 1 else None,
         next(iter(directions.values())) if len(directions) == 1 else None,
         len(directions) > 1 or not _REVERSING.isdisjoint(query),

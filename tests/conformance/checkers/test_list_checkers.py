@@ -268,6 +268,22 @@ def test_a_header_and_a_filtered_total_are_judged_alike(tmp_path):
     assert seen.broken == {TOTAL}
 
 
+def test_a_total_that_is_wrong_beside_a_part_is_noticed(tmp_path):
+    for name in ("total", "count"):
+        seen = Seen(tmp_path / name, [_whole("limit"), _whole("offset")], _totalled(name)).read(VALVES)
+        for number in (4, 5, 4, 3):
+            assert not seen.broken
+            seen.read(VALVES[:2], body={"items": VALVES[:2], name: number}, limit=2).read(VALVES)
+        assert seen.broken == {TOTAL}
+
+
+def _changed_beside(seen):
+    for number in range(5):
+        seen.read(VALVES[:3]).read(VALVES[:1], body={"items": VALVES[:1], "total": 3}, limit=1)
+        seen.write().read(VALVES[:1], body={"items": VALVES[:1], "total": 4}, limit=1).write()
+        seen.read(VALVES[: 3 + number % 2])
+
+
 def _page_count(seen):
     seen.read(VALVES).read(VALVES[2:], offset=2).read(VALVES[:1], limit=1).read(VALVES[1:2], limit=1, offset=1)
 
@@ -325,6 +341,7 @@ def _beyond(seen):
     ("name", "play"),
     [
         ("count", _page_count),
+        ("total", _changed_beside),
         ("total", _all_unfiltered),
         ("total", _estimated),
         ("total", _capped),
