@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 from conformance.documents.json_schema import Schema, kinds_of, shape_of
@@ -180,20 +182,24 @@ def _text(schema: Schema) -> str:
     plain = ("roaas" if length <= len("roaas") <= schema.get("maxLength", 5) else "a" * length)[: 1 << 16]
     if "pattern" not in schema or fits(schema, plain):
         return plain
-    return _matching(schema) or plain
+    return _matching(json.dumps(schema, default=str)) or plain
 
 
-def _matching(schema: Schema) -> str:
-    """Return a short text that fits the schema's pattern, or empty."""
-    from hypothesis import find, settings  # noqa: PLC0415 - few schemas have a pattern
+@lru_cache(maxsize=1024)
+def _matching(encoded: str) -> str:
+    """Return a short text that fits the pattern of a schema, given as JSON; or empty."""
+    from hypothesis import Phase, find, settings  # noqa: PLC0415 - few schemas have a pattern
     from hypothesis.errors import HypothesisException  # noqa: PLC0415 - as above
     from hypothesis.strategies import from_regex  # noqa: PLC0415 - as above
 
+    schema = json.loads(encoded)
     pattern = for_python(str(schema["pattern"]))
     if pattern is None:
         return ""
     try:
-        quiet = settings(database=None, derandomize=True, max_examples=200)
+        # Hypothesis would explain for seconds why a text is the shortest one.
+        phases = (Phase.generate, Phase.shrink)
+        quiet = settings(database=None, derandomize=True, max_examples=200, phases=phases)
         return find(from_regex(pattern), lambda text: fits(schema, text) and text.isprintable(), settings=quiet)
     except (HypothesisException, re.error, ValueError):
         return ""
