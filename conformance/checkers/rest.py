@@ -6,6 +6,7 @@ from typing import Final
 from conformance.api.rest.request_context import RequestContext
 from conformance.checkers import conditional, content, declared, fields, problem, refusals
 from conformance.checkers.entity_tags import EntityTags
+from conformance.checkers.identities import Identities
 from conformance.checkers.lists import Lists
 from conformance.checkers.memory import Memory
 from conformance.checkers.occasion import Occasion
@@ -37,7 +38,7 @@ class RestCheckers:
         self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
         # These know what the run has shown so far; the second ones judge described devices alone.
         self._memory = Memory(contract) if contract.described else None
-        described = (Lists(), Resources(), EntityTags(), Texts(), self._memory) if self._memory is not None else ()
+        described = (Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory) if self._memory else ()
         self._over_time = (conditional.Conditional(), *described)
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:

@@ -16,7 +16,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import listed
 from conformance.api.rest.samples import fits
 from conformance.api.rest.statuses import HELD, held_text
-from conformance.api.rest.things import collection_of, identified
+from conformance.api.rest.things import collection_of, identified, identifier_of
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, operations_of
@@ -33,8 +33,8 @@ from conformance.transport.reach import is_same, joined, path_of
 
 # So many things of a collection are created: where nothing deletes them, at quick, and at the other efforts.
 _KEPT, _FEW, _MANY = 2, 3, 20
-# As many times an exploration's time the looks at one collection take.
-_BUDGETS: Final = 3
+# As many times an exploration's time the looks at one collection may take; less where a device is slow.
+_BUDGETS, _SLOW_BUDGETS = 10, 3
 # So many operations of things are called.
 _ACTIONS: Final = 3
 # A thing is left alone for at most so long, s.
@@ -102,7 +102,8 @@ class _Cycle:
 
     def __post_init__(self) -> None:
         lister = self.operations.get(("GET", collection_of(self.read.template)))
-        until = time.monotonic() + _BUDGETS * self.writer.api.run.effort.budget_s
+        effort = self.writer.api.run.effort
+        until = time.monotonic() + (_SLOW_BUDGETS if effort.slow else _BUDGETS) * effort.budget_s
         self.living = Living(self.writer, self.read, lister, until)
         self.item = self.read.template.rstrip("/")
         changes = (self.operations.get((name, self.item)) for name in ("PUT", "PATCH"))
@@ -139,13 +140,12 @@ class _Cycle:
 
     def _create_all(self, count: int) -> None:
         """Create things; after each, the others are read. The last one but few comes after a change and a refusal."""
-        until = time.monotonic() + self.writer.api.run.effort.budget_s
         for turn in range(count):
             if turn == max(1, min(2, count - 1)):
                 self._change(self.living.things[0], 0)
                 if self.create.method == "POST" and not self.living.is_over:
                     refuse_creation(self.living, self.create, _REFUSED + 2 * self.round)
-            if time.monotonic() > until or not self._create(count * self.round + turn):
+            if self.living.is_over or not self._create(count * self.round + turn):
                 break
             thing = self.living.things[-1]
             self.living.look(thing.life.created, self.create.label, thing)
@@ -317,7 +317,7 @@ class _Cycle:
             return set(self.living.listing.ids)
         listing = self.writer.send(self.living.lister)
         items = listed(read_json(listing.response.body).value) or []
-        ids = {str(identified(one, self.read)[1]).casefold() for one in items if isinstance(one, dict)}
+        ids = {identifier_of(one, self.read) for one in items if isinstance(one, dict)}
         return ids if listing.response.ok else None
 
     def _paths(self, created: Exchange, id_: str) -> list[str]:

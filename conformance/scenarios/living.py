@@ -40,7 +40,6 @@ class Kind(StrEnum):
     KEPT = "kept"  # what was written reads otherwise later
     GONE = "gone"  # what was deleted is back, or still listed
     REFUSED = "refused"  # a refused request has changed something
-    CONDITION = "condition"  # a request whose condition does not hold has
 
 
 @dataclass(frozen=True)
@@ -145,7 +144,6 @@ class Living:
         things: all of them.
         looks: what was seen.
         listing: the last reading of the list, or None.
-        evaluates: whether the device has refused a condition that does not hold.
     """
 
     writer: Writer
@@ -155,7 +153,6 @@ class Living:
     things: list[Thing] = field(default_factory=list)
     looks: list[Look] = field(default_factory=list)
     listing: WholeList | None = None
-    evaluates: bool = False
     _shown: bool = False
 
     @property

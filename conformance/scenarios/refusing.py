@@ -17,8 +17,6 @@ from conformance.scenarios.living import ABSENT, Kind, Living, Look, State, Thin
 from conformance.scenarios.writing import members
 from conformance.transport.exchange import Exchange
 
-# Every current entity tag differs from this one.
-_NO_TAG: Final = (("If-Match", '"roaas"'),)
 # A proxy may have sent 408 after the device has acted; 406 is about the response.
 _UNCLEAR: Final = frozenset({HTTPStatus.NOT_ACCEPTABLE, HTTPStatus.REQUEST_TIMEOUT})
 _ERRORS: Final = range(400, 500)
@@ -54,46 +52,25 @@ def half_valid(living: Living, operation: Operation, turn: int, now: dict[str, A
 def refuse_changes(living: Living, change: Operation, thing: Thing, turn: int) -> None:
     """Send requests that should be refused to a thing, and read it after each."""
     writer = living.writer
-    for step, kind in ((0, Kind.CONDITION), (1, Kind.REFUSED)):
-        valid = next(iter(writer.bodies(change, turn + _STEP * step, members(thing.last, ()))), None)
-        if valid is not None:
-            is_condition = kind is Kind.CONDITION
-            sent = writer.send(
-                change,
-                thing.path,
-                valid,
-                headers=_NO_TAG if is_condition else (),
-                media_type="" if is_condition else _TEXT,
-            )
-            _look(living, thing, change, sent, kind)
-    for body in half_valid(living, change, turn + 2 * _STEP, members(thing.last, ())):
+    valid = next(iter(writer.bodies(change, turn, members(thing.last, ()))), None)
+    if valid is not None:
+        _look(living, thing, change, writer.send(change, thing.path, valid, media_type=_TEXT))
+    for body in half_valid(living, change, turn + _STEP, members(thing.last, ())):
         _look(living, thing, change, writer.send(change, thing.path, body))
 
 
 def refuse_deletion(living: Living, delete: Operation, thing: Thing, absent: str) -> None:
-    """Send a DELETE whose condition does not hold, and one of a thing that does not exist; read the thing."""
-    writer = living.writer
-    if thing.last.response.header("etag") and thing.state is State.ALIVE:
-        sent = writer.send(delete, thing.path, headers=_NO_TAG)
-        if not is_refused(sent):
-            if sent.response.ok and living.evaluates:
-                expected = "status 412, as for another method with an If-Match that names no current entity tag"
-                living.note(Kind.CONDITION, delete.label, sent, expected, f"status {sent.response.status}", thing)
-            thing.state = State.UNKNOWN
-            return
-        _look(living, thing, delete, sent, Kind.CONDITION)
-    if absent and writer.send(living.read, absent).response.status in ABSENT:
-        _look(living, thing, delete, writer.send(delete, absent))
+    """Send a DELETE of a thing that does not exist, and read another thing."""
+    if absent and living.writer.send(living.read, absent).response.status in ABSENT:
+        _look(living, thing, delete, living.writer.send(delete, absent))
 
 
-def _look(living: Living, thing: Thing, operation: Operation, sent: Exchange, kind: Kind = Kind.REFUSED) -> None:
+def _look(living: Living, thing: Thing, operation: Operation, sent: Exchange) -> None:
     """Read a thing after a request that should be refused; one that was accepted has written it."""
     if thing.state is not State.ALIVE:
         return
     if is_refused(sent):
-        is_condition = kind is Kind.CONDITION and sent.response.status == HTTPStatus.PRECONDITION_FAILED
-        living.evaluates |= is_condition
-        living.check(thing, sent, operation.label, Kind.CONDITION if is_condition else Kind.REFUSED)
+        living.check(thing, sent, operation.label, Kind.REFUSED)
     elif operation.bodies:
         living.remember(thing, living.writer.read_back(operation, living.read, thing.path, sent), operation)
 

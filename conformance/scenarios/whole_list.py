@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
+from urllib.parse import quote
 
+from conformance.api.rest.applicable import allowed
 from conformance.api.rest.listing import Page, listing_of, page_of
-from conformance.api.rest.things import identified
-from conformance.documents.openapi import Operation
+from conformance.api.rest.things import collection_of, identified, identifier_of
+from conformance.documents.openapi import Operation, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.writing import json_text
 from conformance.scenarios.lists import cursors
 from conformance.scenarios.writing import Writer
-from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Exchange, NoAnswerError
 
 _PAGES: Final = 5
 _LIMITS: Final = frozenset({"limit", "pagesize", "perpage", "size", "maxresults", "pagelimit"})
@@ -73,7 +76,7 @@ def read_whole(writer: Writer, lister: Operation, item: Operation, path: str) ->
             break
         exchange = writer.send(lister, path, query=query)
     items = tuple(one for one in found if isinstance(one, dict))
-    ids = tuple(str(identified(one, item)[1]).casefold() for one in items)
+    ids = tuple(identifier_of(one, item) for one in items)
     equal = Counter((id_, json_text(one)) for id_, one in zip(ids, items, strict=True) if id_)
     return WholeList(exchange, ids, frozenset(key[0] for key, count in equal.items() if count > 1), items, is_whole)
 
@@ -108,3 +111,25 @@ def _seems_cut(lister: Operation, page: Page) -> bool:
     return bool(count) and (
         count in {most, *(one for one in said if isinstance(one, int))} or (count >= _FEWEST and count % _ROUND == 0)
     )
+
+
+def read_items(writer: Writer) -> None:
+    """Read the first, the middle and the last item of each list, and the first one again."""
+    operations = {
+        (one.method, one.template.rstrip("/")): one
+        for one in operations_of(writer.api.run.contract)
+        if allowed(writer.api, one)
+    }
+    for (method, path), item in operations.items():
+        lister = operations.get(("GET", collection_of(path)))
+        if method != "GET" or lister is None or len(item.parameter("path")) > 1:
+            continue
+        writer.api.run.limit.check()
+        with suppress(NoAnswerError):  # the survey tells what breaks a connection
+            page = page_of(writer.send(lister).response)
+            ids = [identified(one, item)[1] for one in page.items if isinstance(one, dict)] if page is not None else []
+            ids = [one for one in ids if one is not None]
+            chosen = dict.fromkeys(ids[index] for index in (0, len(ids) // 2, -1)) if ids else {}
+            for id_ in [*chosen, *list(chosen)[: len(chosen) > 1]]:
+                text = quote(str(id_), safe="")
+                writer.send(item, item.template.replace(f"{{{item.parameter('path')[0].name}}}", text))

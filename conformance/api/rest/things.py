@@ -53,6 +53,12 @@ def identified(value: Any, item: Operation) -> tuple[str, Any]:
     return next(usable, ("", None))
 
 
+def identifier_of(value: Any, item: Operation) -> str:
+    """Return what identifies a representation in an item's path, as text in lower case; empty if nothing does."""
+    found = identified(value, item)[1]
+    return "" if found is None else str(found).casefold()
+
+
 def represented(value: Any, names: Collection[str]) -> dict[str, Any]:
     """Return the object of a response that has the most members of these plain names: the body, or one inside it."""
     found = [value] if isinstance(value, dict) else []

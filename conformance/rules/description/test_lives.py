@@ -1,16 +1,22 @@
 """What an API creates or writes can be read, whatever is done to others, and is gone when it was deleted.
 
-RFC 9110 15.3.2, 9.3.4, 9.3.5, 13.1.1.
+RFC 9110 15.3.2, 9.3.4, 9.3.5, 15.5.
 """
 
 from collections.abc import Iterable, Iterator
 from http import HTTPStatus
 
+import pytest
+
+from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.things import is_marked_deleted
+from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json
 from conformance.scenarios.lifecycles import lifecycles
 from conformance.scenarios.living import Kind, Life
 from conformance.scenarios.rule import Outcome, rule
+from conformance.scenarios.whole_list import read_items
+from conformance.scenarios.writing import Writer
 from conformance.verdict.case import Case
 
 _DONE = frozenset({HTTPStatus.OK, HTTPStatus.NO_CONTENT})
@@ -63,7 +69,9 @@ def refused_keeps(trace: tuple[Life, ...]) -> Iterable[Outcome]:
     yield from _looks(trace, Kind.REFUSED)
 
 
-@rule("description/failed-condition", on=(lifecycles,))
-def failed_condition(trace: tuple[Life, ...]) -> Iterable[Outcome]:
-    """Judge whether requests whose If-Match does not hold have changed nothing."""
-    yield from _looks(trace, Kind.CONDITION)
+@pytest.mark.phase("late")
+@pytest.mark.needs("rest")
+@pytest.mark.requirement("description/own-identifier")
+def test_items_of_lists(api: RestInterface, values: Values) -> None:
+    """Read some items of each list, one after another and the first one again; a checker judges all reads of a run."""
+    read_items(Writer(api, values))
