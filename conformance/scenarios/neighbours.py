@@ -22,8 +22,8 @@ from conformance.scenarios.survey import REFUSALS, Survey, Surveyor
 NO_TAG: Final = '"roaas-nothing-has-this-tag"'
 # As many values of an id are tried; and as many queries of one operation, and of all at quick.
 _TRIED, _QUERIES, _AT_QUICK = 3, 3, 8
-# Each operation is read so often in a run, so that a fault in one of twenty responses is met.
-_READS: Final = 20
+# Each operation has been read so often by then: with the reads that come later, one wrong response in twenty is met.
+_READS: Final = 17
 # Operations are read more often where the device usually responds in so many ms.
 _QUICK_MS: Final = 50.0
 _FEW_READS: Final = 2

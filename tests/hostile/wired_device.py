@@ -7,6 +7,7 @@ import gzip
 import hashlib
 import json
 import re
+import sys
 import threading
 from collections import Counter
 from collections.abc import Collection, Iterator
@@ -48,7 +49,10 @@ _CONFIG = {
     "type": "object",
     "required": ["name", "speed"],
     "additionalProperties": False,
-    "properties": {"name": {"type": "string", "maxLength": 60}, "speed": {"type": "integer", "minimum": 1}},
+    "properties": {
+        "name": {"type": "string", "maxLength": 60},
+        "speed": {"type": "integer", "minimum": 1, "maximum": 1000},
+    },
 }
 _ANY = {"type": "object", "additionalProperties": False, "properties": {"up": {"type": "integer"}}}
 _IF_MATCH = {"in": "header", "name": "If-Match", "schema": {"type": "string"}}
@@ -552,6 +556,12 @@ class _Handler(BaseHTTPRequestHandler):
 
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Print an error, unless the client has gone."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
+
     request_queue_size = 128
 
 

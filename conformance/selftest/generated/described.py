@@ -60,6 +60,7 @@ def _of_operation(operation: Operation, exchange: Exchange) -> Iterator[Generate
     yield from described_requests.lenient(operation, description)
     yield from described_requests.strict(operation, description)
     yield from described_requests.crashing(operation, replace(exchange, classes=("robustness",)))
+    yield from described_http.of_resource(operation, description)
     yield from described_http.of_http(operation, replace(exchange, classes=("http",)))
 
 

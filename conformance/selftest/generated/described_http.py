@@ -4,9 +4,9 @@ import re
 from collections.abc import Callable, Iterator
 
 from conformance.documents.openapi import Operation
-from conformance.mutation.messages import Request, Response
+from conformance.mutation.messages import Change, Forward, Request, Response
 from conformance.selftest.generated.described_failures import Edit, edited, failed
-from conformance.selftest.generated.mutant import GeneratedMutant
+from conformance.selftest.generated.mutant import GeneratedMutant, Tally
 from conformance.selftest.generated.places import Exchange
 
 _SUCCESS, _METHOD_NOT_ALLOWED = range(200, 300), 405
@@ -243,3 +243,90 @@ def _allows(method: str) -> dict[str, tuple[str, Callable[[Response], object]]]:
         "allow-drop": ("answers 405 without Allow (RFC 9110 15.5.6)", lambda answer: answer.drop("Allow")),
         "allow-less": ("answers 405 with an Allow that lacks a method of the resource (RFC 9110 10.2.1)", less),
     }
+
+
+def of_resource(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
+    """Yield mutants whose resource says one thing by one request, and another by the next."""
+
+    def at(*methods: str) -> Callable[[Request], bool]:
+        return lambda request: re.fullmatch(exchange.path, request.path) is not None and request.method in methods
+
+    rows: list[tuple[str, str, Callable[[Tally], Change]]] = [
+        (
+            "refused-as-missing",
+            "answers 404 in place of 405 (RFC 9110 15.5.6)",
+            edited(
+                lambda request: re.fullmatch(exchange.path, request.path) is not None,
+                _changed(_missing, lambda answer: answer.status == _METHOD_NOT_ALLOWED),
+            ),
+        )
+    ]
+    if operation.method == "GET":
+        tagged = _changed(
+            lambda answer: answer.put("ETag", '"roaas"'),
+            lambda answer: bool(answer.field("ETag")) and _succeeded(answer),
+        )
+        rows += [
+            ("head-missing", "answers HEAD with 404", edited(at("HEAD"), _changed(_missing, _succeeded))),
+            ("head-tag", "sends another ETag for HEAD (RFC 9110 9.3.2)", edited(at("HEAD"), tagged)),
+            ("tag-kept", "keeps its first ETag (RFC 9110 8.8.1)", _keeping_tags(at("GET", "HEAD"))),
+            (
+                "list-ignored",
+                "knows one tag in If-None-Match, and no list (RFC 9110 13.1.2)",
+                _without("If-None-Match", at("GET"), lambda value: "," in value),
+            ),
+        ]
+    if operation.method in {"PUT", "PATCH", "DELETE"}:
+        ignored = _without("If-Match", at(operation.method), lambda _: True)
+        rows.append(("match-ignored", "ignores If-Match (RFC 9110 13.1.1)", ignored))
+    for name, says, make in rows:
+        yield GeneratedMutant(
+            f"{name}:{exchange.name}:resource", f"{exchange.name} {says}.", name, exchange, exchange.classes, make
+        )
+
+
+def _missing(answer: Response) -> None:
+    answer.status, answer.reason = 404, ""
+
+
+def _succeeded(answer: Response) -> bool:
+    return answer.status in _SUCCESS
+
+
+def _keeping_tags(where: Callable[[Request], bool]) -> Callable[[Tally], Change]:
+    """Return a change that gives each path the strong ETag that it had at first."""
+
+    def make(tally: Tally) -> Change:
+        first: dict[str, str] = {}
+
+        def edit(request: Request, answer: Response) -> Response | None:
+            tag = answer.field("ETag")
+            if not tag or tag.startswith("W/") or first.setdefault(request.path, tag) == tag:
+                return None
+            altered = answer.copy()
+            altered.put("ETag", first[request.path])
+            return altered
+
+        return edited(where, edit)(tally)
+
+    return make
+
+
+def _without(name: str, where: Callable[[Request], bool], when: Callable[[str], bool]) -> Callable[[Tally], Change]:
+    """Return a change that takes a condition out of requests, counted where the device answers 2xx."""
+
+    def make(tally: Tally) -> Change:
+        def change(request: Request, forward: Forward) -> Response:
+            value = request.field(name)
+            if value is None or not where(request) or not when(value):
+                return forward(request)
+            without = request.copy()
+            without.drop(name)
+            response = forward(without)
+            if response.status in _SUCCESS:
+                tally()
+            return response
+
+        return change
+
+    return make

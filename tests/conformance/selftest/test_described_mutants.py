@@ -176,3 +176,32 @@ def test_the_page_has_all_tools_in_one_table_and_names_what_only_another_kills(
     assert "| plain Schemathesis | 1 | 2 | 50.0% |" in text
     assert "| Specmatic | 0 | 1 | 0.0% |" in text
     assert only_theirs(results, compared) == [f"plain Schemathesis alone: {theirs.name}: GET /x ST108"]
+
+
+@pytest.mark.parametrize(
+    ("name", "method", "condition", "status", "tag"),
+    [
+        ("head-missing", "HEAD", "", 404, '"1"'),
+        ("head-tag", "HEAD", "", 200, '"roaas"'),
+        ("tag-kept", "GET", "", 200, '"0"'),
+        ("list-ignored", "GET", 'If-None-Match: "9", "1"', 200, '"1"'),
+        ("refused-as-missing", "PATCH", "", 404, None),
+    ],
+)
+def test_a_resource_says_one_thing_and_then_another(mutants, name, method, condition, status, tag):
+    count = [-1]
+
+    def lamp(request: Request) -> Response:
+        count[0] += 1
+        if request.method == "PATCH":
+            return Response(405)
+        found = Response(200, [("ETag", f'"{count[0]}"')], b"{}")
+        return Response(304) if f'"{count[0]}"' in (request.field("If-None-Match") or "") else found
+
+    tally = Tally()
+    change = mutants[f"{name}:lamp:resource"].make(tally)
+    assert change(Request("rest", "GET", "/v1/lamps/3"), lamp).status == 200
+    assert tally.altered == 0
+    fields = [tuple(condition.split(": "))] if condition else []
+    answer = change(Request("rest", method, "/v1/lamps/3", fields=fields), lamp)
+    assert (answer.status, answer.field("ETag"), tally.altered) == (status, tag, 1)
