@@ -30,6 +30,7 @@ class _Part:
     Attributes:
         occasion: the exchange.
         page: what it shows.
+        names: the parameters of its request.
         offset: how many items are before it.
         plain: whether no filter was asked for.
         whole: whether it goes to the end.
@@ -38,6 +39,7 @@ class _Part:
 
     occasion: Occasion
     page: Page
+    names: frozenset[str]
     offset: int
     plain: bool
     whole: bool
@@ -59,7 +61,7 @@ class _Count:
         by_filter: whether it counts what a filter leaves, by the first list with a filter; None: there was none.
         all: the number of all items when it agreed last.
         last: what identified the items of the last whole list that it agreed with.
-        wrong_since_s: when it was wrong first after that; 0: it was not.
+        wrong_since_s: by the names of the parameters, when it was wrong first since such a list agreed with it.
         times: how often it was wrong while nothing changed.
         other: the parts of the list, since it agreed last, that tell another total.
     """
@@ -69,7 +71,7 @@ class _Count:
     by_filter: bool | None = None
     all: int = 0
     last: frozenset[str] = frozenset()
-    wrong_since_s: float = 0.0
+    wrong_since_s: dict[frozenset[str], float] = field(default_factory=dict)
     times: int = 0
     other: list[tuple[Occasion, int]] = field(default_factory=list)
 
@@ -86,14 +88,15 @@ class _Count:
     def is_sure(self, part: _Part, changed_s: float) -> bool:
         """Note a wrong total; return whether no change that is under way explains it."""
         now_s, shown = part.occasion.response.received_s, frozenset(part.page.identities)
-        self.wrong_since_s = self.wrong_since_s or now_s
+        since_s = self.wrong_since_s.setdefault(part.names, now_s)
         is_same = shown == self.last if part.whole and not part.offset else shown <= self.last
-        self.times += is_same and now_s - changed_s >= SETTLES_S
-        return self.times >= _OFTEN or now_s - self.wrong_since_s >= SETTLES_S
+        is_quiet = now_s - changed_s >= SETTLES_S
+        self.times += is_same and is_quiet
+        return is_quiet and (self.times >= _OFTEN or now_s - since_s >= SETTLES_S)
 
     def agreed(self, page: Page, changed_s: float) -> Iterator[tuple[Occasion, int]]:
         """Note the whole list that it agrees with; yield the parts that told another total, if the list is the same."""
-        self.wrong_since_s, before, self.last = 0.0, self.last, frozenset(page.identities)
+        before, self.last = self.last, frozenset(page.identities)
         if self.last == before:
             told = [one for one in self.other if one[0].response.received_s - changed_s >= SETTLES_S]
             self.times += len(told)
@@ -125,7 +128,7 @@ class Totals:
         most = listing.most(sent)
         whole = not page.goes_on and (not most or shown < most) and (shown > 0 or offset == 0)
         sure = whole and not self._is_cut(listing, shown, sent)
-        part = _Part(occasion, page, offset, plain=plain, whole=whole, sure=sure)
+        part = _Part(occasion, page, frozenset(sent), offset, plain=plain, whole=whole, sure=sure)
         for name, total in page.totals.items():
             count = self._counts[label, name]
             count.is_of_all |= total > shown > 0
@@ -139,6 +142,7 @@ class Totals:
         shown, least = len(part.page.items), part.least
         is_of_page = plain_name(name) in COUNTS and not count.is_of_all and total >= shown
         if part.whole and total == least:
+            count.wrong_since_s.pop(part.names, None)
             for one, told in count.agreed(part.page, self._changed_s) if part.plain and not part.offset else ():
                 expected = f"{total} as {name}, as the whole list tells before and after"
                 yield _case(one, name, f"{told} as {name}", expected, holds=False)

@@ -36,6 +36,8 @@ _MOST_VALUES: Final = 12
 _TRIES: Final = 4
 _TWICE: Final = 2
 _STEADY: Final = 3
+# At a multiple of so many items a server may cut a list.
+_ROUND: Final = 5
 # Fewer items have no pages to compare.
 _FEWEST: Final = 2
 # So far beyond the end a part of a list is asked for, as far as the schema allows.
@@ -92,25 +94,23 @@ def pages_of_lists(api: RestInterface, values: Values) -> tuple[Paged, ...]:
 def _pages_of(reader: Reader) -> Iterator[Paged]:
     """Yield what is seen of a list in parts: as it is, sorted by a member that no two items share, and filtered."""
     page = reader.page()
-    for query in ({}, *_selections(reader.listing, page)) if page is not None else ():
-        yield from _Parts(replace(reader, always=query)).all()
+    for query, by in (({}, ""), *_selections(reader.listing, page)) if page is not None else ():
+        yield from _Parts(replace(reader, always=query, by=by)).all()
 
 
-def _selections(listing: Listing, page: Page) -> Iterator[dict[str, Any]]:
-    """Yield one value of the sort, and one of a filter that leaves several items, where the list has such."""
+def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], str]]:
+    """Yield one value of the sort, with its member, and one of a filter that leaves several items."""
     items = [members_of(one) for one in page.items]
     if listing.sort is not None and listing.direction is None and "array" not in kinds_of(listing.sort.schema):
-        sorts = [
-            text
-            for text, one in listing.sortings.items()
-            if len({str(item.get(one.member)) for item in items}) == len(items)
-        ]
-        yield from ({listing.sort.name: text} for text in sorts[-1:])
+        ranks = {text: len({str(item.get(one.member)) for item in items}) for text, one in listing.sortings.items()}
+        best = max(ranks, key=ranks.__getitem__, default="")
+        if ranks.get(best, 0) >= _FEWEST:
+            yield {listing.sort.name: best}, listing.sortings[best].member
     for name, parameter in listing.filters.items():
         there = Counter(text_of(item.get(name)) for item in items if not isinstance(item.get(name), list | dict))
         chosen = [one for one in _choices(parameter, name, page) if _FEWEST <= there[text_of(one)] < len(items)]
         if chosen:
-            yield {parameter.name: chosen[-1]}
+            yield {parameter.name: chosen[-1]}, ""
             break
 
 
@@ -136,12 +136,14 @@ class Reader:
         api, values: of the device.
         listing: the list.
         always: values of query parameters, by name, that each request has.
+        by: as in Page.
     """
 
     api: RestInterface
     values: Values
     listing: Listing
     always: dict[str, Any] = field(default_factory=dict)
+    by: str = ""
 
     @property
     def usual(self) -> Inputs:
@@ -162,9 +164,16 @@ class Reader:
         for one in islice(invalid_variations(self.listing.operation, self.usual), 1):
             written(self.listing.operation, one.inputs).send(self.api)
 
+    def part(self, query: dict[str, Any] | None = None) -> tuple[Exchange, Page] | None:
+        """Return a request as `read` sends it and the list in its response; None if there is none."""
+        exchange = self.read(query)
+        page = page_of(exchange.response)
+        return None if page is None else (exchange, replace(page, by=self.by))
+
     def page(self) -> Page | None:
         """Return the list as it is without optional parameters; None if it is not answered."""
-        return page_of(self.read().response)
+        part = self.part()
+        return None if part is None else part[1]
 
 
 def _settled(reader: Reader) -> None:
@@ -223,9 +232,10 @@ class _Parts:
     def all(self) -> Iterator[Paged]:
         """Yield what each way to read the list in parts has shown."""
         whole = self.reader.page()
-        if whole is None or len(set(whole.identities)) < max(_FEWEST, len(whole.items)):
+        fewest = _FEWEST if self.reader.by or whole is None else max(_FEWEST, len(whole.items))
+        if whole is None or len(set(whole.identities)) < fewest:
             return
-        for walk in (self._shifted, self._beyond, self._by_offset, self._by_page, self._by_cursor):
+        for walk in (self._entire, self._shifted, self._beyond, self._by_offset, self._by_page, self._by_cursor):
             found = self._twice(walk, whole)
             if found is not None:
                 yield found
@@ -245,18 +255,24 @@ class _Parts:
                 return found
         return None
 
-    def _part(self, query: dict[str, Any]) -> tuple[Exchange, Page] | None:
-        exchange = self.reader.read(query)
-        page = page_of(exchange.response)
-        return (exchange, page) if page is not None else None
-
     def _paged(self, way: str, found: Exchange, expected: str, fault: str) -> Paged:
         return Paged(self.reader.listing.operation.label, way, found, expected, fault)
+
+    def _entire(self, whole: Page) -> Paged | None:
+        """Read with a limit that is just beyond the list, which a server may cut at a round number of items."""
+        limit, size = self.reader.listing.limit, len(whole.items) + 1
+        part = self.reader.part({limit.name: size}) if limit is not None and fitting(limit, size) else None
+        if limit is None or part is None:
+            return None
+        found = part[1].identities
+        expected = whole.identities[: len(found)] if len(found) % _ROUND == 0 else whole.identities
+        fault = "" if found[: len(expected)] == expected else _difference(expected, found)
+        return self._paged(limit.name, part[0], f"the whole list, by {limit.name}={size}", fault)
 
     def _shifted(self, whole: Page) -> Paged | None:
         """Read from the second item on."""
         offset = self.reader.listing.offset
-        part = self._part({offset.name: 1}) if offset is not None and fitting(offset, 1) else None
+        part = self.reader.part({offset.name: 1}) if offset is not None and fitting(offset, 1) else None
         if offset is None or part is None:
             return None
         expected, found = whole.identities[1:], part[1].identities
@@ -267,7 +283,7 @@ class _Parts:
         """Read far beyond the end."""
         offset, end = self.reader.listing.offset, max([len(whole.items), *whole.totals.values()])
         far = next((end + more for more in _BEYOND if fitting(offset, end + more)), None)
-        part = self._part({offset.name: far}) if offset is not None and far is not None else None
+        part = self.reader.part({offset.name: far}) if offset is not None and far is not None else None
         if offset is None or part is None or (whole.goes_on and not whole.totals):
             return None
         again = [one for one in part[1].identities if one in whole.identities]
@@ -295,7 +311,7 @@ class _Parts:
         return self._walk(whole, page.name, lambda _, number: {page.name: begin + number})
 
     def _begins(self, whole: Page, query: dict[str, Any]) -> bool:
-        part = self._part(query)
+        part = self.reader.part(query)
         return part is not None and part[1].identities[:1] == whole.identities[:1]
 
     def _by_cursor(self, whole: Page) -> Paged | None:
@@ -330,7 +346,7 @@ class _Parts:
                 # Only a device that named a next page before has said that this is the last one.
                 ends = f"no further page after {len(joined)} items" if number > 1 and not whole.goes_on else ""
                 break
-            part = self._part({**query, limit.name: size})
+            part = self.reader.part({**query, limit.name: size})
             if part is None:
                 return None
             last = part
@@ -345,7 +361,8 @@ class _Parts:
         expected = whole.identities[: len(joined)]
         fault = "" if tuple(joined[: len(expected)]) == expected else _difference(expected, tuple(joined))
         fault = fault or (ends if len(joined) < len(whole.items) else "")
-        fault = fault or next((f"the item {one[:60]} twice" for one in joined if joined.count(one) > 1), "")
+        twice = next((f"the item {one[:60]} twice" for one in joined if joined.count(one) > 1), "")
+        fault = fault or ("" if self.reader.by else twice)
         return self._paged(way, last[0], f"each item of the list once, page after page by {way}", fault)
 
 

@@ -164,17 +164,19 @@ class Page:
         totals: how many items there are, by the name of each member and header that tells it.
         goes_on: whether the response has something like a link to the next page.
         around: the objects that stand around the list, from outside.
+        by: plain name of the member by which items are told apart, as where several of one rank may change places.
     """
 
     items: tuple[Any, ...]
     totals: Mapping[str, int] = field(default_factory=dict)
     goes_on: bool = False
     around: tuple[Mapping[str, Any], ...] = ()
+    by: str = ""
 
     @cached_property
     def identities(self) -> tuple[str, ...]:
         """What identifies each item, or its whole content."""
-        return tuple(map(identity_of, self.items))
+        return tuple(json.dumps(members_of(one).get(self.by)) if self.by else identity_of(one) for one in self.items)
 
 
 def number_of(text: str) -> int:
