@@ -3,22 +3,30 @@
 A fault in one response of a hundred may meet none of the survey's requests, so its rules judge these as well.
 """
 
+from contextlib import suppress
 from typing import Final
 
+from conformance.api.rest.applicable import allowed
 from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.left_behind import LeftBehind
 from conformance.api.rest.request_context import RequestContext
 from conformance.api.rest.statuses import CRASHES, HELD, held_text
 from conformance.api.rest.validity import VALID, validity
 from conformance.api.rest.variations import Kind
 from conformance.contract.described import SOAP
+from conformance.documents.openapi import operations_of
+from conformance.documents.resources import matching
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey
-from conformance.transport.exchange import Attempt, Exchange, Listener, NoAnswer, Unanswered
+from conformance.transport.exchange import Attempt, Exchange, Listener, NoAnswer, NoAnswerError, Unanswered
+from conformance.verdict.time_limit import TimeIsOverError
 
 # Different responses that are kept, so that a long run needs no more memory.
 _MOST: Final = 2000
+# Things that are read at the end: by then even a slow device has them, or has them no more.
+_MOST_THINGS: Final = 30
 _ANY_FORMAT: Final = frozenset({None, "*/*", "application/json"})
 
 
@@ -27,10 +35,13 @@ class OtherExchanges(Listener):
 
     Attributes:
         probes: the exchanges, those with equal responses once.
+        things: paths of what was created or deleted, in this order.
     """
 
     def __init__(self, api: RestInterface) -> None:
         self.probes: list[Probe] = []
+        self.things: dict[str, None] = {}
+        self._made = LeftBehind(operations_of(api.run.contract), api.client.base_url).made
         self._api = api
         self._seen: set[int] = set()
 
@@ -39,6 +50,17 @@ class OtherExchanges(Listener):
         answer = exchange.response
         names = sorted(name.lower() for name, _ in answer.headers)
         self._keep(exchange, (answer.status, answer.media_type, *names, answer.body))
+        if answer.ok and exchange.request.method in {"POST", "PUT", "DELETE"} and len(self.things) < _MOST_THINGS:
+            self._note(exchange)
+
+    def _note(self, exchange: Exchange) -> None:
+        context = RequestContext.of(self._api.run.contract, self._api.client.base_url, exchange.request)
+        if context is not None and context.operation is not None:
+            path = context.target.partition("?")[0]
+            made = path if exchange.request.method == "DELETE" else self._made(context.operation, path, exchange)
+            reads = matching(self._api.run.contract, "GET", made) if made else None
+            if reads is not None and allowed(self._api, reads):
+                self.things[made] = None
 
     def unanswered(self, request: Unanswered) -> None:
         """Keep a request whose connection was closed; several clients at once may be refused, and are not told."""
@@ -79,7 +101,10 @@ class OtherExchanges(Listener):
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)
 def others(api: RestInterface, other_exchanges: OtherExchanges) -> Survey:
-    """Return what other checks have sent and received until the end of the run."""
+    """Read what was created or deleted once more, and return what other checks have sent and received."""
+    with suppress(NoAnswerError, TimeIsOverError):
+        for path in other_exchanges.things:
+            api.client.send("GET", path, headers=(("Accept", "*/*"),))
     held = {label: status for label, status in api.usual_status.items() if status in HELD}
     if not api.working and held:
         raise NoOccasionError(held_text(held, set(held.values())))

@@ -49,7 +49,7 @@ class LeftBehind:
         # Written again, it is the last one.
         self._last.pop(operation.label, None)
         self._last[operation.label] = answer.status
-        made = self._made(operation, path, exchange)
+        made = self.made(operation, path, exchange)
         if operation.method == "DELETE":
             ours = [one for one in self._created if one == path or one.startswith(f"{path.rstrip('/')}/")]
             for one in ours:
@@ -68,7 +68,7 @@ class LeftBehind:
         elif exchange.response.ok and "?" not in exchange.request.url:
             self._read[path] = exchange.response.body
 
-    def _made(self, operation: Operation, path: str, exchange: Exchange) -> str:
+    def made(self, operation: Operation, path: str, exchange: Exchange) -> str:
         """Return the path of what a request created; empty if it created nothing that has one."""
         answer = exchange.response
         location = answer.header("location") or ""

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 from aiohttp import web
-from small_device import REFUSED, answers, certified, described, error, small_device
+from small_device import REFUSED, answers, certified, described, error, reading, small_device
 
 _WRITTEN = {
     "type": "object",
@@ -154,3 +154,27 @@ def test_a_right_device_is_not_blamed(shape, tmp_path):
 def test_a_fault_is_found(shape, fault, requirement, tmp_path):
     blamed, done = _blamed(shape, fault, tmp_path)
     assert requirement in blamed, done.text
+
+
+def test_what_was_created_is_read_once_more_at_the_end(tmp_path):
+    made, sent = [], []
+    job = {"type": "object", "required": ["id"], "properties": {"id": {"type": "string"}}}
+    item = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
+    created = {"201": answers(job), "4XX": REFUSED}
+    document = described({"/jobs": {"post": {"responses": created}}, "/jobs/{id}": reading(job, parameters=[item])})
+
+    async def create(_):
+        made.append(f"j{len(made)}")
+        sent.clear()
+        return web.json_response({"id": made[-1]}, status=201, headers={"Location": f"/jobs/{made[-1]}"})
+
+    async def read(request):
+        sent.append(request.path)
+        is_there = request.match_info["id"] in made
+        return web.json_response({"id": request.match_info["id"]}) if is_there else error(404, "no such job")
+
+    with small_device(document, {"/jobs": {"POST": create}, "/jobs/{id}": {"GET": read}}) as url:
+        seen = certified(f"{url}/openapi.json", tmp_path / "out", "--call", "*")
+
+    assert seen.exit_code == 0, seen.text
+    assert {f"/jobs/{one}" for one in made[:30]} <= set(sent)  # since the last one was created
