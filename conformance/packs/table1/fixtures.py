@@ -9,6 +9,7 @@ from conformance.api.interfaces import Interfaces
 from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.plugin import Device
 from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliveries
+from conformance.packs.table1.robot.beats import Beats
 from conformance.packs.table1.robot.clock import Clock
 from conformance.packs.table1.robot.delivery_sender import DeliverySender
 from conformance.packs.table1.robot.probe.client import RosProbe
@@ -104,14 +105,28 @@ def refused(api: RestInterface) -> RefusedRequests:
 
 
 @pytest.fixture(autouse=True)
-def _looked_at(_standstills: list[Standstill], _accepted: list[AcceptedDeliveries]) -> Iterator[None]:
-    """Look after each check whether an earlier attempt moves the robot, and for the deliveries that it has accepted."""
+def _looked_at(
+    _standstills: list[Standstill], _accepted: list[AcceptedDeliveries], _beats: list[Beats]
+) -> Iterator[None]:
+    """Look after each check whether an earlier attempt moves the robot, for deliveries that it has accepted, and more.
+
+    Here nothing is between two requests whose responses are compared.
+    """
     yield
     with suppress(NoAnswerError):  # the next check meets that as well
         for standstill in _standstills:
             standstill.look()
         for accepted in _accepted:
             accepted.read()
+        for beats in _beats:
+            beats.beat()
+
+
+@pytest.fixture(scope="session")
+def _beats(interfaces: Interfaces, _validated: None) -> list[Beats]:
+    """Return what reads the robot's state between the checks; empty without a REST interface."""
+    api = interfaces.rest
+    return [Beats(api, interfaces)] if api is not None and isinstance(api.device, Device) else []
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ from conformance.transport.exchange import Listener
 
 if TYPE_CHECKING:
     from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliveries
+    from conformance.packs.table1.robot.interface_observer import InterfaceObserver
     from conformance.packs.table1.robot.refused_requests import RefusedRequests
 
 _TEMPLATE = """
@@ -69,6 +70,8 @@ class Device(device.Device):
     doubts = MappingProxyType({"safety": "to claim it, declare limits and hold time below"})
     fixtures = ("conformance.packs.table1.fixtures",)
     comes_and_goes = frozenset({"GetGoal"})
+    #: Observers to which one reading more may tell whether something is wrong.
+    doubting: "tuple[InterfaceObserver, ...]" = ()
 
     @property
     def settle_s(self) -> float:
@@ -141,6 +144,7 @@ class Device(device.Device):
         """Return what judges every exchange with the robot's resources."""
         from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliveries  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.goal_observer import GoalObserver  # noqa: PLC0415 - see the class
+        from conformance.packs.table1.robot.interface_observer import InterfaceObserver  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.list_observer import ListObserver  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.observer import Observer  # noqa: PLC0415 - see the class
         from conformance.packs.table1.robot.plan_observer import PlanObserver  # noqa: PLC0415 - see the class
@@ -150,8 +154,9 @@ class Device(device.Device):
         accepted, refused = AcceptedDeliveries(api), RefusedRequests(api)
         self.accepted.append(accepted)
         self.refused.append(refused)
+        self.doubting = (InterfaceObserver(api),)
         others = (GoalObserver, PlanObserver, ListObserver, SoapPoseObserver)
-        return (Observer(api, self.clock), *(one(api) for one in others), accepted, refused)
+        return (Observer(api, self.clock), *(one(api) for one in others), *self.doubting, accepted, refused)
 
     def halt(self, api: device.Rest) -> None:
         """Cancel and stop what the robot may be doing, without waiting until it stands still."""

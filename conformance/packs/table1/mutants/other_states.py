@@ -1,5 +1,6 @@
 """Mutants that refuse a request as they should, and break something only in another state than the one before."""
 
+import contextlib
 import json
 from collections.abc import Callable
 from typing import Any
@@ -10,7 +11,7 @@ from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.goal_memory import active, identity, pose_of
 from conformance.packs.table1.mutants.holding import Remembering
 from conformance.packs.table1.mutants.input_effects import after_refusal, sent
-from conformance.packs.table1.mutants.paths import DELIVERIES, GOAL, LINEAR, POSE, SENSORS, VELOCITY, deliveries
+from conformance.packs.table1.mutants.paths import DELIVERIES, GOAL, LINEAR, PLAN, POSE, SENSORS, VELOCITY, deliveries
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("rest-resources", "rest")
@@ -89,20 +90,6 @@ class _Outcome:
         return response
 
 
-@_mutant("head-of-an-ended-goal", "http/head", "HEAD of the goal goes on returning 200 after a goal was cancelled.")
-class _Head:
-    def __init__(self) -> None:
-        self._cancelled = False
-
-    def __call__(self, request: Request, forward: Forward) -> Response:
-        response = forward(request)
-        if _DELETE(request) and success(response):
-            self._cancelled = True
-        if self._cancelled and rest("HEAD", GOAL)(request) and response.status == 404:
-            return plain(200)(request)
-        return response
-
-
 def _renewed(where: Callable[[Request], bool]) -> type[Remembering]:
     """Return a change that sends the last velocity again when a request is refused."""
 
@@ -171,4 +158,74 @@ class _Lost:
             return plain(204)(request)
         response = forward(request)
         self._fault = request.side == "soap" and b"Fault" in response.body
+        return response
+
+
+@_mutant("plan-cached", "plan-start", "A plan that was requested before is the one from before, wherever the robot is.")
+class _CachedPlan:
+    def __init__(self) -> None:
+        self._plans: dict[str, Response] = {}
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        if not rest("GET", PLAN)(request) or "start_x" in request.target or "xml" in (request.field("Accept") or ""):
+            return forward(request)
+        if request.target not in self._plans:
+            response = forward(request)
+            if not success(response):
+                return response
+            self._plans[request.target] = response.copy()
+        return self._plans[request.target].copy()
+
+
+def _is_zero(request: Request) -> bool:
+    value: Any = parsed(request.body) if rest("PUT", VELOCITY)(request) else None
+    try:
+        return value is not None and not any(value[part][axis] for part in ("linear", "angular") for axis in "xyz")
+    except (TypeError, KeyError):
+        return False
+
+
+@_mutant(
+    "safety-stop-not-backwards", "safety/stop", "Zero velocity does not stop a robot that drives back and turns right."
+)
+class _BackwardsRight(Remembering):
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        last = self.last if _is_zero(request) else None
+        if isinstance(last, dict) and "angular" in last and "linear" in last:
+            with contextlib.suppress(TypeError, KeyError):
+                if last["linear"]["x"] < 0 and last["angular"]["z"] < 0:
+                    return plain(204)(request)
+        return super().__call__(request, forward)
+
+
+@_mutant("sensors-twice-after-406", "sensors-unique", "The list after one that was answered 406 has an entry twice.")
+class _Twice:
+    def __init__(self) -> None:
+        self._refused = False
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        if rest("GET", SENSORS)(request):
+            value: Any = parsed(response.body) if self._refused and success(response) else None
+            if isinstance(value, list):
+                response.body = json.dumps([*value, *value[:1]]).encode()
+            self._refused = response.status == 406
+        return response
+
+
+@_mutant("soap-goal-lingers-cancelled", "equivalence/goal", "GetGoal goes on returning a goal that was cancelled.",
+         interface="both")  # fmt: skip
+class _Lingering:
+    def __init__(self) -> None:
+        self._last: Response | None = None
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        response = forward(request)
+        if _PUT_GOAL(request) and success(response):
+            self._last = None
+        if soap("GetGoal")(request):
+            if b"target_pose" in response.body:
+                self._last = response.copy()
+            elif self._last is not None:
+                return self._last.copy()
         return response

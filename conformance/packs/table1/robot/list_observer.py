@@ -1,24 +1,25 @@
-"""Judge every list of a run that is read over SOAP, whichever check requests it, by the lists over REST around it."""
+"""Judge every list of a run, whichever check requests it; one over SOAP also by the lists over REST around it."""
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.json_schema import Shape
 from conformance.documents.representation import from_element
 from conformance.packs.table1.robot.agreement import entries_of
+from conformance.packs.table1.robot.message_shapes import MESSAGE_TYPE, SERVICE_TYPE, read_as
 from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.packs.table1.robot.message_shapes import SERVICES as SERVICES_SHAPE
-from conformance.packs.table1.robot.message_shapes import read_as
 from conformance.packs.table1.robot.robot import SENSORS, SERVICES
 from conformance.packs.table1.robot.soap_services import returned
 from conformance.transport.exchange import Exchange, Listener
 
-#: Path, shape and requirement of each list, by what is in a SOAP response with it.
-_LISTS: Final[Mapping[bytes, tuple[str, Shape, str]]] = {
-    b"GetSensorsResponse": (SENSORS, SENSORS_SHAPE, "equivalence/sensors"),
-    b"GetNavigationServicesResponse": (SERVICES, SERVICES_SHAPE, "equivalence/services"),
+#: Path, shapes of the list and of a type named in full, and requirement, by what is in a SOAP response with the list.
+_LISTS: Final[Mapping[bytes, tuple[str, Shape, Shape, str]]] = {
+    b"GetSensorsResponse": (SENSORS, SENSORS_SHAPE, MESSAGE_TYPE, "equivalence/sensors"),
+    b"GetNavigationServicesResponse": (SERVICES, SERVICES_SHAPE, SERVICE_TYPE, "equivalence/services"),
 }
 
 
@@ -27,7 +28,7 @@ class _Seen:
     """What was read of one list.
 
     Attributes:
-        path, shape, requirement: as above.
+        path, shape, full, requirement: as above.
         listed: the entries over REST, as read last; None: not read yet.
         received_s: when they were received, s of the monotonic clock.
         others: other entries over SOAP since then.
@@ -35,6 +36,7 @@ class _Seen:
 
     path: str
     shape: Shape
+    full: Shape
     requirement: str
     listed: list[str] | None = None
     received_s: float = 0.0
@@ -74,6 +76,7 @@ class ListObserver(Listener):
         value, problem = read_as(exchange.response, seen.shape)
         if problem:
             return
+        self._judge_entries(seen, value, exchange)
         listed, (others, seen.others) = entries_of(value, seen.names), (seen.others, [])
         for entries, other in others if listed == seen.listed else ():
             if _sent_s(exchange) < other.response.received_s:
@@ -88,6 +91,28 @@ class ListObserver(Listener):
                 cause="other entries",
             )
         seen.listed, seen.received_s = listed, exchange.response.received_s
+
+    def _judge_entries(self, seen: _Seen, entries: list[Any], exchange: Exchange) -> None:
+        """Judge that no entry of a list is there twice, and that each type is named in full."""
+        listed, what = entries_of(entries, seen.names), seen.requirement.rpartition("/")[2]
+        twice = next((one for one, two in itertools.pairwise(listed) if one == two), "")
+        self._judge.check(
+            f"rest-resources/{what}-unique",
+            not twice,
+            exchange,
+            "no entry twice",
+            found=f"twice {twice}",
+            cause="twice",
+        )
+        short = next((entry["type"] for entry in entries if seen.full.problem(entry["type"])), "")
+        self._judge.check(
+            f"rest-resources/{what}-named-in-full",
+            not short,
+            exchange,
+            f"a type named in full, as {'sensor_msgs/msg/LaserScan' if what == 'sensors' else 'nav_msgs/srv/GetPlan'}",
+            found=f"type {short!r}",
+            cause="not in full",
+        )
 
     def _over_soap(self, seen: _Seen, exchange: Exchange) -> None:
         found, problem = returned(exchange)

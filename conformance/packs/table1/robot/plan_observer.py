@@ -12,12 +12,13 @@ from urllib.parse import parse_qsl, urlsplit
 
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.representation import UnreadableError, local_name, parse_xml, read
-from conformance.packs.table1.robot.geometry import Pose
-from conformance.packs.table1.robot.message_shapes import GET_PLAN
+from conformance.packs.table1.robot.geometry import Pose, pose_of
+from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, read_as
 from conformance.packs.table1.robot.plan import START_OFF, plan_of
-from conformance.packs.table1.robot.robot import PLAN
+from conformance.packs.table1.robot.robot import FARTHEST, PLAN, POSE
 from conformance.packs.table1.robot.state_over_soap import answered
-from conformance.transport.exchange import Exchange, Listener, Response
+from conformance.packs.table1.statement import said_of
+from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener, Response
 
 # Shorter than this, m, or than so many of the path's own steps, is no leap.
 _LEAP_M: Final = 1.0
@@ -36,6 +37,9 @@ _JUDGED: Final = {
 }
 # Of fewer poses nobody knows the usual step.
 _FEWEST: Final = 6
+# A robot whose pose changes by less stands still, m; of plans that start elsewhere so many are no wrong readings.
+_STANDS_M: Final = 0.02
+_OFTEN: Final = 2
 
 
 class PlanObserver(Listener):
@@ -48,10 +52,22 @@ class PlanObserver(Listener):
     def __init__(self, api: RestInterface) -> None:
         self._judge = api.run.judge
         self._url = api.client.url(f"{PLAN}?")
+        self._at = api.client.url(POSE)
+        motion = said_of(api.run).motion
+        self._frame, self._in_map = motion.frame, Pose(*motion.odom_to_map)
+        self._noise_m = FARTHEST * said_of(api.run).limits.noise.position_m
+        # The pose that was read last since anything was asked of the robot; plans from where it is, since then.
+        self._here: Exchange | None = None
+        self._from_here: list[tuple[Pose, Exchange]] = []
+        self._elsewhere = 0
 
     def answered(self, exchange: Exchange) -> None:
         """Judge one exchange if it is a plan."""
         response = exchange.response
+        if exchange.request.url == self._at and exchange.request.method == "GET":
+            self._read_pose(exchange)
+        elif exchange.request.method not in SAFE_METHODS and b":Get" not in exchange.request.body:
+            self._here, self._from_here = None, []
         if not response.ok or response.media_type not in _JUDGED:
             return
         if exchange.request.method == "GET" and exchange.request.url.startswith(self._url):
@@ -69,8 +85,35 @@ class PlanObserver(Listener):
         self._judge_end(exchange, asked, poses[-1])
         self._judge_start(exchange, asked, poses[0])
         self._judge_frame(exchange, asked.get("frame_id", ""), plan.frames)
+        if not any(name.startswith("start") for name in asked) and asked.get("frame_id", "map") == self._frame:
+            self._from_here.append((poses[0], exchange))
         if response.media_type == "application/json":
             self._judge_leaps(exchange, poses)
+
+    def _read_pose(self, exchange: Exchange) -> None:
+        """Judge the plans since the pose that was read before, if the robot stood there and still does."""
+        plans, before = self._from_here, self._here
+        self._here, self._from_here = exchange, []
+        if not plans or before is None:
+            return
+        one, other = (read_as(seen.response, ODOMETRY)[0] for seen in (before, exchange))
+        if one is None or other is None:
+            return
+        here, after = (pose_of(seen["pose"]["pose"]).seen_from(self._in_map) for seen in (one, other))
+        if here.distance(after) > _STANDS_M + 2 * self._noise_m:
+            return
+        for start, asked in plans:
+            off_m = min(start.distance(here), start.distance(after)) - START_OFF - self._noise_m
+            # A single reading may be wrong.
+            self._elsewhere += off_m > 0
+            self._judge.check(
+                _JUDGED[asked.response.media_type][1],
+                off_m <= 0 or self._elsewhere < _OFTEN,
+                asked,
+                f"a path that starts within {START_OFF:g} m of the robot, ({here.x:.3f}, {here.y:.3f})",
+                found=f"one that starts at ({start.x:.3f}, {start.y:.3f}), {self._elsewhere} times",
+                cause="starts where the robot is not",
+            )
 
     def _judge_end(self, exchange: Exchange, asked: Mapping[str, str], end: Pose) -> None:
         """Judge that a path ends at the position in the request, where that is clear."""

@@ -35,8 +35,8 @@ class VelocityMachine(RuleBasedStateMachine):
         self._wanted = STILL
 
     def teardown(self) -> None:
-        """Stop the robot."""
-        self._walk.step(lambda: self._drive.command(STILL))
+        """Stop the robot, whichever way it drives: every stop has to be one."""
+        self._walk.step(self._stop)
 
     @rule()
     def ask(self) -> None:
@@ -56,7 +56,7 @@ class VelocityMachine(RuleBasedStateMachine):
     @rule()
     def stop(self) -> None:
         """Command zero velocity."""
-        self._walk.command(lambda: self._full(STILL))
+        self._walk.command(self._stop)
 
     @rule(forward=st.booleans(), linear=_SHARES)
     def command_linear(self, *, forward: bool, linear: float) -> None:
@@ -83,6 +83,13 @@ class VelocityMachine(RuleBasedStateMachine):
         self._wanted = wanted
         commanded = self._drive.command(wanted, xml=self._as_xml(wanted))
         return commanded and self._drive.reach(wanted, "rest-resources/velocity-converges")
+
+    def _stop(self) -> bool:
+        """Command zero velocity, if the robot drives at all, and wait until it is at rest, before its watchdog acts."""
+        moving, self._wanted = self._wanted, STILL
+        if moving == STILL:
+            return self._full(STILL)
+        return self._drive.stop(moving, "xml" if self._as_xml(STILL) else "velocity")
 
     def _as_xml(self, wanted: Velocity) -> bool:
         """Return whether to send a velocity as XML: every other one of the same signs is, where the robot takes it."""

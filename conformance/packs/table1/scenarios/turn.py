@@ -157,6 +157,7 @@ class _Turning:
             # A small circle: either part has to end. The linear part is commanded last, and ends as well.
             bent, before = along_arc(robot, bent, _ASIDE)
             arc(robot, drive, bent, before)
+            drive.stop(bent)
 
     def play_letting_go(self, run: Run) -> None:
         """Drive along an arc, and let several velocities end by themselves; then drive straight on."""
@@ -228,7 +229,7 @@ class _Turning:
         drive.saw("rest-resources/linear-keeps-angular", expected, seen, "came back", holds=keeps)
         if renewed and self.robot.limits.hold_s:
             self._renew_linear(ahead, self.robot.limits.hold_s)
-        self.robot.put_velocity(STILL)
+        drive.stop(ahead)
 
     def _renew_linear(self, ahead: Velocity, hold_s: float) -> None:
         """PUT a linear part again and again for longer than it holds, and record whether it lasts."""

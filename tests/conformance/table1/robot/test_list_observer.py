@@ -44,7 +44,12 @@ _BOTH, _ONE = (_LIDAR, _CAMERA), (_LIDAR,)
 )
 def test_a_list_that_differs_while_rest_s_does_not_change(read, wrong):
     found = []
-    judge = SimpleNamespace(check=lambda *_, **what: found.append(what["found"]))
+
+    def check(id_, holds, *_, **what):
+        if not holds and id_.startswith("equivalence/"):
+            found.append(what["found"])
+
+    judge = SimpleNamespace(check=check)
     api = SimpleNamespace(run=SimpleNamespace(judge=judge), client=SimpleNamespace(url=lambda path: f"http://r2{path}"))
     observer = ListObserver(api)
     for number, (path, media_type, body) in enumerate(read):

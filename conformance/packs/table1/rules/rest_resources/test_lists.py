@@ -1,17 +1,13 @@
-"""The lists of sensors and of navigation services."""
-
-import itertools
-import json
-from typing import Any
+"""The lists of sensors and of navigation services; their entries are judged by ListObserver, whoever reads them."""
 
 import pytest
 
 from conformance.documents.json_schema import Shape
-from conformance.packs.table1.robot.message_shapes import MESSAGE_TYPE, SERVICE_TYPE, read_as
+from conformance.packs.table1.robot.agreement import entries_of
 from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.packs.table1.robot.message_shapes import SERVICES as SERVICES_SHAPE
+from conformance.packs.table1.robot.message_shapes import read_as
 from conformance.packs.table1.robot.robot import SENSORS, SERVICES, Robot
-from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
@@ -26,7 +22,7 @@ pytestmark = [pytest.mark.phase("reading"), pytest.mark.needs("rest")]
 )
 def test_sensors(robot: Robot, judge: Judge, effort: Effort) -> None:
     """Check each reading: {name, topic, type} without duplicates, and the same list each time."""
-    _read_often(robot, judge, "sensors", SENSORS, SENSORS_SHAPE, MESSAGE_TYPE, effort.cases(100))
+    _read_often(robot, judge, "sensors", SENSORS, SENSORS_SHAPE, effort.cases(100))
 
 
 @pytest.mark.requirement(
@@ -37,10 +33,10 @@ def test_sensors(robot: Robot, judge: Judge, effort: Effort) -> None:
 )
 def test_services(robot: Robot, judge: Judge, effort: Effort) -> None:
     """Check each reading: {name, type} without duplicates, and the same list each time."""
-    _read_often(robot, judge, "services", SERVICES, SERVICES_SHAPE, SERVICE_TYPE, effort.cases(100))
+    _read_often(robot, judge, "services", SERVICES, SERVICES_SHAPE, effort.cases(100))
 
 
-def _read_often(robot: Robot, judge: Judge, what: str, path: str, shape: Shape, full: Shape, times: int) -> None:
+def _read_often(robot: Robot, judge: Judge, what: str, path: str, shape: Shape, times: int) -> None:
     fields = "{name, topic, type}" if what == "sensors" else "{name, type}"
     before: list[str] | None = None
     for _ in range(times):
@@ -51,7 +47,7 @@ def _read_often(robot: Robot, judge: Judge, what: str, path: str, shape: Shape, 
         )
         if not holds:
             continue
-        listed = _judge_entries(judge, what, entries, exchange, full)
+        listed = entries_of(entries, tuple(shape.schema["items"]["properties"]))
         if before is not None:
             judge.check(
                 f"rest-resources/{what}-stable",
@@ -62,23 +58,3 @@ def _read_often(robot: Robot, judge: Judge, what: str, path: str, shape: Shape, 
                 cause="another list",
             )
         before = listed
-
-
-def _judge_entries(judge: Judge, what: str, entries: list[Any], exchange: Exchange, full: Shape) -> list[str]:
-    """Judge one list, and return its entries as sorted texts."""
-    names = ("name", "topic", "type") if what == "sensors" else ("name", "type")
-    listed = sorted(json.dumps([entry[name] for name in names]) for entry in entries)
-    twice = next((one for one, two in itertools.pairwise(listed) if one == two), "")
-    judge.check(
-        f"rest-resources/{what}-unique", not twice, exchange, "no entry twice", found=f"twice {twice}", cause="twice"
-    )
-    short = next((entry["type"] for entry in entries if full.problem(entry["type"])), "")
-    judge.check(
-        f"rest-resources/{what}-named-in-full",
-        not short,
-        exchange,
-        f"a type named in full, as {'sensor_msgs/msg/LaserScan' if what == 'sensors' else 'nav_msgs/srv/GetPlan'}",
-        found=f"type {short!r}",
-        cause="not in full",
-    )
-    return listed

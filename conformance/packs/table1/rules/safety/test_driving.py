@@ -30,7 +30,7 @@ _LATE_RESPONSES: Final = 2
 _LATE = NotTested("responses came too late to measure how long a velocity holds")
 
 
-@rule("safety/stop", on=(straight, further_axes))
+@rule("safety/stop", on=(straight, turn, letting_go, further_axes, velocity_walk))
 def stop(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that zero velocity stops the robot before its watchdog would."""
     return outcomes("safety/stop", trace.drive, said_of(run).limits)

@@ -86,17 +86,9 @@ def conflict(trace: RefusedAgain) -> Iterator[Outcome]:
 def outcome(trace: RefusedAgain) -> Iterator[Outcome]:
     """Judge that the 404 after a cancelled goal tells of that goal, and not of the one that it replaced."""
     if trace.cancelled is not None:
-        read, _, id_ = trace.cancelled
+        read, id_ = trace.cancelled
         fault = outcome_fault(read, CANCELED, id_) if read.response.status == HTTPStatus.NOT_FOUND else read.came
         yield Case(not fault, read, f"a 404 with last_goal {{goal_id, status}} of the goal {id_!r}, code 5", fault)
-
-
-@rule("http/head", on=(refused_again,))
-def head(trace: RefusedAgain) -> Iterator[Outcome]:
-    """Judge that HEAD of the goal has the status of GET after the goal was cancelled."""
-    if trace.cancelled is not None and trace.cancelled[0].response.status == HTTPStatus.NOT_FOUND:
-        seen = trace.cancelled[1]
-        yield Case(seen.response.status == HTTPStatus.NOT_FOUND, seen, "404, as GET has it after a cancelled goal")
 
 
 @rule("strict-input/delivery-refused", on=(refused_again,))

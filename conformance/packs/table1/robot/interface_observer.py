@@ -1,0 +1,164 @@
+"""Judge the goal and the velocity that are read over SOAP, as XML or by HEAD, by what is read as JSON around them."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from http import HTTPStatus
+from typing import Any, Final
+
+from conformance.api.rest.interface import RestInterface
+from conformance.documents.json_schema import Shape
+from conformance.documents.representation import UnreadableError, read
+from conformance.packs.table1.robot.goal import difference
+from conformance.packs.table1.robot.message_shapes import GOAL, TWIST
+from conformance.packs.table1.robot.robot import GOAL_PATH, VELOCITY, Velocity, is_near
+from conformance.packs.table1.robot.state_over_soap import answered
+from conformance.packs.table1.statement import said_of
+from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener, Unanswered
+
+# One interface may be behind the other: once is none too often, and neither is any time so soon after a change, s.
+_OFTEN: Final = 2
+_BEHIND_S: Final = 0.5
+_XML: Final = "application/xml"
+_LARGE: Final = 100_000
+# A value that was not read yet, and one of which HEAD says only that it is there.
+_UNREAD: Final = object()
+_THERE: Final = object()
+_HEAD: Final = "http/head"
+
+
+@dataclass
+class _State:
+    """What was read of one state.
+
+    Attributes:
+        name: of the state.
+        shape: of its value.
+        over_soap, as_xml: what is broken where SOAP, or XML, shows another value.
+        differs: returns where a value differs from another one, or an empty text; None: there is no such state.
+        before: the value as JSON that was read last since anything may have changed it.
+        since: values over SOAP and as XML since then, with their exchanges and requirements.
+    """
+
+    name: str
+    shape: Shape
+    over_soap: str
+    differs: Callable[[Any, Any], str]
+    as_xml: str = "rest-formats/same-values"
+    before: Any = _UNREAD
+    since: list[tuple[Any, Exchange, str]] = field(default_factory=list)
+
+
+class InterfaceObserver(Listener):
+    """Listens to all exchanges of one run, and compares what the interfaces and formats show of one state.
+
+    Args:
+        api: the robot's REST interface.
+
+    Attributes:
+        suspects: whether a value was another one for the first time, so that another look will tell.
+    """
+
+    def __init__(self, api: RestInterface) -> None:
+        limits = said_of(api.run).limits
+
+        def faster(one: Any, other: Any) -> str:
+            near = is_near(limits, Velocity.of(one), Velocity.of(other), 2)
+            return "" if near else f"{Velocity.of(one)} for {Velocity.of(other)}"
+
+        self._judge = api.run.judge
+        self._settle_s = limits.settle_s
+        velocity = _State("GetVelocity", TWIST, "equivalence/pose", faster)
+        goal = _State("GetGoal", GOAL, "equivalence/goal", difference)
+        self._states = {velocity.name: velocity, goal.name: goal}
+        self._by_url = {api.client.url(VELOCITY): velocity, api.client.url(GOAL_PATH): goal}
+        self._acted_s = self._received_s = 0.0
+        self._others: Counter[tuple[str, str]] = Counter()
+        self.suspects = False
+
+    def answered(self, exchange: Exchange) -> None:
+        """Take one exchange of the run."""
+        request, response = exchange.request, exchange.response
+        sent_s = response.received_s - response.elapsed_ms / 1000
+        crossed, self._received_s = sent_s < self._received_s, max(self._received_s, response.received_s)
+        state = self._by_url.get(request.url)
+        if request.method == "POST":
+            named = [one for name, one in self._states.items() if f"{name}Response".encode() in response.body]
+            asked = [one for name, one in self._states.items() if b":%s" % name.encode() in request.body]
+            if crossed or not asked:
+                self._forget(response.received_s if crossed or b":Get" not in request.body else self._acted_s)
+            elif response.ok or (asked[0].shape is GOAL and b"Fault" in response.body):
+                found, problem = answered(exchange, asked[0].shape) if named else (None, "")
+                nothing = bool(problem) or found is None or bool(asked[0].shape.problem(found))
+                if asked[0].shape is GOAL or not nothing:
+                    asked[0].since.append((None if nothing else found, exchange, asked[0].over_soap))
+        elif request.method not in SAFE_METHODS or crossed:
+            self._forget(response.received_s)
+        elif request.method == "HEAD" and state is not None and state.shape is GOAL:
+            state.since.append((None if response.status == HTTPStatus.NOT_FOUND else _THERE, exchange, _HEAD))
+        elif request.method == "GET" and state is not None and len(response.body) < _LARGE:
+            self._read(state, exchange)
+
+    def by_hand(self, exchange: Exchange) -> None:
+        """Take a request that was written by hand: whatever it did is not known."""
+        self._forget(max(exchange.response.received_s, self._received_s))
+
+    def unanswered(self, request: Unanswered) -> None:
+        """Take a request without a response: it may have been carried out."""
+        if request.request.method not in SAFE_METHODS:
+            self._forget(self._received_s)
+
+    def _forget(self, at_s: float) -> None:
+        """Begin anew, as something may have changed the states."""
+        self._acted_s = at_s
+        for state in self._states.values():
+            state.before, state.since = _UNREAD, []
+
+    def _read(self, state: _State, exchange: Exchange) -> None:
+        """Take a value over REST."""
+        response = exchange.response
+        value: Any = None
+        if response.status == HTTPStatus.NOT_FOUND and state.shape is GOAL:
+            is_json = "xml" not in response.media_type
+        elif response.ok and response.media_type in {"application/json", _XML}:
+            is_json = response.media_type != _XML
+            try:
+                value = read(response.media_type, response.body, state.shape.schema)
+            except UnreadableError:
+                return
+            if state.shape.problem(value):
+                return
+        else:
+            return
+        if not is_json:
+            state.since.append((value, exchange, state.as_xml))
+            return
+        if state.before is not _UNREAD and not _differs(state, state.before, value):
+            for other, one, requirement in state.since:
+                self._compare(state, (other, one, requirement), value)
+        state.before, state.since = value, []
+
+    def _compare(self, state: _State, read_otherwise: tuple[Any, Exchange, str], value: Any) -> None:
+        """Judge a value that was read over SOAP or as XML between two equal ones."""
+        other, exchange, requirement = read_otherwise
+        if state.shape is TWIST and exchange.response.received_s < self._acted_s + self._settle_s + _BEHIND_S:
+            return
+        found = _differs(state, other, value)
+        key = state.name, requirement
+        self._others[key] += bool(found)
+        self.suspects = bool(found) and self._others[key] < _OFTEN
+        soon = exchange.response.received_s < self._acted_s + _BEHIND_S and requirement != _HEAD
+        self._judge.check(
+            requirement,
+            not found or soon or self._others[key] < _OFTEN,
+            exchange,
+            "what GET as JSON gives before and after it",
+            found=f"{found}; {self._others[key]} times",
+            cause=f"{state.name} now and then",
+        )
+
+
+def _differs(state: _State, one: Any, other: Any) -> str:
+    if one is None or other is None:
+        return "" if one is other else "none" if one is None else "one where there is none"
+    return "" if one is _THERE else state.differs(one, other)
