@@ -32,6 +32,9 @@ from conformance.transport.exchange import Exchange, NoAnswerError
 _PAGES: Final = 4
 _VALUES: Final = {"quick": 3}
 _MOST_VALUES: Final = 12
+# As many times an exploration's time one list may take; one that once took more than a second, this part of it.
+_BUDGETS: Final = 3
+_SLOW_SHARE: Final = 4
 # A fault counts that was seen twice in so many tries; the list was the same before and after, read so often.
 _TRIES: Final = 4
 _TWICE: Final = 2
@@ -81,21 +84,22 @@ def pages_of_lists(api: RestInterface, values: Values) -> tuple[Paged, ...]:
     """Read each list in parts, by each of its parameters for that, and compare the parts with the list."""
     found, is_possible = list[Paged](), False
     for listing in lists_of(api):
-        if listing.offset or listing.page or listing.cursor:
+        if listing.limit or listing.offset or listing.page or listing.cursor:
             is_possible = True
             api.run.limit.check()
             with suppress(NoAnswerError):  # the survey tells what breaks a connection
                 found += _pages_of(Reader(api, values, listing))
     if not is_possible:
-        raise NotPossibleError("no list that may be read has parameters for its pages")
+        raise NotPossibleError("no list that may be read has parameters for a part of it")
     return tuple(found)
 
 
 def _pages_of(reader: Reader) -> Iterator[Paged]:
-    """Yield what is seen of a list in parts: as it is, sorted by a member that no two items share, and filtered."""
-    page = reader.page()
+    """Yield what is seen of a list in parts: as it is, sorted, and filtered."""
+    page, until = reader.page(), reader.until
     for query, by in (({}, ""), *_selections(reader.listing, page)) if page is not None else ():
-        yield from _Parts(replace(reader, always=query, by=by)).all()
+        if time.monotonic() < until:
+            yield from _Parts(replace(reader, always=query, by=by)).all(until)
 
 
 def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], str]]:
@@ -120,11 +124,12 @@ def vary_lists(api: RestInterface, values: Values) -> None:
         api.run.limit.check()
         with suppress(NoAnswerError):
             reader = Reader(api, values, listing)
-            page = reader.page()
+            page, until = reader.page(), reader.until
             if page is not None and page.items:
                 reader.refused()
                 for query in _queries(listing, page, _VALUES.get(api.run.effort.name, _MOST_VALUES)):
-                    reader.read(query)
+                    if time.monotonic() < until:
+                        reader.read(query)
                 _settled(reader)
 
 
@@ -144,6 +149,12 @@ class Reader:
     listing: Listing
     always: dict[str, Any] = field(default_factory=dict)
     by: str = ""
+
+    @property
+    def until(self) -> float:
+        """The time at which enough of it was read, if it is read from now on, s of the monotonic clock."""
+        share = _SLOW_SHARE if self.listing.operation.label in self.api.slow else 1
+        return time.monotonic() + _BUDGETS * self.api.run.effort.budget_s / share
 
     @property
     def usual(self) -> Inputs:
@@ -229,14 +240,14 @@ class _Parts:
 
     reader: Reader
 
-    def all(self) -> Iterator[Paged]:
-        """Yield what each way to read the list in parts has shown."""
+    def all(self, until: float) -> Iterator[Paged]:
+        """Yield what each way to read the list in parts has shown, until a time on the monotonic clock."""
         whole = self.reader.page()
         fewest = _FEWEST if self.reader.by or whole is None else max(_FEWEST, len(whole.items))
         if whole is None or len(set(whole.identities)) < fewest:
             return
         for walk in (self._entire, self._shifted, self._beyond, self._by_offset, self._by_page, self._by_cursor):
-            found = self._twice(walk, whole)
+            found = self._twice(walk, whole) if time.monotonic() < until else None
             if found is not None:
                 yield found
 
