@@ -123,10 +123,16 @@ class Totals:
         elsewhere = {one.name for one in (listing.page, listing.cursor) if one is not None}
         if not sent.keys() <= listing.known - elsewhere:
             return
+        texts = {one.name: sent[one.name] for one in (listing.limit, listing.offset) if one and one.name in sent}
+        if any(number_of(text) == 0 and text != "0" for text in texts.values()):
+            return
         offset = number_of(sent.get(listing.offset.name, "")) if listing.offset is not None else 0
         plain = sent.keys().isdisjoint(one.name for one in listing.filters.values())
         most = listing.most(sent)
-        whole = not page.goes_on and (not most or shown < most) and (shown > 0 or offset == 0)
+        # A limit of 0 may ask for no items, or for all.
+        is_open = listing.limit is None or listing.limit.name not in sent
+        is_beyond = shown == 0 and offset > 0
+        whole = not page.goes_on and (shown < most or (is_open and not most)) and not is_beyond
         sure = whole and not self._is_cut(listing, shown, sent)
         part = _Part(occasion, page, frozenset(sent), offset, plain=plain, whole=whole, sure=sure)
         for name, total in page.totals.items():

@@ -337,9 +337,24 @@ def _beyond(seen):
         seen.read(VALVES).read([], body={"items": [], "total": 4}, after=4.0, offset=99)
 
 
+def _nothing(seen):
+    seen.read(VALVES)
+    for query in ({"limit": 0}, {"offset": 10**12}, {"limit": 10**12, "offset": 5}) * 3:
+        seen.read([], body={"items": [], "total": 4}, after=4.0, **query)
+
+
+def _from_the_end(seen):
+    seen.read(VALVES)
+    for _ in range(3):
+        seen.read(VALVES[3:], body={"items": VALVES[3:], "total": 4}, after=4.0, offset=-1)
+        seen.read(VALVES[:3], body={"items": VALVES[:3], "total": 4}, after=4.0, limit=-1)
+
+
 @pytest.mark.parametrize(
     ("name", "play"),
     [
+        ("total", _nothing),
+        ("total", _from_the_end),
         ("count", _page_count),
         ("total", _changed_beside),
         ("total", _all_unfiltered),
