@@ -53,7 +53,9 @@ def _watched(
     listeners: list[Listener] = []
     if api is not None:
         elsewhere = [service.endpoint for service in services]
-        checkers += [Habits(api), RestCheckers(run.contract, api.client.base_url, elsewhere)]
+        judging = RestCheckers(run.contract, api.client.base_url, elsewhere)
+        checkers += [Habits(api), judging]
+        listeners.append(judging)
         listeners += api.device.observers(api)
         listeners += [one for one in (other_exchanges, kept_exchanges) if one is not None]
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):

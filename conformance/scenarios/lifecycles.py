@@ -116,6 +116,7 @@ class _Cycle:
         count = _KEPT if delete is None else _FEW if effort.name == "quick" or effort.slow else _MANY
         try:
             self._create_all(count)
+            self.living.look_at_older()
             self._change_all()
             self._act()
             if delete is not None:

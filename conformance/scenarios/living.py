@@ -10,8 +10,9 @@ from enum import StrEnum
 from functools import partial
 from http import HTTPStatus
 from typing import Any, Final
+from urllib.parse import quote
 
-from conformance.api.rest.things import differences
+from conformance.api.rest.things import differences, identifier_of, is_marked_deleted, represented
 from conformance.documents.json_schema import Schema
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation
@@ -29,6 +30,7 @@ _SHARED: Final = re.compile(r"(?:default|primary|active|selected|current|order|i
 _ENDED: Final = frozenset(
     {"done", "finished", "completed", "complete", "ended", "failed", "cancelled", "canceled", "succeeded", "expired"}
 )
+_STATES: Final = ("state", "status", "phase")
 # A collection that keeps the newest so many things drops the oldest.
 _RING: Final = 3
 
@@ -237,7 +239,7 @@ class Living:
     @staticmethod
     def _is_ended(thing: Thing) -> bool:
         """Return whether a thing has ended by itself, by what was last read of it."""
-        now = members(thing.last, ("state", "status", "phase"))
+        now = members(thing.last, _STATES)
         return any(isinstance(one, str) and one.casefold() in _ENDED for one in now.values())
 
     def _is_dropped(self, thing: Thing, after: Exchange) -> bool:
@@ -280,6 +282,28 @@ class Living:
             self.note(kind, operation, listing.exchange, f"{expected} after {_said(after)}", other, thing)
             thing.is_told = True
 
+    def look_at_older(self) -> None:
+        """Look whether the list has what the run created before, and what can be read and is in a listed state."""
+        lister, before, parameters = self.lister, self.listing, self.read.parameter("path")
+        if lister is None or before is None or len(parameters) > 1 or chooses(lister) or not self._shown:
+            return
+        for id_ in self.writer.values.known_ids(self.read, parameters[0]) if before.is_whole else ():
+            name, text = str(id_).casefold(), quote(str(id_), safe="")
+            path = self.read.template.replace(f"{{{parameters[0].name}}}", text)
+            found = None if name in before.ids else self.writer.send(self.read, path)
+            if found is None or not found.response.ok or not self._is_listable(found, name, before):
+                continue
+            listing = self.writer.until(partial(self.list_of, self.things[-1]), partial(_has, name))
+            other = "" if name in listing.ids or not listing.is_whole else "a list without it"
+            expected = f"a list with the thing {id_}, which can be read"
+            self.note(Kind.THERE, lister.label, listing.exchange, expected, other, self.things[-1])
+
+    def _is_listable(self, found: Exchange, name: str, listing: WholeList) -> bool:
+        """Return whether a thing has the identifier, is not marked as deleted, and in the state of a listed one."""
+        value = read_json(found.response.body).value
+        states = [{one.get(key) for key in _STATES} for one in (represented(value, _STATES), *listing.items)]
+        return identifier_of(value, self.read) == name and not is_marked_deleted(value) and states[0] in states[1:]
+
     def list_of(self, thing: Thing) -> WholeList:
         """Read the list that a thing is in."""
         if self.lister is None:
@@ -304,6 +328,10 @@ class Living:
             elif thing.state is State.ALIVE and thing.id in listing.twice:
                 found.append((thing, Kind.THERE, f"a list with the thing {thing.id} once", "a list with it twice"))
         return found
+
+
+def _has(name: str, listing: WholeList) -> bool:
+    return name in listing.ids
 
 
 def _said(after: Exchange) -> str:
