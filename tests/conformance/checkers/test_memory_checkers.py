@@ -11,7 +11,7 @@ from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
 
 BASE = "http://device:8000/api"
-_TYPE = (("Content-Type", "application/json"),)
+_TYPE, _HOST = (("Content-Type", "application/json"),), (("Host", "device:8000"),)
 _MEMBERS = {
     "id": {"type": "string"}, "name": {"type": "string"}, "rank": {"type": "integer"}, "state": {"type": "string"},
 }  # fmt: skip
@@ -188,7 +188,7 @@ def test_a_request_over_a_raw_socket_may_have_written(contract, method, forgets)
     """A checker learns of such a request without its body, as PUT may have created what was deleted."""
     checkers = RestCheckers(contract, BASE)
     deleted, read = (
-        Exchange(Request(name, f"{BASE}/jobs/1", (), b""), Response(status, _TYPE, body, 10.0, received_s=at))
+        Exchange(Request(name, f"{BASE}/jobs/1", _HOST, b""), Response(status, _TYPE, body, 10.0, received_s=at))
         for name, status, body, at in (("DELETE", 204, b"", 1000.0), ("GET", 200, b'{"id": "1"}', 1009.0))
     )
     assert GONE not in {case.requirement for case in checkers(deleted)}
