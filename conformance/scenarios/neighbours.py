@@ -22,6 +22,8 @@ from conformance.scenarios.survey import REFUSALS, Survey, Surveyor
 NO_TAG: Final = '"roaas-nothing-has-this-tag"'
 # As many values of an id are tried; and as many queries of one operation, and of all at quick.
 _TRIED, _QUERIES, _AT_QUICK = 3, 3, 8
+# Each operation is read after so many refusals at standard effort, and after two at quick.
+_REFUSALS: Final = 8
 # Each operation has been read so often by then: with the reads that come later, one wrong response in twenty is met.
 _READS: Final = 17
 # Operations are read more often where the device usually responds in so many ms.
@@ -39,15 +41,18 @@ def neighbours(api: RestInterface, values: Values) -> Survey:
         if item.method == "GET" and allowed(api, item) and item.label not in slow
     ]
     surveyor = Surveyor(api, values)
-    refusals = cycle(_refusals(api) or [None])
-    queries = _AT_QUICK if api.run.effort.name == "quick" else len(reads) * _QUERIES
+    found = _refusals(api)
+    refusals = cycle(found or [None])
+    is_quick = api.run.effort.name == "quick" or api.run.effort.slow
+    queries = _AT_QUICK if is_quick else len(reads) * _QUERIES
     for read in api.run.effort.subsample(reads, _FEW_READS):
         usual = _after(surveyor, read, usual_inputs(read, values)[:_TRIED], refusals)
         if usual is None:
             continue
         _head(surveyor, read, usual)
         _cached(surveyor, read, usual)
-        _after(surveyor, read, [usual], refusals)
+        for _ in found[: 1 if is_quick else _REFUSALS]:
+            _after(surveyor, read, [usual], refusals)
         for inputs in islice(_queries(read, usual, values), min(queries, _QUERIES)):
             queries -= 1
             if surveyor.send(read, Variation(Kind.AGAIN, "", "", inputs)).ok:

@@ -3,7 +3,8 @@
 import json
 
 import pytest
-from small_device import certified
+from aiohttp import web
+from small_device import REFUSED, answers, certified, constant, described, error, reading, small_device
 from wired_device import CALLS, wired_device
 
 # Faults of one run, each with the requirement that it breaks and what a finding of it names.
@@ -80,3 +81,35 @@ def test_a_right_device_of_any_style_passes(styles, tmp_path):
     with wired_device(styles=styles) as url:
         done = certified(url, tmp_path / "out", *CALLS)
     assert (done.exit_code, done.blamed) == (0, {}), done.text
+
+
+@pytest.mark.parametrize("missing", [405, 404])
+def test_what_the_device_has_named_is_asked_by_undeclared_methods(missing, tmp_path):
+    axis = {"type": "object", "required": ["id"], "properties": {"id": {"type": "string"}}}
+    key = {"parameters": [{"in": "path", "name": "axisId", "required": True, "schema": {"type": "string"}}]}
+    act = {"post": {"responses": {"200": answers({}), "4XX": REFUSED}}}
+    paths = {
+        "/axes": reading({"type": "array", "items": axis}),
+        "/axes/{axisId}": {**key, **reading(axis)},
+        "/axes/{axisId}/home": {**key, **act},
+        "/stop": act,
+    }
+
+    async def one(request: web.Request) -> web.Response:
+        return web.json_response({"id": "x7"}) if request.match_info["axisId"] == "x7" else error(404, "no such axis")
+
+    async def home(request: web.Request) -> web.Response:
+        return error(409 if request.match_info["axisId"] == "x7" else 404, "not now")
+
+    async def none(_: web.Request) -> web.Response:
+        return error(missing, "no such thing", Allow="POST")
+
+    routes = {
+        "/axes": constant([{"id": "x7"}]),
+        "/axes/{axisId}": {"GET": one},
+        "/axes/{axisId}/home": {"POST": home, "GET": none},
+        "/stop": {"POST": constant({})["GET"]},
+    }
+    with small_device(described(paths), routes) as url:
+        done = certified(f"{url}/openapi.json", tmp_path / "out", "--call", "POST *")
+    assert ("description/method-refused" in done.blamed) is (missing == 404), done.text

@@ -1,6 +1,7 @@
 """Methods: those that a resource has, those that it lacks, and the Allow field (RFC 9110 9, 10.2.1, 15.5.6)."""
 
 from http import HTTPStatus
+from typing import cast
 
 import pytest
 
@@ -37,9 +38,7 @@ def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
     for resource in resources_of(api.run.contract):
         if api.run.contract.described and not any(allowed(api, item) for item in resource.operations.values()):
             continue
-        # Of a described API, the survey may have found what is there.
-        working = (api.working[item.label] for item in resource.operations.values() if item.label in api.working)
-        first = next(working, None) or example_call(api, next(iter(resource.operations.values())))
+        first = _found(api, resource) or example_call(api, next(iter(resource.operations.values())))
         # Only the address is used: a request with a body, or one that moves the robot, is never sent from here.
         call = Call(first.operation, first.values)
         if resource.optional:
@@ -48,6 +47,20 @@ def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
                 continue
         found.append((resource, call))
     return found
+
+
+def _found(api: RestInterface, resource: Resource) -> Call | None:
+    """Return a request for a resource of a described API with ids of something that the survey has found there."""
+    own = (api.working[item.label] for item in resource.operations.values() if item.label in api.working)
+    if call := next(own, None):
+        return cast("Call", call)
+    first = next(iter(resource.operations.values()))
+    names = {item.name for item in first.parameter("path")}
+    for call in api.working.values() if names else ():
+        known = {item.name for item in call.operation.parameter("path")}
+        if names <= known and resource.template.startswith(call.operation.template.rstrip("/")):
+            return Call(first, {name: call.values[name] for name in names})
+    return None
 
 
 @pytest.mark.requirement("http/method-not-allowed", "http/allow", "http/allow-agrees")
@@ -106,6 +119,10 @@ def test_options(api: RestInterface, judge: Judge) -> None:
         if there:
             seen.append((resource, exchange))
     _judge_agreement(api, judge, seen)
+    # What is still there now, was there when it was asked (checkers.resources).
+    for call in [call for call in api.working.values() if call.operation.method == "GET"]:
+        if call.operation.parameter("path") and call.operation.label not in api.streams:
+            call.send(api)
 
 
 def _named(exchange: Exchange) -> set[str]:
