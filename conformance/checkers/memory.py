@@ -15,7 +15,14 @@ from typing import Any, Final
 from urllib.parse import quote, unquote, urlsplit
 
 from conformance.api.rest.references import collections_of
-from conformance.api.rest.things import collection_of, differences, identified, is_marked_deleted, represented
+from conformance.api.rest.things import (
+    collection_of,
+    differences,
+    identified,
+    is_marked_deleted,
+    is_shared,
+    represented,
+)
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_text import read_json
@@ -218,7 +225,9 @@ class Memory:
                 yield from self._lasts(kept, age_s, str(wanted))
                 continue
             # It had been written, and something was sent since then; or it was never written.
-            was_lost = name in thing.shown and thing.shown[name] < self._acts
+            # Another thing may be the default one now.
+            is_given_away = wanted is True and is_shared(name)
+            was_lost = not is_given_away and name in thing.shown and thing.shown[name] < self._acts
             if was_lost or (name not in thing.shown and age_s > _SETTLES_S):
                 thing.differs[name] += 1
                 if thing.differs[name] >= _SEEN:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,11 +11,10 @@ from http import HTTPStatus
 from typing import Any, Final
 from urllib.parse import quote
 
-from conformance.api.rest.things import differences, identifier_of, is_marked_deleted, represented
+from conformance.api.rest.things import differences, identifier_of, is_marked_deleted, is_shared, represented
 from conformance.documents.json_schema import Schema
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation
-from conformance.documents.parameters import plain_name
 from conformance.scenarios.whole_list import WholeList, chooses, read_whole
 from conformance.scenarios.writing import Write, Writer, members
 from conformance.transport.exchange import Exchange
@@ -24,8 +22,6 @@ from conformance.transport.exchange import Exchange
 ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 # So many things are read after one step.
 _LOOKED: Final = 4
-# Members that one of several things has: another one gets it, or gets another place in an order.
-_SHARED: Final = re.compile(r"(?:default|primary|active|selected|current|order|index|rank|priority|position|sequence)$")
 # The states of things that end by themselves, and may be removed then.
 _ENDED: Final = frozenset(
     {"done", "finished", "completed", "complete", "ended", "failed", "cancelled", "canceled", "succeeded", "expired"}
@@ -176,7 +172,7 @@ class Living:
         thing.schema = next(iter(operation.bodies.values())).schema
         if isinstance(body, dict):
             now = members(write.found, body)
-            usable = {name: one for name, one in body.items() if name in now and not _SHARED.search(plain_name(name))}
+            usable = {name: one for name, one in body.items() if name in now and not is_shared(name)}
             thing.kept = {name: one for name, one in usable.items() if not self._differ(thing, {name: one}, now)}
 
     def _differ(self, thing: Thing, kept: dict[str, Any], now: dict[str, Any]) -> list[str]:

@@ -28,6 +28,8 @@ _OWN: Final = re.compile(
 _DELETED: Final = re.compile(r"delet|remov|archiv|retire|decommission|trash|tombstone|gone")
 _STATES: Final = ("status", "state", "lifecycle", "phase")
 _ALIVE: Final = frozenset({"active", "isactive", "alive"})
+# Members that one of several things has: another one gets it, or gets another place in an order.
+_SHARED: Final = re.compile(r"(?:default|primary|active|selected|current|order|index|rank|priority|position|sequence)$")
 # Formats of texts that are the same in every spelling but for case and punctuation.
 _COMPARED: Final = frozenset({"", "email", "uuid", "hostname", "date", "date-time"})
 _NEAR: Final = {"rel_tol": 0.02, "abs_tol": 0.01}
@@ -152,6 +154,11 @@ def is_devices(name: str, part: Any, collections: frozenset[str]) -> bool:
     given = flat(part) if isinstance(part, dict) else {}
     marked = given.get("readOnly") or given.get("writeOnly") or given.get("format") in {"password", "byte", "binary"}
     return bool(marked or "const" in given or _OWN.search(plain_name(name)) or refers(name, given, collections))
+
+
+def is_shared(name: str) -> bool:
+    """Return whether a member may change when another thing is written, as only one thing is the default one."""
+    return bool(_SHARED.search(plain_name(name)))
 
 
 def _alike(value: Any, other: Any, schema: Schema) -> bool:  # noqa: PLR0911 - one for each type

@@ -14,6 +14,7 @@ BASE = "http://device:8000/api"
 _TYPE, _HOST = (("Content-Type", "application/json"),), (("Host", "device:8000"),)
 _MEMBERS = {
     "id": {"type": "string"}, "name": {"type": "string"}, "rank": {"type": "integer"}, "state": {"type": "string"},
+    "is_default": {"type": "boolean"},
 }  # fmt: skip
 _JOB = {"type": "object", "properties": _MEMBERS}
 _BODY = {"required": True, "content": {"application/json": {"schema": _JOB}}}
@@ -95,6 +96,11 @@ BROKEN = {
 }  # fmt: skip
 #: The same for right devices.
 RIGHT = {
+    "another one is the default one": [
+        *(_put("8", name="c", is_default=True), 10.0, _get("8", name="c", is_default=True)),
+        *(_put("1", is_default=True), _get("1", is_default=True), _put("2", is_default=True)),
+        *(_get("1", is_default=False), _get("1", is_default=False), _get("1", is_default=False)),
+    ],
     "deleted a moment ago": [_delete("1"), _get("1"), _get("1", 404)],
     "deleted, and marked so": [_delete("1"), 5.0, _get("1", deleted=True), _get("1", state="archived")],
     "deleted, and put again": [_delete("1"), _put("1", 201), 5.0, _get("1")],
