@@ -16,6 +16,7 @@ from urllib.parse import quote, unquote, urlsplit
 
 from conformance.api.rest.references import collections_of
 from conformance.api.rest.things import (
+    as_answered,
     collection_of,
     differences,
     identified,
@@ -263,4 +264,9 @@ def _body_of(occasion: Occasion, operation: Operation) -> dict[str, Any] | None:
     """Return the object that a request has written; None if it is another content, or one that is not allowed."""
     is_first = occasion.request.media_type == next(iter(operation.bodies), None)
     value = read_json(occasion.request.body).value if is_first and is_json(occasion.request.media_type) else None
-    return value if isinstance(value, dict) and occasion.is_valid else None
+    if not isinstance(value, dict) or not occasion.is_valid:
+        return None
+    response = occasion.response
+    answer = read_json(response.body).value if is_json(response.media_type) else None
+    shown = represented(answer, {plain_name(name) for name in value})
+    return as_answered(value, shown, {}, operation.bodies[occasion.request.media_type].schema)

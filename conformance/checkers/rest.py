@@ -13,7 +13,7 @@ from conformance.checkers.occasion import Occasion
 from conformance.checkers.resources import Resources
 from conformance.checkers.texts import Texts
 from conformance.contract.pack import Contract
-from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange, Listener, NoAnswer, Unanswered
+from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
 from conformance.verdict.case import Case
 
 # Those that judge any response; those that judge what the description may say of it.
@@ -24,7 +24,7 @@ _DOCUMENTS: Final = (
 )  # fmt: skip
 
 
-class RestCheckers(Listener):
+class RestCheckers:
     """Judges each exchange with a REST interface, whoever sent it.
 
     Args:
@@ -41,9 +41,9 @@ class RestCheckers(Listener):
         described = (Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory) if self._memory else ()
         self._over_time = (conditional.Conditional(), *described)
 
-    def by_hand(self, exchange: Exchange) -> None:
-        """Take a request over a raw socket, which is not judged: nobody knows what it has changed."""
-        if self._memory is not None and exchange.request.method not in SAFE_METHODS:
+    def forget(self) -> None:
+        """Forget what was written: nobody knows what a request did that these checkers are not told of."""
+        if self._memory is not None:
             self._memory.forget()
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
@@ -54,8 +54,7 @@ class RestCheckers(Listener):
         if context is None:
             return
         if isinstance(attempt, Unanswered):
-            if self._memory is not None:
-                self._memory.forget()
+            self.forget()
             # A malformed request may be answered in any way.
             if context.usual and attempt.kind is NoAnswer.MALFORMED:
                 yield Case(False, attempt, fields.WELL_FRAMED, attempt.problem, requirement="http/framing")  # noqa: FBT003

@@ -53,9 +53,7 @@ def _watched(
     listeners: list[Listener] = []
     if api is not None:
         elsewhere = [service.endpoint for service in services]
-        judging = RestCheckers(run.contract, api.client.base_url, elsewhere)
-        checkers += [Habits(api), judging]
-        listeners.append(judging)
+        checkers += [Habits(api), RestCheckers(run.contract, api.client.base_url, elsewhere)]
         listeners += api.device.observers(api)
         listeners += [one for one in (other_exchanges, kept_exchanges) if one is not None]
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):

@@ -17,7 +17,7 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.scenarios.living import Life
 from conformance.scenarios.writing import Write, Writer, members
-from conformance.transport.exchange import NoAnswerError
+from conformance.transport.exchange import Exchange, NoAnswerError
 
 # Words in the names of members by which a client may lose the device.
 _CONNECTING: Final = frozenset(
@@ -92,24 +92,24 @@ def _written(writer: Writer, read: Operation, write: Operation) -> list[Write]:
                     {name: value} if write.method == "PATCH" and fits(schema, {name: value}) else {**first, name: value}
                 )
                 if fits(schema, body) and time.monotonic() < until:
-                    done += _write(writer, read, write, body)
+                    done += _write(writer, read, write, body, before)
             # What never reads as written may show what the device does.
             is_kept = words_of(read.template) & _KEEPING or any(not one.other for one in done)
             found += done if is_kept else ()
     finally:
-        done = _write(writer, read, write, first) if chosen else []
+        done = _write(writer, read, write, first, before) if chosen else []
     return found + (done if found else [])
 
 
-def _write(writer: Writer, read: Operation, write: Operation, body: Any) -> list[Write]:
+def _write(writer: Writer, read: Operation, write: Operation, body: Any, before: Exchange) -> list[Write]:
     """Write a value; return that with what was read on the connection, and on another one. Nothing if it is refused."""
     sent = writer.conditional(write, read, "", body)
     if not sent.response.ok or sent.response.status == _ACCEPTED:
         return []
-    done = writer.read_back(write, read, "", sent)
+    done = writer.read_back(write, read, "", sent, before=before)
     if done.other:
         return [done]
-    return [done, writer.read_back(write, read, "", sent, fresh=True)]
+    return [done, writer.read_back(write, read, "", sent, before=before, fresh=True)]
 
 
 def _is_changeable(name: str, schema: Schema, writer: Writer) -> bool:

@@ -66,6 +66,9 @@ _NOT_FOUND: Final = 404
 _NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
 #: Statuses by which a request is refused for what is in it, or for the thing's state.
 REFUSALS: Final = frozenset({400, 404, 405, 409, 411, 412, 413, 415, 422})
+# Those by which a device may refuse a second thing of one name, and the requests that ask for acceptance.
+_DOUBTED: Final = frozenset({400, 409, 422})
+_ACCEPTED: Final = frozenset({Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL, Kind.BOUND, Kind.GENERATED})
 # What differs between two responses to one request: times, and ids of requests.
 _VARYING: Final = re.compile(r"[0-9a-fA-F]*\d[0-9a-fA-F]*")
 # How often one request is sent again and again; and cases of Schemathesis, as many of each kind, of one operation.
@@ -94,7 +97,8 @@ class Probe:
         unanswered: the request without a response; None with one.
         validity: valid, invalid or unclear: the request by the description, read back as it was written.
         why: what is invalid in it.
-        invents: whether it refers to something, by an id or a cursor, that the device has not named.
+        invents: whether a refusal may be right: it refers to something, by an id or a cursor, that the device has not
+            named, or creates what may be there only once.
     """
 
     operation: str
@@ -251,7 +255,8 @@ class Surveyor:
             if not goes_on:
                 raise PartialTraceError(self.trace) from none
             return probe
-        self.record(replace(probe, exchange=exchange))
+        doubted = exchange.response.status in _DOUBTED and variation.kind in _ACCEPTED and self._is_single(operation)
+        self.record(replace(probe, exchange=exchange, invents=probe.invents or doubted))
         if exchange.response.cut:
             # An endless response says nothing new the second time, and costs its time each time.
             self.given_up.add(operation.label)
@@ -262,6 +267,16 @@ class Surveyor:
         elif exchange.response.status in REFUSALS:
             self.api.refused.setdefault((exchange.response.status, operation.label), request)
         return self.probes[-1]
+
+    def _is_single(self, operation: Operation) -> bool:
+        """Return whether a creation that succeeded is refused the second time, as where names are unique."""
+        label, usual = operation.label, self.usual.get(operation.label)
+        succeeds = operation.method == "POST" and label in self.api.working
+        if succeeds and usual is not None and label not in self.api.single:
+            with suppress(NotPossibleError, TimeIsOverError, NoAnswerError):
+                again = self._recorded(written(operation, usual), fresh=False)
+                self.api.single[label] = again.response.status in _DOUBTED
+        return self.api.single.get(label, False)
 
     def _described(self, operation: Operation, variation: Variation, request: GeneratedRequest) -> Probe:
         """Return a probe of a request that is not sent yet."""

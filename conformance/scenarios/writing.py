@@ -10,7 +10,7 @@ from typing import Any, Final, TypeVar
 from conformance.api.rest.inputs import usual_inputs, whole_body, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import another, differences, represented
+from conformance.api.rest.things import another, as_answered, differences, represented
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
@@ -142,21 +142,34 @@ class Writer:
         return Settled(found, tuple(one for one in seen[-1] if one in lasting))
 
     def read_back(
-        self, operation: Operation, read: Operation, path: str, sent: Exchange, *, fresh: bool = False
+        self,
+        operation: Operation,
+        read: Operation,
+        path: str,
+        sent: Exchange,
+        *,
+        before: Exchange | None = None,
+        fresh: bool = False,
     ) -> Write:
-        """Read a thing until it shows what a request has written; fresh: on connections of their own."""
+        """Read a thing until it shows what a request has written; before: a read before that; fresh: anew each time."""
         found = self.settled(
-            lambda: self.send(read, path, fresh=fresh), lambda exchange: self.differing(operation, read, sent, exchange)
+            lambda: self.send(read, path, fresh=fresh),
+            lambda exchange: self.differing(operation, read, sent, exchange, before),
         )
         return Write(operation.label, read.label, sent, found.exchange, found.wrong)
 
-    def differing(self, operation: Operation, read: Operation, sent: Exchange, found: Exchange) -> tuple[str, ...]:
+    def differing(
+        self, operation: Operation, read: Operation, sent: Exchange, found: Exchange, before: Exchange | None = None
+    ) -> tuple[str, ...]:
         """Return what differs between the content of a request and a response; none if they cannot be compared."""
         body, media_type = read_json(sent.request.body).value, sent.request.media_type
         if not isinstance(body, dict) or not found.response.ok or media_type not in operation.bodies:
             return ()
-        now = members(found, body)
-        return tuple(differences(body, now, operation.bodies[media_type].schema, read.shape, self.values.collections))
+        schema = operation.bodies[media_type].schema
+        told = as_answered(body, members(sent, body), members(before, body) if before else {}, schema)
+        now, collections = members(found, body), self.values.collections
+        differs = tuple(differences(body, now, schema, read.shape, collections))
+        return differs if any(differences(told, now, schema, read.shape, collections)) else ()
 
     def change(self, operation: Operation, read: Operation, path: str, turn: int) -> Write | None:
         """Write other values to a thing, and read them back; None if the device does not accept them, or only later."""
@@ -165,7 +178,7 @@ class Writer:
             sent = self.conditional(operation, read, path, body)
             if sent.response.ok:
                 is_later = sent.response.status == _ACCEPTED
-                return None if is_later else self.read_back(operation, read, path, sent)
+                return None if is_later else self.read_back(operation, read, path, sent, before=before)
         return None
 
     def conditional(self, operation: Operation, read: Operation, path: str, body: Any = None) -> Exchange:

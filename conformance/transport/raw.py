@@ -17,6 +17,7 @@ import h11
 from conformance.transport.client import HttpClient
 from conformance.transport.connections import open_link
 from conformance.transport.exchange import (
+    SAFE_METHODS,
     Attempt,
     Exchange,
     NoAnswer,
@@ -169,6 +170,8 @@ def talk(
             if answers and short and answers_in(bytes(received), answers) == answers:
                 break
     client.connection.note(request.method)
+    for listener in client.connection.listeners if acts(octets) else ():
+        listener.acted_by_hand()
     silence = NoAnswer.CLOSED if closed else NoAnswer.TIMEOUT
     record(bytes(received), "" if received else _SILENCES[silence], None if received else silence, whole=sent_all)
     client.connection.recent.append(Sending(request, None if received else silence))
@@ -223,6 +226,11 @@ def requests_in(octets: bytes) -> list[tuple[str, str]]:
     """
     found = (match.groups() for match in _REQUEST_LINE.finditer(octets))
     return [((one or three).decode(), (two or four).decode("latin-1")) for one, two, three, four in found]
+
+
+def acts(octets: bytes) -> bool:
+    """Return whether a server may find a request in the bytes that changes something."""
+    return any(method not in SAFE_METHODS for method, _ in requests_in(octets))
 
 
 def _url(client: HttpClient, target: str) -> str:

@@ -31,6 +31,7 @@ class RestInterface:
         first: the usual exchange of each of these operations at the beginning of the run.
         usual_status: status of the survey's last usual request to each operation; 0 without a response.
         refused: requests that the survey of a described API found to be refused, by status and operation.
+        single: whether each operation that creates refuses the same request the second time.
         reads: how often each operation that reads was answered.
         streams: operations whose responses do not end.
         slow: operations that once took more than a second to respond.
@@ -53,6 +54,7 @@ class RestInterface:
     first: dict[str, Exchange] = field(default_factory=dict)
     usual_status: dict[str, int] = field(default_factory=dict)
     refused: dict[tuple[int, str], Any] = field(default_factory=dict)
+    single: dict[str, bool] = field(default_factory=dict)
     reads: Counter[str] = field(default_factory=Counter)
     streams: set[str] = field(default_factory=set)
     slow: set[str] = field(default_factory=set)

@@ -141,6 +141,31 @@ def differences(
             yield f"{shown(other)} as {name} instead of {shown(value)}"
 
 
+def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, Any], schema: Schema) -> dict[str, Any]:
+    """Return what was written, with the values that the response to it shows instead.
+
+    A device that tells which other value it took has written that, but for the one that was there before, and where the
+    schema states which values there are.
+
+    Args:
+        sent: the members that were sent.
+        answer: those in the response.
+        before: those that were read before; empty if nobody read them, or nothing was there.
+        schema: of what was sent.
+    """
+    parts = flat(schema).get("properties", {})
+    return {
+        name: answer[name] if _is_told(value, answer.get(name), before.get(name), flat(parts.get(name, {}))) else value
+        for name, value in sent.items()
+    }
+
+
+def _is_told(sent: Any, told: Any, before: Any, schema: Schema) -> bool:
+    ranges = ("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum")
+    is_stated = "enum" in schema or all(any(word in schema for word in words) for words in ranges)
+    return isinstance(told, str | int | float) and told not in (sent, before) and not is_stated
+
+
 def _parts(schema: Schema, names: Collection[str]) -> dict[str, Any]:
     """Return the properties of the part of a response's schema that has the most of these names."""
     outer = flat(schema).get("properties", {})
