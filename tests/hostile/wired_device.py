@@ -92,7 +92,12 @@ def document() -> dict[str, Any]:
     state = _query("sealed", {"type": "boolean"})
     job = {"type": "object", "required": ["id", "label"], "properties": {"id": {"type": "integer"},
            "label": {"type": "string"}}}  # fmt: skip
-    new_job = {**job, "required": ["label"], "properties": {"label": {"type": "string", "minLength": 1}}}
+    new_job = {
+        **job,
+        "additionalProperties": False,
+        "required": ["label"],
+        "properties": {"label": {"type": "string", "minLength": 1}},
+    }
     text = {**_ERROR, "required": ["text"], "properties": {"text": {"type": "string", "maxLength": 40}}}
     change = {**_optional(_NEW), "minProperties": 1}
     return described(
@@ -292,12 +297,11 @@ class Rack:
             only("GET", "POST")
             if act == "POST":
                 return self._new_tube(body)
-            shown = self._limited(list(self.tubes.values()), query)
             wanted = query.get("sealed", [None])[0]
             if wanted not in {None, "true", "false"}:
                 raise Refused(422, "sealed")
-            shown = [one for one in shown if wanted is None or one["sealed"] == (wanted == "true")]
-            return 200, {}, shown
+            shown = [one for one in self.tubes.values() if wanted is None or one["sealed"] == (wanted == "true")]
+            return 200, {}, self._limited(shown, query)
         if path in {"/log", "/sensors", "/jobs"}:
             only("GET", *(["POST"] if path == "/jobs" else []))
             if act == "POST":
