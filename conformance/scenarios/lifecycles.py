@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from http import HTTPStatus
@@ -114,15 +115,14 @@ class _Cycle:
         effort, things = self.writer.api.run.effort, self.living.things
         delete = self.operations.get(("DELETE", self.item))
         count = _KEPT if delete is None else _FEW if effort.name == "quick" or effort.slow else _MANY
-        try:
+        with suppress(NoAnswerError):  # the survey tells what breaks a connection
             self._create_all(count)
             self.living.look_at_older()
             self._change_all()
             self._act()
+        with suppress(NoAnswerError):
             if delete is not None:
                 self._delete_all(delete)
-        except NoAnswerError:
-            pass  # the survey tells what breaks a connection
         return [replace(one.life, looks=tuple(self.living.looks) if one is things[0] else ()) for one in things]
 
     def changes_alone(self, seconds: float) -> bool:
@@ -182,7 +182,7 @@ class _Cycle:
         usable = [one for one in acting if one.template.count("{") == self.item.count("{")]
         for action in usable[:_ACTIONS]:
             thing = next(reversed(self.living.of(State.ALIVE)), None)
-            if thing is not None and not self.living.is_over:
+            if thing is not None and self._is_item(thing.path) and not self.living.is_over:
                 self._act_on(action, thing)
 
     def _act_on(self, action: Operation, thing: Thing) -> None:
@@ -336,13 +336,16 @@ class _Cycle:
             return []
         there = path_of(target).removeprefix(below)
         last = unquote(there.partition("?")[0].rstrip("/").rpartition("/")[2])
-        is_item = re.fullmatch(
-            re.sub(r"\\{[^{}]*\\}", "[^/]+", re.escape(self.read.template.rstrip("/"))), there.rstrip("/")
-        )
+        is_item = self._is_item(there)
         if created.response.status == HTTPStatus.SEE_OTHER and not is_item:
             return []
         # Two identifiers of another kind may both be right: a number, and a readable name.
         return [there, by_id] if by_id and is_item and last != id_ and last.isdigit() and id_.isdigit() else [there]
+
+    def _is_item(self, path: str) -> bool:
+        """Return whether a path is that of an item, as the description writes it."""
+        template = re.sub(r"\\{[^{}]*\\}", "[^/]+", re.escape(self.item))
+        return re.fullmatch(template, path.rstrip("/")) is not None
 
     def _absent(self, path: str) -> str:
         """Return the path of a thing that hardly exists, beside another one; empty if none can be made."""

@@ -27,6 +27,7 @@ _ENDED: Final = frozenset(
     {"done", "finished", "completed", "complete", "ended", "failed", "cancelled", "canceled", "succeeded", "expired"}
 )
 _STATES: Final = ("state", "status", "phase")
+_MANY: Final = 10
 # A collection that keeps the newest so many things drops the oldest.
 _RING: Final = 3
 
@@ -152,6 +153,7 @@ class Living:
     looks: list[Look] = field(default_factory=list)
     listing: WholeList | None = None
     _shown: bool = False
+    _capped: bool = False
 
     @property
     def is_over(self) -> bool:
@@ -269,7 +271,10 @@ class Living:
     def _look_at_list(self, after: Exchange, operation: str) -> None:
         """Read the list until it has each living thing, once, and none that was deleted."""
         thing = self.things[-1]
+        before, is_new = self.listing, after is thing.life.created
         self.listing = listing = self.writer.until(lambda: self.list_of(thing), lambda one: not self._wrong(one))
+        # A list of many items that does not grow may have a limit of its own.
+        self._capped |= is_new and before is not None and _MANY <= len(listing.items) <= len(before.items)
         wrong = self._wrong(listing)
         self._shown = self._shown or any(one.id in listing.ids for one in self.of(State.ALIVE) if one.id)
         if not wrong:
@@ -311,9 +316,8 @@ class Living:
         """Return what is wrong in a list: the thing, what that shows, what was expected, and what was found."""
         found: list[tuple[Thing, Kind, str, str]] = []
         # A list that has never shown a created thing may leave out such things, if it can leave out any.
-        is_complete = listing.is_whole and (
-            self._shown or (self.lister is not None and not chooses(self.lister) and all(listing.ids))
-        )
+        leaves_out = self.lister is None or chooses(self.lister) or not all(listing.ids) or len(listing.ids) >= _MANY
+        is_complete = listing.is_whole and not self._capped and (self._shown or not leaves_out)
         for thing in self.things:
             if not thing.id or not thing.is_own or thing.is_told:
                 continue

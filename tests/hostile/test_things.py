@@ -30,6 +30,8 @@ _STYLES = {
     "pages by number": ("paged", "page"),
     "pages with a total": ("paged", "total", "offset"),
     "filtered": ("state",),
+    "lists the newest": ("newest",),
+    "lists the oldest": ("oldest",),
 }
 _THERE, _KEPT, _GONE = "description/created-is-there", "description/written-is-read", "description/deleted-is-gone"
 _REFUSED = "description/refused-keeps"

@@ -61,7 +61,9 @@ class Things:
         self.style, self.fault = set(style), fault
         first = {"id": 1, "label": "first", "level": 3, "mode": "slow", "state": "idle"}
         self.there = {} if self.style & {"ring", "named"} else {1: first}
-        self.deleted, self.refused, self.lists, self.last_id = {}, 0, 0, 1
+        if self.style & {"newest", "oldest"}:
+            self.there = {number: {**first, "id": number} for number in range(1, 14)}
+        self.deleted, self.refused, self.lists, self.last_id = {}, 0, 0, max(self.there, default=1)
         self.now = time.monotonic
 
     def description(self):
@@ -324,6 +326,8 @@ class Things:
             self.kept = found = getattr(self, "kept", found) if self.refused else found
         if "state" in self.style:
             found = [one for one in found if one["state"] == "running"]
+        # A limit of which nobody is told.
+        found = found[-12:] if "newest" in self.style else found[:12] if "oldest" in self.style else found
         if "paged" not in self.style:
             return web.json_response(found)
         begin = int(request.query.get("offset") or request.query.get("cursor") or 0)
