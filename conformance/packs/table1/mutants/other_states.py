@@ -229,3 +229,29 @@ class _Lingering:
             elif self._last is not None:
                 return self._last.copy()
         return response
+
+
+class _LostAfter:
+    """The first command after a refusal, or after a SOAP message, is answered and lost."""
+
+    def __init__(self, lost: Callable[[Request], bool], *, soap_message: bool = False) -> None:
+        self._lost, self._soap, self._spoilt = lost, soap_message, False
+
+    def __call__(self, request: Request, forward: Forward) -> Response:
+        if self._spoilt and self._lost(request) and not _is_zero(request):
+            self._spoilt = False
+            return plain(204)(request)
+        response = forward(request)
+        self._spoilt |= request.side == "soap" if self._soap else refusal(response) and request.method != "GET"
+        return response
+
+
+_mutant("goal-cancel-lost", "goal-delete", "The first DELETE after a refused request cancels nothing.").made(
+    lambda: _LostAfter(_DELETE)
+)
+_mutant(
+    "velocity-lost-after-refusal", "velocity-converges", "The first velocity after a refused request is lost."
+).made(lambda: _LostAfter(_PUTS))
+_mutant(
+    "velocity-lost-after-soap", "velocity-converges", "The first velocity after SOAP is lost.", interface="both"
+).made(lambda: _LostAfter(_PUTS, soap_message=True))

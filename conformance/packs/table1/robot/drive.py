@@ -47,7 +47,15 @@ class Drive:
         self._turn_at = 0.0
         self._crowded = False
 
-    def command(self, velocity: Velocity, *, integers: bool = False, xml: bool = False, fresh: bool = False) -> bool:
+    def command(
+        self,
+        velocity: Velocity,
+        *,
+        integers: bool = False,
+        xml: bool = False,
+        fresh: bool = False,
+        before: Callable[[], object] = lambda: None,
+    ) -> bool:
         """PUT a velocity; return whether the response conforms to the contract.
 
         Args:
@@ -55,6 +63,7 @@ class Drive:
             integers: write whole numbers without a fraction.
             xml: send it as XML, if the robot sends its own as XML and takes it.
             fresh: send it on a connection that is closed afterwards.
+            before: called just before the PUT.
 
         Raises:
             NotPossibleError: the robot pursues a goal, so that it cannot be driven.
@@ -64,7 +73,9 @@ class Drive:
             whole = {part: {axis: int(value) for axis, value in side.items()} for part, side in velocity.twist.items()}
             exchange = self.robot.put(VELOCITY, whole)
         else:
-            as_xml = put_as_xml(self.robot, VELOCITY, velocity.twist) if xml else None
+            as_xml = put_as_xml(self.robot, VELOCITY, velocity.twist, before=before) if xml else None
+            if as_xml is None or not as_xml.response.ok:
+                before()
             exchange = as_xml if as_xml and as_xml.response.ok else self.robot.put_velocity(velocity, fresh=fresh)
         return self._commanded(Command(velocity, sent, self.clock.now(), exchange, integers=integers))
 

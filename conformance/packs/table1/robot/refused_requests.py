@@ -15,6 +15,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.calls import read_exchange
 from conformance.api.soap.service import SoapService
+from conformance.contract.interfaces import Interface
 from conformance.packs.table1.robot.delivery import Delivery, path_of
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import goal_body, put_goal
@@ -170,7 +171,7 @@ def send_known(robot: Robot, soap: SoapServices, refused: RefusedRequests) -> No
     robot.rest.send("PUT", path_of(*_NO_NUMBER))
     for path in (POSE, SENSORS):
         robot.rest.send("GET", path, headers=(("Accept", "image/png"),))
-    if soap.publishers is not None:
+    if soap.publishers is not None and Interface.PUBLISHERS not in soap.run.unreachable:
         send_delivery(soap.publishers, Delivery(0, *map(float, range(6))))
 
 

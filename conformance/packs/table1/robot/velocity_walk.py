@@ -81,7 +81,7 @@ class VelocityMachine(RuleBasedStateMachine):
 
     def _full(self, wanted: Velocity) -> bool:
         self._wanted = wanted
-        commanded = self._drive.command(wanted, xml=self._as_xml(wanted))
+        commanded = self._drive.command(wanted, xml=self._as_xml(wanted), before=self._walk.prelude)
         return commanded and self._drive.reach(wanted, "rest-resources/velocity-converges")
 
     def _stop(self) -> bool:
@@ -102,6 +102,7 @@ class VelocityMachine(RuleBasedStateMachine):
         if self._robot.drivable(wanted) != wanted:
             return True  # too narrow a circle for the angular part, or too fast a curve
         self._drive.refresh(self._wanted)
+        self._walk.prelude()
         if not self._drive.command_linear(wanted, xml=self._as_xml(wanted)):
             return False
         self._wanted = wanted

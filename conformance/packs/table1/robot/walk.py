@@ -1,7 +1,9 @@
 """State shared by the random walks of a check: they end by a failure, an unreachable robot, or when all is done."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import cycle, islice
 
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import Trace
@@ -15,6 +17,8 @@ _ENOUGH = "all steps that were planned are done"
 # A command takes about this long to be reached, at least; and this part of the settle time of a robot that is slow.
 _COMMAND_S = 0.4
 _OF_SETTLE = 0.25
+# A pause without any request, s.
+_PAUSE_S = 1.5
 
 
 class Walk:
@@ -30,8 +34,22 @@ class Walk:
         left_out: number of steps left out because the time was up.
     """
 
-    def __init__(self, robot: Robot, effort: Effort, share: float, trace: Trace | None = None) -> None:
-        """Plan a walk that takes about ``share`` of the effort's budget: its steps are counted, not timed."""
+    def __init__(
+        self,
+        robot: Robot,
+        effort: Effort,
+        share: float,
+        trace: Trace | None = None,
+        preludes: Sequence[Callable[[], object]] = (),
+    ) -> None:
+        """Plan a walk that takes about ``share`` of the effort's budget: its steps are counted, not timed.
+
+        Two of the ``preludes`` come before each command: they change nothing, and neither do they spoil the command.
+        """
+        before: list[Callable[[], object]] = [] if effort.slow else list(preludes)
+        if before and effort.name != "quick":
+            before.append(partial(robot.clock.sleep, _PAUSE_S))
+        self._preludes = cycle(before)
         self.robot = robot
         self.drive = Drive(robot)
         self.commands: Counter[tuple[int, ...]] = Counter()
@@ -43,6 +61,11 @@ class Walk:
         self._commands_left = max(
             1, round(share * effort.budget_s / max(_COMMAND_S, _OF_SETTLE * robot.limits.settle_s))
         )
+
+    def prelude(self) -> None:
+        """Do the next two things that command nothing."""
+        for before in islice(self._preludes, 2):
+            before()
 
     def command(self, act: Callable[[], bool]) -> None:
         """Make one step that commands a velocity and waits for it; there are so many of them as time is planned for."""

@@ -1,6 +1,6 @@
 """Commands as XML, in the form in which the robot sends its own state (contract.md#formats)."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from conformance.api.rest.calls import JSON, XML
@@ -10,7 +10,14 @@ from conformance.packs.table1.robot.robot import Robot
 from conformance.transport.exchange import Exchange
 
 
-def put_as_xml(robot: Robot, path: str, value: Mapping[str, Any], *, accept: str = JSON) -> Exchange | None:
+def put_as_xml(
+    robot: Robot,
+    path: str,
+    value: Mapping[str, Any],
+    *,
+    accept: str = JSON,
+    before: Callable[[], object] = lambda: None,
+) -> Exchange | None:
     """PUT a value as XML; return None where the robot sends no XML from there.
 
     Args:
@@ -18,6 +25,7 @@ def put_as_xml(robot: Robot, path: str, value: Mapping[str, Any], *, accept: str
         path: path of the resource.
         value: the value, as JSON would have it.
         accept: media type of the response.
+        before: called just before the PUT.
 
     Raises:
         NoAnswerError: there is no response.
@@ -30,4 +38,5 @@ def put_as_xml(robot: Robot, path: str, value: Mapping[str, Any], *, accept: str
     except UnreadableError:
         return None
     body = xml_bytes(value, local_name(form), form)
+    before()
     return robot.rest.send("PUT", path, headers=(("Content-Type", XML), ("Accept", accept)), body=body)

@@ -7,6 +7,7 @@ from typing import Any, Final
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, rule
 
+from conformance.api.soap.callable_services import SoapServices
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import (
     RATHER_XML,
@@ -20,25 +21,26 @@ from conformance.packs.table1.robot.goal import (
 )
 from conformance.packs.table1.robot.goal_trace import GoalStep
 from conformance.packs.table1.robot.goals import choose_goals
+from conformance.packs.table1.robot.no_commands import no_commands
 from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.robot.walk import Walk
 from conformance.scenarios.scenario import PartialTraceError, scenario
 from conformance.scenarios.stage import Need
 from conformance.transport.exchange import Exchange
-from conformance.verdict.effort import Effort
 from conformance.verdict.explorer import Explorer
+from conformance.verdict.run import Run
 
 _IDS: Final = st.sampled_from((None, "a", "b", "a ", "A"))
 _WHICH: Final = st.integers(0, 1)
 
 
 @scenario(needs={Need.REST, Need.MOTION})
-def goal_walk(robot: Robot, effort: Effort, explore: Explorer) -> tuple[GoalStep, ...]:
+def goal_walk(robot: Robot, run: Run, soap: SoapServices, explore: Explorer) -> tuple[GoalStep, ...]:
     """Send goal requests in random order: after each sequence the goal sent last must be the active one."""
-    walk = Walk(robot, effort, 0.4)
+    walk = Walk(robot, run.effort, 0.4, preludes=no_commands(robot, soap, f"{run.seed}/goals"))
     poses = choose_goals(robot, 1.5, 2)
     steps: list[GoalStep] = []
-    explore.machine(lambda: _Goals(walk, poses, steps), cases=20, steps=effort.cases(12))
+    explore.machine(lambda: _Goals(walk, poses, steps), cases=20, steps=run.effort.cases(12))
     explore.left_out(walk.left_out)
     if walk.unreachable:
         raise PartialTraceError(tuple(steps)) from walk.unreachable
@@ -63,8 +65,8 @@ class _Goals(RuleBasedStateMachine):
         walk.step(self._clear)
 
     def teardown(self) -> None:
-        """Cancel the goal."""
-        self._walk.step(self._clear)
+        """Cancel the goal, if there is one."""
+        self._walk.step(self._cancel if self._active is not None else self._clear)
 
     @rule()
     def ask(self) -> None:
@@ -111,6 +113,7 @@ class _Goals(RuleBasedStateMachine):
     def _put(self, id_: str | None, which: int) -> bool:
         if not self._look():
             return False
+        self._walk.prelude()
         body = goal_body(self._poses[which], self._robot.statement.motion.frame, id_)
         if self._active is not None and id_ is not None and id_ == self._id:
             return self._put_again(body, self._poses[which])
@@ -138,6 +141,7 @@ class _Goals(RuleBasedStateMachine):
     def _cancel(self) -> bool:
         if not self._look():
             return False
+        self._walk.prelude()
         exchange = self._robot.delete_goal(RATHER_XML)
         if self._active is None:
             return self._record("goal-delete-none-success", exchange)

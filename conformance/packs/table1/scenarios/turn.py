@@ -76,7 +76,7 @@ def letting_go(robot: Robot, run: Run, soap: SoapServices, refused: RefusedReque
     make_room(robot)
     send_known(robot, soap, refused)
     again = deque(refused.chosen(soap.there.values(), run.effort))
-    turning = _Turning(robot, Drive(robot), no_commands(robot, soap.subscribers, str(run.seed)), refused=again)
+    turning = _Turning(robot, Drive(robot), no_commands(robot, soap, str(run.seed)), refused=again)
     try:
         turning.play_letting_go(run)
     except Exception as error:
@@ -88,7 +88,7 @@ def letting_go(robot: Robot, run: Run, soap: SoapServices, refused: RefusedReque
 def further_axes(robot: Robot, run: Run, soap: SoapServices) -> Driven:
     """Drive along each axis that the robot has beside those of a robot on two wheels; without any, do nothing."""
     further = [axis for axis in range(len(STILL)) if axis not in {AHEAD, ABOUT} and robot.actuated(axis)]
-    driving = _Turning(robot, Drive(robot), no_commands(robot, soap.subscribers, str(run.seed)))
+    driving = _Turning(robot, Drive(robot), no_commands(robot, soap, str(run.seed)))
     if further:
         make_room(robot)
     try:

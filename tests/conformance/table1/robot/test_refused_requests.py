@@ -7,11 +7,13 @@ import pytest
 from toy_body import interface_of
 
 from conformance.api.soap.callable_services import SoapServices
+from conformance.packs.table1.robot.no_commands import no_commands
 from conformance.packs.table1.robot.refused_requests import RefusedRequests, is_refused
 from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, VELOCITY, Robot
+from conformance.packs.table1.robot.walk import Walk
 from conformance.packs.table1.rules.strict_input import test_refused_state as rules
 from conformance.packs.table1.scenarios.refused_again import RefusedAgain, refused_again
-from conformance.transport.exchange import Exchange, Request, Response
+from conformance.transport.exchange import SAFE_METHODS, Exchange, Request, Response
 from conformance.verdict.case import Case
 from conformance.verdict.effort import Effort
 
@@ -149,7 +151,8 @@ class _Body:
             was, self.goal = self.goal, None
             return (404 if was is None else 204), None
         value = _json(sent)
-        if value is None or value["goal"]["target_pose"]["header"]["frame_id"] != "map":
+        target = value["goal"]["target_pose"] if value else {"header": {"frame_id": ""}}
+        if target["header"]["frame_id"] != "map" or target["pose"]["orientation"]["w"] > 1:
             return self._refuse(sent)
         if self.goal and self.goal["goal_id"]["id"] == value["goal_id"]["id"]:
             same = self.goal["goal"]["target_pose"]["pose"] == value["goal"]["target_pose"]["pose"]
@@ -254,3 +257,25 @@ def test_a_robot_that_stands_still_as_long_as_requests_are_refused_is_found_the_
 
 def _came_at(method: str) -> Exchange:
     return Exchange(Request(method, "http://robot/"), Response(422, (), b"", 1.0))
+
+
+def test_what_commands_nothing_is_refused_or_only_read():
+    body = _Body()
+    with interface_of(body, linear_m_s=0.7, angular_rad_s=1.0, settle_s=0.1) as api:
+        robot = Robot(api)
+        exchanges = [act() for act in no_commands(robot, SoapServices(api.run), "seed")]
+    assert (body.goal, body.speed) == (None, 0.0)
+    assert all(one.response.status >= 400 or one.request.method in SAFE_METHODS for one in exchanges)
+
+
+@pytest.mark.parametrize("effort", ["quick", "standard"])
+def test_two_of_them_come_before_each_command_of_a_walk(api, effort):
+    done = []
+    walk = Walk(Robot(api), Effort(effort), 0.1, preludes=[lambda: done.append(1), lambda: done.append(2)])
+    walk.prelude()
+    assert done == [1, 2]
+
+
+def test_a_slow_robot_is_sent_no_more_than_the_commands(api):
+    walk = Walk(Robot(api), Effort("quick").seen(1000.0), 0.1, preludes=[lambda: pytest.fail("sent")])
+    walk.prelude()
