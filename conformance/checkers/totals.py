@@ -20,7 +20,7 @@ _OFTEN: Final = 2
 # Where servers cut a list without saying so, and where they stop counting.
 _CUTS: Final = (5, 16)
 _FEWEST_CUT: Final = 10
-_CAP: Final = 50
+_CAP: Final = 50  # also the fewest items that a list without parameters for its parts is cut at
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class Totals:
         has_parts = not all(one is None for one in (limit, listing.offset, listing.page, listing.cursor))
         is_declared = limit is not None and limit.name in sent and "maximum" in flat(limit.schema)
         longest = self._longest[listing.operation.label]
-        return has_parts and not is_declared and is_round and shown >= max(_FEWEST_CUT, longest)
+        return not is_declared and is_round and shown >= max(_FEWEST_CUT if has_parts else _CAP, longest)
 
 
 def _is_cap(total: int) -> bool:

@@ -319,6 +319,16 @@ def _cut_by_server(seen):
         seen.read(many, body={"items": many, "total": 21}, after=4.0)
 
 
+def test_a_list_without_parts_may_be_cut_at_many_items(tmp_path):
+    for size, blamed in ((50, set()), (15, {TOTAL})):
+        seen = Seen(tmp_path / str(size), [_text("state", enum=_STATES)], _totalled("count"))
+        items = [{"id": number} for number in range(size)]
+        seen.read(items).write()
+        for _ in range(3):
+            seen.read(items, body={"items": items, "count": size + 1}, after=4.0)
+        assert seen.broken == blamed
+
+
 def _cursor(seen):
     for _ in range(3):
         seen.read(VALVES[:2], body={"items": VALVES[:2], "total": 4, "next_cursor": "x"}, after=4.0)
