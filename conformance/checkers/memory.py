@@ -40,6 +40,7 @@ _REFUSED: Final = range(400, 500)
 # Other clients and devices that answer from several processes: what differs counts when it is seen again.
 _SEEN: Final = 2
 _MOST_PENDING: Final = 20
+_MOST_THINGS: Final = 1_000
 
 
 @dataclass
@@ -51,6 +52,8 @@ class _Thing:
         last: the last request that changed it.
         gone: whether that deleted it.
         made: whether this run created it, and no read has shown it yet.
+        body: that of the POST that created it.
+        replaced: whether an equal one was created later, which may be there in its place.
         written: what it has to read, by member, with the operation that wrote it.
         shown: the members that were read as written, with how much had been sent by then that may change something.
         differs: how often a member was read in another way.
@@ -60,6 +63,8 @@ class _Thing:
     last: Exchange
     gone: bool = False
     made: bool = False
+    body: bytes = b""
+    replaced: bool = False
     written: dict[str, tuple[Any, Operation]] = field(default_factory=dict)
     shown: dict[str, int] = field(default_factory=dict)
     differs: dict[str, int] = field(default_factory=lambda: defaultdict(int))
@@ -92,9 +97,11 @@ class Memory:
         # What is a failure if something else lasts as long, with its age, s, and what was read instead.
         self._pending: dict[tuple[str, str], list[tuple[float, str, Case]]] = defaultdict(list)
 
-    def forget(self) -> None:
-        """Forget all things: nobody knows what a request without a response has done."""
-        self._things.clear()
+    def forget(self, *, deletes: bool = True) -> None:
+        """Forget what a request may have changed of which nobody knows what it did: all things if it ``deletes``."""
+        self._things = {} if deletes else {key: one for key, one in self._things.items() if not one.gone}
+        for thing in self._things.values():
+            thing.written.clear()
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
@@ -168,7 +175,13 @@ class Memory:
         if response.status == HTTPStatus.CREATED:
             body = _body_of(occasion, operation) or {}
             written = {name: (value, operation) for name, value in body.items()}
-            self._things[target.casefold()] = _Thing(target, occasion.exchange, made=True, written=written)
+            thing = _Thing(target, occasion.exchange, made=True, written=written)
+            thing.body = occasion.request.body
+            for one in self._things.values():
+                one.replaced |= one.body == thing.body and one.path.rpartition("/")[0] == path
+            self._things[target.casefold()] = thing
+            if len(self._things) > _MOST_THINGS:
+                del self._things[next(iter(self._things))]
 
     def _read(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
         thing = self._things.get(path.casefold())
@@ -186,7 +199,7 @@ class Memory:
             return
         kept = item.template, ""
         if response.status in _ABSENT and thing.made:
-            if age_s > _SETTLES_S:
+            if age_s > _SETTLES_S and not thing.replaced:
                 expected = f"the thing that {change} has created {age_s:.0f} s before"
                 case = self._case("created-is-there", occasion, expected, cause=item.label)
                 yield from self._differs(kept, age_s, "none", case)

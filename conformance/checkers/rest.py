@@ -41,10 +41,10 @@ class RestCheckers:
         described = (Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory) if self._memory else ()
         self._over_time = (conditional.Conditional(), *described)
 
-    def forget(self) -> None:
-        """Forget what was written: nobody knows what a request did that these checkers are not told of."""
+    def forget(self, *, deletes: bool) -> None:
+        """Forget what may have been changed by a request of which nobody knows what it did."""
         if self._memory is not None:
-            self._memory.forget()
+            self._memory.forget(deletes=deletes)
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Yield the cases of one exchange; none if it went to another interface."""
@@ -54,7 +54,7 @@ class RestCheckers:
         if context is None:
             return
         if isinstance(attempt, Unanswered):
-            self.forget()
+            self.forget(deletes=attempt.request.method == "DELETE")
             # A malformed request may be answered in any way.
             if context.usual and attempt.kind is NoAnswer.MALFORMED:
                 yield Case(False, attempt, fields.WELL_FRAMED, attempt.problem, requirement="http/framing")  # noqa: FBT003

@@ -27,7 +27,7 @@ from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, Listener
 from conformance.transport.parallel import is_busy
 from conformance.transport.passage import Heard
-from conformance.transport.raw import acts
+from conformance.transport.raw import tell
 from conformance.verdict.case import Case, Checker
 from conformance.verdict.evidence import Judge
 from conformance.verdict.observers import Observers
@@ -95,9 +95,8 @@ def _judge_history(
             judge.begin(event.name)
         elif isinstance(event, Sent):
             requests += 1
-            if event.request is not None and event.request.raw is not None and acts(event.request.raw):
-                for listener in listeners:
-                    listener.acted_by_hand()
+            if event.request is not None and event.request.raw is not None:
+                tell(listeners, event.request.raw)
             outcome = None if event.id in withdrawn else event.outcome
             if outcome is not None and _is_heard(event, outcome):
                 _tell(judge, listeners, outcome)

@@ -241,8 +241,8 @@ class Listener:
     def by_hand(self, exchange: Exchange) -> None:
         """Handle a response to bytes over a raw socket; the request has their method and URL alone."""
 
-    def acted_by_hand(self) -> None:
-        """Handle that bytes over a raw socket may have changed something."""
+    def acted_by_hand(self, *, deletes: bool) -> None:
+        """Handle that bytes over a raw socket may have changed something, or deleted it."""
 
     def unanswered(self, request: Unanswered) -> None:
         """Handle a request without a response."""

@@ -20,6 +20,7 @@ from conformance.transport.exchange import (
     SAFE_METHODS,
     Attempt,
     Exchange,
+    Listener,
     NoAnswer,
     NoAnswerError,
     Request,
@@ -170,8 +171,7 @@ def talk(
             if answers and short and answers_in(bytes(received), answers) == answers:
                 break
     client.connection.note(request.method)
-    for listener in client.connection.listeners if acts(octets) else ():
-        listener.acted_by_hand()
+    tell(client.connection.listeners, octets)
     silence = NoAnswer.CLOSED if closed else NoAnswer.TIMEOUT
     record(bytes(received), "" if received else _SILENCES[silence], None if received else silence, whole=sent_all)
     client.connection.recent.append(Sending(request, None if received else silence))
@@ -228,9 +228,11 @@ def requests_in(octets: bytes) -> list[tuple[str, str]]:
     return [((one or three).decode(), (two or four).decode("latin-1")) for one, two, three, four in found]
 
 
-def acts(octets: bytes) -> bool:
-    """Return whether a server may find a request in the bytes that changes something."""
-    return any(method not in SAFE_METHODS for method, _ in requests_in(octets))
+def tell(listeners: Sequence[Listener], octets: bytes) -> None:
+    """Tell that a server may find a request in the bytes that changes something."""
+    acting = {method for method, _ in requests_in(octets)} - SAFE_METHODS
+    for listener in listeners if acting else ():
+        listener.acted_by_hand(deletes="DELETE" in acting)
 
 
 def _url(client: HttpClient, target: str) -> str:

@@ -30,11 +30,11 @@ class Observers(Listener):
         """Judge a request without a response."""
         self._check(request)
 
-    def acted_by_hand(self) -> None:
+    def acted_by_hand(self, *, deletes: bool) -> None:
         """Tell the checkers that know what was written before."""
         for checker in self._checkers:
             if (forget := getattr(checker, "forget", None)) is not None:
-                forget()
+                forget(deletes=deletes)
 
     def _check(self, attempt: Attempt) -> None:
         """Call each checker; what one cannot judge is no reason not to judge the rest of the run."""

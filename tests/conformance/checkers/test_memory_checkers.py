@@ -75,8 +75,11 @@ BROKEN = {
     "deleted after an action": ([_post("1"), _CANCEL, _delete("1"), 4.0, _get("1")], GONE),
     "deleted, and another one created": ([_delete("1"), _post("2"), 3.0, _get("1")], GONE),
     "created, and never there": ([*_LASTING, _post("1"), 4.0, _get("1", 404)], THERE),
-    "created, and another one lasts": ([_post("1"), _post("8"), 4.0, _get("1", 404), _get("8")], THERE),
+    "created, and another one lasts": (
+        [_post("1"), _post("8", name="b"), 4.0, _get("1", 404), _get("8", name="b")], THERE,
+    ),
     "created, and the mode was set": ([*_LASTING, _post("1"), _MODE, 4.0, _get("1", 404)], THERE),
+    "created, and a raw request": ([*_LASTING, _post("1"), _BY_HAND, 4.0, _get("1", 404)], THERE),
     "created after a refusal": ([*_LASTING, _REFUSED, _post("1"), 4.0, _get("1", 410)], THERE),
     "created under a name of the client's": ([*_LASTING, _put("1", 201), 4.0, _get("1", 404)], THERE),
     "lost after another's creation": (
@@ -117,6 +120,11 @@ RIGHT = {
     "a refused DELETE": [_delete("1", 409), 5.0, _get("1")],
     "a DELETE for later": [_delete("1", 202), 5.0, _get("1")],
     "things that end": [_post("8"), _get("8"), _post("1"), 9.0, _get("1", 404)],
+    "created, and replaced by another one of its name": [
+        *[_post("8", name="b"), _post("1"), _post("2"), _post("3", name="c"), 4.0, _get("1", 404)],
+        *[4.0, _get("8", name="b")],
+    ],
+    "created, and perhaps deleted": [*_LASTING, _post("1"), ("RAW", "DELETE", None, None, None), 4.0, _get("1", 404)],
     "created, and deleted": [*_LASTING, _post("1"), _delete("1"), 5.0, _get("1", 404)],
     "created, and reset": [*_LASTING, _post("1"), _RESET, 5.0, _get("1", 404)],
     "created for later": [*_LASTING, _post("1", 202), 5.0, _get("1", 404)],
@@ -171,7 +179,7 @@ def _broken(contract, steps):
         method, path, sent, status, seen = step
         now, after = now + after, 1.0
         if method == "RAW":
-            checkers.forget()
+            checkers.forget(deletes=path == "DELETE")
             continue
         fields = [("Host", "device:8000"), *([("Content-Type", "application/json")] if sent else [])]
         request = Request(method, BASE + path, tuple(fields), json.dumps(sent).encode() if sent else b"")
