@@ -19,10 +19,11 @@ from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.history.events import Began, Ended, Sent, Span, Withdrawn
 from conformance.history.reading import HistoryError, read_history
 from conformance.history.writing import HISTORY_NAME
+from conformance.scenarios.other_exchanges import others
 from conformance.scenarios.rule import Rule, record
 from conformance.scenarios.scenario import Recordings, Scenario
 from conformance.scenarios.stored import TRACES_NAME, read_traces
-from conformance.scenarios.survey import generated_requests, survey
+from conformance.scenarios.survey import Survey
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, Listener
 from conformance.transport.parallel import is_busy
@@ -132,8 +133,9 @@ def _listeners(robot: RobotUnderTest, target: Mapping[str, Any], traces: Recordi
 
 def _crashes(api: RestInterface, traces: Recordings) -> Checker:
     """Return the checker of crashes, which leaves out what a survey recorded: its rules judge that."""
-    played = [traces.played[one.name].trace for one in (survey, generated_requests) if one.name in traces.played]
-    recorded = Counter(_key(probe.exchange) for trace in played for probe in trace.probes if probe.exchange)
+    played = (one.trace for name, one in traces.played.items() if name != others.name)
+    probes = (probe for trace in played if isinstance(trace, Survey) for probe in trace.probes)
+    recorded = Counter(_key(probe.exchange) for probe in probes if probe.exchange)
     habits = Habits(api)
 
     def judged(attempt: Attempt) -> Iterator[Case]:

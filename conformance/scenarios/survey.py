@@ -274,7 +274,7 @@ class Surveyor:
         succeeds = operation.method == "POST" and label in self.api.working
         if succeeds and usual is not None and label not in self.api.single:
             with suppress(NotPossibleError, TimeIsOverError, NoAnswerError):
-                again = self._recorded(written(operation, usual), fresh=False)
+                again = written(operation, usual).send(self.api)
                 self.api.single[label] = again.response.status in _DOUBTED
         return self.api.single.get(label, False)
 
