@@ -49,6 +49,8 @@ _NO_NUMBER: Final = ("3", "1", "2", "3", "4", "5", "abc")
 # How many are sent again, of a fast robot and at least.
 _COUNTS: Final = {"quick": 60, "standard": 300}
 _FEWEST: Final = 8
+# For so long they are sent at most where the rate of requests is limited, s.
+_LONGEST_S: Final = 0.5
 # So many kinds of fault of an operation are sent before the next ones of all operations, by the operation's rank.
 _DEPTH: Final = (6, 2, 1)
 
@@ -140,6 +142,8 @@ class RefusedRequests(Listener):
         """
         count = max(_FEWEST, round(_COUNTS.get(effort.name, _COUNTS["standard"]) * effort.speed.share))
         clients = [self._rest, *(service.client for service in services)]
+        if rate := self._rest.connection.request_rate:
+            count = min(count, max(_FEWEST, round(rate * _LONGEST_S)))
         found: list[Refused] = []
         ranked: list[tuple[int, int, Request]] = []
         for key, kinds in self._by_operation.items():
