@@ -136,6 +136,8 @@ class Lists:
         if not up and not down:
             return
         wrong = {True: up, False: down, None: up and down}[descending]
+        if wrong and _comes_first(page, sorting.member, descending):
+            return
         way = {True: "descending ", False: "ascending ", None: ""}[descending]
         yield occasion.case(
             "description/list-order",
@@ -144,6 +146,19 @@ class Lists:
             f"{text_of(wrong[0][0])} before {text_of(wrong[0][1])}" if wrong else "",
             cause=f"{listing.operation.label} {sorting.member}",
         )
+
+
+def _comes_first(page: Page, member: str, descending: bool | None) -> bool:  # noqa: FBT001 - None: either
+    """Return whether items with a flag come before the others, such as pinned ones, and both are in order."""
+    items = [members_of(one) for one in page.items[:_COMPARED]]
+    for flag in {name for one in items[:1] for name, value in one.items() if isinstance(value, bool)}:
+        flags = [one.get(flag) for one in items]
+        parts = [[one.get(member) for one in items if one.get(flag) is value] for value in (flags[0], not flags[0])]
+        is_grouped = all(parts) and set(flags[: len(parts[0])]) == {flags[0]}
+        ways = {is_before(one, other) for part in parts for one, other in combinations(part, 2)} - {None}
+        if is_grouped and (len(ways) <= 1 if descending is None else descending not in ways):
+            return True
+    return False
 
 
 def _limit(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:

@@ -19,6 +19,7 @@ from conformance.documents.security import without_credentials
 from conformance.statement.endpoints import Endpoints
 from conformance.transport.client import Connection
 from conformance.transport.reach import Folder, Trust, UnreachableError, is_same, server_of
+from conformance.verdict.finding import counted
 
 if TYPE_CHECKING:
     from conformance.documents.soap_services import SoapDescription
@@ -197,7 +198,7 @@ def _without_cases(document: Schema) -> tuple[str, ...]:
     large = [f"{method} {path}" for method, path, operation in every if unrolls(document, operation)]
     if not large:
         return ()
-    more = f" and {len(large) - 1:,} other operations" if large[1:] else ""
+    more = f" and {counted(len(large) - 1, 'other operation')}" if large[1:] else ""
     return (f"{large[0]}{more} had no generated requests: the schemas have too many parts for that.",)
 
 
