@@ -22,6 +22,8 @@ from conformance.verdict.case import Case
 _REMEMBERED: Final = 50_000
 _ASKED: Final = 1000
 _COMPARED: Final = 60
+# Items of one kind may come before those of another.
+_KINDS: Final = 2
 # By these a client may ask for a value or more, as logs are filtered; by these it may ask for more items, not for these
 # alone, where the value is true.
 _LEVELS: Final = frozenset({"level", "severity", "loglevel", "priority", "criticality", "rank"})
@@ -149,14 +151,15 @@ class Lists:
 
 
 def _comes_first(page: Page, member: str, descending: bool | None) -> bool:  # noqa: FBT001 - None: either
-    """Return whether items with a flag come before the others, such as pinned ones, and both are in order."""
+    """Return whether items of one kind come before the others, such as pinned ones or folders, each kind in order."""
     items = [members_of(one) for one in page.items[:_COMPARED]]
-    for flag in {name for one in items[:1] for name, value in one.items() if isinstance(value, bool)}:
-        flags = [one.get(flag) for one in items]
-        parts = [[one.get(member) for one in items if one.get(flag) is value] for value in (flags[0], not flags[0])]
-        is_grouped = all(parts) and set(flags[: len(parts[0])]) == {flags[0]}
-        ways = {is_before(one, other) for part in parts for one, other in combinations(part, 2)} - {None}
-        if is_grouped and (len(ways) <= 1 if descending is None else descending not in ways):
+    for name in {name for one in items[:1] for name, value in one.items() if isinstance(value, bool | str)}:
+        kinds = [str(one.get(name)) for one in items]
+        parts = [[one for one, kind in zip(items, kinds, strict=True) if kind == of] for of in dict.fromkeys(kinds)]
+        is_grouped = len(parts) == _KINDS and kinds == sorted(kinds, key=kinds.index)
+        pairs = (pair for part in parts if is_grouped for pair in combinations(part, 2))
+        ways = {is_before(one.get(member), other.get(member)) for one, other in pairs} - {None}
+        if len(ways) == 1 and descending not in ways:
             return True
     return False
 

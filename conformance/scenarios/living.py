@@ -154,6 +154,9 @@ class Living:
     listing: WholeList | None = None
     _shown: bool = False
     _capped: bool = False
+    # Whether a thing has outlived the creation of another one, and what was lost by one before that was seen.
+    _lasts: bool = False
+    _replaced: list[Look] = field(default_factory=list)
 
     @property
     def is_over(self) -> bool:
@@ -225,7 +228,15 @@ class Living:
         thing.last = found if found.response.ok else thing.last
         expected = f"the thing as it was read before {_said(after)}"
         kind = kind or (Kind.THERE if is_lost else Kind.KEPT)
+        creates = after.request.method == "POST" and after.response.status == HTTPStatus.CREATED
+        if creates and not is_lost:
+            # Another one is no replacement of those before.
+            self.looks += self._replaced
+            self._replaced = []
+            self._lasts = True
         self.note(kind, operation, found, expected, "; ".join(wrong), thing)
+        if creates and is_lost and wrong and not self._lasts:
+            self._replaced.append(self.looks.pop())
 
     def _read(self, thing: Thing) -> Exchange:
         return self.writer.send(self.read, thing.path)

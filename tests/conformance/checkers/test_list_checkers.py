@@ -199,6 +199,7 @@ _SORT = _text("sort", enum=["name", "-name", "size", "opened:desc", "state", "id
         ([_text("sort", enum=["size"])], {"sort": "size"}, "3124", False),
         ([_text("sort", enum=["size"])], {"sort": "size"}, "1324", True),
         ([_text("sort", enum=["-size"])], {"sort": "-size"}, "1342", False),
+        ([_text("sort", enum=["size"])], {"sort": "size"}, "4231", True),
         ([_text("sort", enum=["size"]), _text("order", enum=_WAYS)], {"sort": "size", "order": "desc"}, "2431", True),
         ([_text("sort", enum=["-id"], default="-id")], {}, "1234", True),
         ([_text("sortBy", enum=["id"]), _text("sortDir", enum=_WAYS, default="asc")], {"sortBy": "id"}, "1342", True),
