@@ -41,6 +41,9 @@ _REFUSED: Final = range(400, 500)
 _SEEN: Final = 2
 _MOST_PENDING: Final = 20
 _MOST_THINGS: Final = 1_000
+# A body of more octets is not remembered, and of a value so many characters are.
+_MOST_OCTETS: Final = 65_536
+_SHOWN: Final = 200
 
 
 @dataclass
@@ -49,10 +52,12 @@ class _Thing:
 
     Attributes:
         path: as it was written; of a device that knows case, another spelling is another thing.
-        last: the last request that changed it.
+        change: method and path of the last request that changed it.
+        status: how that was answered.
+        changed_s: when, s of the monotonic clock.
         gone: whether that deleted it.
         made: whether this run created it, and no read has shown it yet.
-        body: that of the POST that created it.
+        body: hash of that of the POST that created it; 0: there was none.
         replaced: whether an equal one was created later, which may be there in its place.
         written: what it has to read, by member, with the operation that wrote it.
         shown: the members that were read as written, with how much had been sent by then that may change something.
@@ -60,14 +65,24 @@ class _Thing:
     """
 
     path: str
-    last: Exchange
+    change: str
+    status: int
+    changed_s: float
     gone: bool = False
     made: bool = False
-    body: bytes = b""
+    body: int = 0
     replaced: bool = False
     written: dict[str, tuple[Any, Operation]] = field(default_factory=dict)
     shown: dict[str, int] = field(default_factory=dict)
     differs: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+
+    @classmethod
+    def of(cls, path: str, exchange: Exchange, *, made: bool) -> _Thing:
+        """Return a thing that an exchange has changed."""
+        request, response = exchange.request, exchange.response
+        return cls(
+            path, f"{request.method} {urlsplit(request.url).path}", response.status, response.received_s, made=made
+        )
 
 
 class Memory:
@@ -142,10 +157,10 @@ class Memory:
         self._drop(lambda other: other != path and (_is_below(other, path) or other.casefold() == path.casefold()))
         before = self._things.pop(path.casefold(), None)
         status = occasion.response.status
-        overlaps = before is not None and _sent_s(occasion) < before.last.response.received_s
+        overlaps = before is not None and _sent_s(occasion) < before.changed_s
         if status == HTTPStatus.ACCEPTED or overlaps or not occasion.context.usual:
             return
-        thing = _Thing(path, occasion.exchange, made=status == HTTPStatus.CREATED)
+        thing = _Thing.of(path, occasion.exchange, made=status == HTTPStatus.CREATED)
         if occasion.request.method == "DELETE":
             thing.gone = True
         elif (body := _body_of(occasion, operation)) is not None:
@@ -175,8 +190,8 @@ class Memory:
         if response.status == HTTPStatus.CREATED:
             body = _body_of(occasion, operation) or {}
             written = {name: (value, operation) for name, value in body.items()}
-            thing = _Thing(target, occasion.exchange, made=True, written=written)
-            thing.body = occasion.request.body
+            thing = _Thing.of(target, occasion.exchange, made=True)
+            thing.written, thing.body = written, hash(occasion.request.body)
             for one in self._things.values():
                 one.replaced |= one.body == thing.body and one.path.rpartition("/")[0] == path
             self._things[target.casefold()] = thing
@@ -188,19 +203,18 @@ class Memory:
         response = occasion.response
         if thing is None or thing.path != path:
             return
-        age_s = _sent_s(occasion) - thing.last.response.received_s
+        age_s = _sent_s(occasion) - thing.changed_s
         if age_s < 0:
             return  # it was sent before that
-        change = f"{thing.last.request.method} {urlsplit(thing.last.request.url).path}"
         if thing.gone:
             if response.ok and age_s > _SETTLES_S and not is_marked_deleted(read_json(response.body).value):
-                expected = f"status 404 or 410, {age_s:.0f} s after {change} was answered {thing.last.response.status}"
+                expected = f"status 404 or 410, {age_s:.0f} s after {thing.change} was answered {thing.status}"
                 yield self._case("deleted-is-gone", occasion, expected, cause=item.label)
             return
         kept = item.template, ""
         if response.status in _ABSENT and thing.made:
             if age_s > _SETTLES_S and not thing.replaced:
-                expected = f"the thing that {change} has created {age_s:.0f} s before"
+                expected = f"the thing that {thing.change} has created {age_s:.0f} s before"
                 case = self._case("created-is-there", occasion, expected, cause=item.label)
                 yield from self._differs(kept, age_s, "none", case)
         elif response.ok:
@@ -236,7 +250,7 @@ class Memory:
             kept = item.template, name
             if not other:
                 thing.shown.setdefault(name, self._acts)
-                yield from self._lasts(kept, age_s, str(wanted))
+                yield from self._lasts(kept, age_s, str(wanted)[:_SHOWN])
                 continue
             # It had been written, and something was sent since then; or it was never written.
             # Another thing may be the default one now.
@@ -248,7 +262,7 @@ class Memory:
                     when = "as it was read before" if was_lost else f"{age_s:.0f} s before"
                     expected, cause = f"what {operation.label} wrote, {when}", f"{operation.label} {name}"
                     case = self._case("written-is-read", occasion, expected, other, cause=cause)
-                    yield from self._differs(kept, age_s, str(now.get(name)), case)
+                    yield from self._differs(kept, age_s, str(now.get(name))[:_SHOWN], case)
 
     @staticmethod
     def _case(name: str, occasion: Occasion, expected: str, found: str = "", *, cause: str) -> Case:
@@ -276,6 +290,7 @@ def _is_below(path: str, other: str) -> bool:
 def _body_of(occasion: Occasion, operation: Operation) -> dict[str, Any] | None:
     """Return the object that a request has written; None if it is another content, or one that is not allowed."""
     is_first = occasion.request.media_type == next(iter(operation.bodies), None)
+    is_first = is_first and len(occasion.request.body) <= _MOST_OCTETS
     value = read_json(occasion.request.body).value if is_first and is_json(occasion.request.media_type) else None
     if not isinstance(value, dict) or not occasion.is_valid:
         return None
