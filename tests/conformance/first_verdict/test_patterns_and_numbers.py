@@ -123,8 +123,12 @@ def test_a_pattern_that_cannot_be_judged_is_told_and_the_rest_is_judged(tmp_path
         ]),
         "/other": {"get": {"responses": {"200": answers({"type": "integer"}), "4XX": REFUSED}}},
     }  # fmt: skip
-    routes = {"/t": constant({"v": "a" * 60 + "!"}), "/other": constant(1)}
-    with small_device(described(paths, "3.1.0"), routes) as url:
+
+    async def taking_letters(request):
+        is_right = set(request.query.get("q", "a")) == {"a"}
+        return web.json_response({"v": "a" * 60 + "!"}) if is_right else error(400, "no letters a")
+
+    with small_device(described(paths, "3.1.0"), {"/t": {"GET": taking_letters}, "/other": constant(1)}) as url:
         said = certified(f"{url}/openapi.json", tmp_path / "out")
     assert said.exit_code == exit_code, said.text
     assert text in said.text
