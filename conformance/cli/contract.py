@@ -114,30 +114,3 @@ def coverage(pack: str, out: Path | None) -> None:
     for problem in problems:
         click.echo(problem, err=True)
     sys.exit(ExitCode.FAILED if problems else ExitCode.PASSED)
-
-
-@contract.command()
-@contract_option
-@click.option("--domain-id", type=click.IntRange(0, 100), default=79, help="ROS domain of the device.")
-@click.option("--seed", type=int, default=0, help="Seed of the run.")
-@click.option("--effort", type=click.Choice(["quick", "standard"]), default="standard", help="Effort of the run.")
-def ways(pack: str, domain_id: int, seed: int, effort: str) -> None:
-    """Record by which interfaces, resources and formats each requirement is judged, in a run on a good device.
-
-    The result stays beside the pack's ledger (ways.json), and is shown by `roaas contract coverage`.
-    """
-    contract = loaded(pack)
-    # Imported here, as in coverage().
-    from conformance.selftest.robots import RobotError, running, target_of  # noqa: PLC0415
-    from conformance.selftest.ways import FILE, recorded  # noqa: PLC0415
-
-    try:
-        with running(contract, target_of(contract, ""), domain_id) as robot:
-            click.echo(f"a run at {effort} effort on {robot.device.name}, about a minute", err=True)
-            found = recorded(robot, effort, seed)
-    except RobotError as error:
-        click.echo(str(error), err=True)
-        sys.exit(ExitCode.UNREACHABLE)
-    path = contract.directory / FILE
-    path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    click.echo(f"wrote {path}: {counted(len(found), 'requirement')}")

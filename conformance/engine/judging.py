@@ -109,7 +109,7 @@ def _is_heard(event: Sent, outcome: Attempt) -> bool:
 
 
 def _tell(judge: Judge, listeners: list[Listener], outcome: Attempt) -> None:
-    judge.sent(outcome.request)
+    judge.sent(outcome)
     for listener in listeners:
         if isinstance(outcome, Exchange):
             listener.answered(outcome)

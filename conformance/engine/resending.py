@@ -56,11 +56,11 @@ class Recorder(Listener):
 
     def answered(self, exchange: Exchange) -> None:
         """Report a request with its response."""
-        self._judge.sent(exchange.request)
+        self._judge.sent(exchange)
 
     def unanswered(self, request: Unanswered) -> None:
         """Report a request without a response."""
-        self._judge.sent(request.request)
+        self._judge.sent(request)
 
 
 def written(sequence: Sequence[Sent]) -> list[dict[str, Any]]:

@@ -194,6 +194,7 @@ def _requirement(verdict: Verdict) -> dict[str, Any]:
         "text": requirement.text,
         "verdict": verdict.value,
         "cases": verdict.evidence.cases,
+        **({"occasions": occasions} if (occasions := dict(verdict.evidence.occasions.most_common())) else {}),
         "reason": verdict.reason,
         "untestable": requirement.untestable,
         "checks": sorted(verdict.evidence.checks - {""}),

@@ -18,7 +18,6 @@ from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.mutation.mutant import Mutant
 from conformance.mutation.self_test import self_test_of
 from conformance.selftest.generated.report import page_part
-from conformance.selftest.ways import tables, unargued
 from conformance.statement.statement import empty_statement
 from conformance.verdict.run import Run
 
@@ -164,7 +163,7 @@ def disagreements(contract: Contract) -> list[str]:
     for id_, checks in checks_by_requirement(contract).items():
         if id_ not in known and id_ not in generic_ledger():
             problems.append(f"{checks[0]} judges {id_!r}, which the ledger does not have")
-    return list(dict.fromkeys([*problems, *_misnamed(mutants, known), *unargued(contract)]))
+    return list(dict.fromkeys([*problems, *_misnamed(mutants, known)]))
 
 
 def _misnamed(mutants: Iterable[Mutant], known: Iterable[str]) -> Iterable[str]:
@@ -209,7 +208,7 @@ def page(contract: Contract) -> str:
                 _listed(binding.mutants),
             )
             lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
-    return "\n".join([*lines, *page_part(contract), *tables(contract)]) + "\n"
+    return "\n".join([*lines, *page_part(contract)]) + "\n"
 
 
 def _listed(names: tuple[str, ...]) -> str:

@@ -3,15 +3,16 @@
 import re
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from conformance.contract.classes import CauseKind
 from conformance.contract.ledger import Requirement, renamed
+from conformance.documents.openapi import is_json
 from conformance.documents.patterns import PatternError
-from conformance.transport.exchange import Attempt, NoAnswer, Request, Unanswered
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Unanswered
 from conformance.verdict.case import Case
 from conformance.verdict.finding import Finding, Sent, Showing, causes_of, kind_of, likeness, observed_in, subject_of
 
@@ -23,6 +24,7 @@ MAX_SEQUENCE = 40
 _REST = "the rest"
 # Characters of the message of an error of the suite.
 _FAULT = 200
+_REFUSED = 400
 # What differs between two cases of one finding: numbers, and values in quotes.
 _VALUES = re.compile(r"[-+]?\d[\d.e+-]*|'[^']*'|\"[^\"]*\"")
 
@@ -53,9 +55,11 @@ class Evidence:
         unclaimed: why it does not apply to a robot for which no classes were named.
         because: the finding of another requirement that prevented the test, or None.
         parts: number of judged cases by the id that checks use, which may be an alias of the requirement.
+        occasions: number of judged cases by interface, method and format, and of those after a refused request.
     """
 
     cases: int = 0
+    occasions: Counter[str] = field(default_factory=Counter)
     parts: dict[str, int] = field(default_factory=dict)
     findings: dict[str, Finding] = field(default_factory=dict)
     skips: list[str] = field(default_factory=list)
@@ -105,6 +109,8 @@ class Judge:
         self._renamed = renamed(self._ledger)
         self._sent: deque[Sent] = deque(maxlen=MAX_SEQUENCE)
         self._findings = 0
+        self._newest: Attempt | None = None
+        self._occasions: tuple[str, ...] = ()
         self._by_rule = threading.local()
 
     def of(self, requirement: str) -> Evidence | None:
@@ -123,9 +129,11 @@ class Judge:
         self.check_name, self.at_risk, self.met = check_name, (), []
         self._sent.clear()
 
-    def sent(self, request: Request) -> None:
-        """Record that the check sent a request."""
-        self._sent.append(Sent(time.monotonic(), request))
+    def sent(self, attempt: Attempt) -> None:
+        """Record that the check sent a request, and what became of it."""
+        self._sent.append(Sent(time.monotonic(), attempt.request))
+        after = isinstance(self._newest, Exchange) and self._newest.response.status >= _REFUSED
+        self._newest, self._occasions = attempt, (occasion_of(attempt), *(("after a refusal",) if after else ()))
 
     @contextmanager
     def by_rule(self) -> Iterator[None]:
@@ -182,6 +190,9 @@ class Judge:
         evidence.cases += cases
         evidence.parts[part] = evidence.parts.get(part, 0) + cases
         evidence.checks.add(self.check_name)
+        if exchange is not None:
+            for occasion in self._occasions if exchange is self._newest else (occasion_of(exchange),):
+                evidence.occasions[occasion] += cases
         if not holds:
             self.failed(requirement)
             subject = subject or subject_of(exchange, self.check_name)
@@ -347,6 +358,22 @@ class Judge:
             self.error(requirement, reason)
         elif not evidence.findings:
             evidence.because = self.ended_by
+
+
+def occasion_of(attempt: Attempt) -> str:
+    """Return how a request was made: "PUT XML", "SOAP"; without a body the format is that of the response."""
+    request = attempt.request
+    if request.raw is not None:
+        return "raw bytes"
+    if request.method == "POST" and any(name.lower() == "soapaction" for name, _ in request.headers):
+        return "SOAP"
+    media_type = request.media_type if request.body else ""
+    if not request.body and isinstance(attempt, Exchange):
+        media_type = attempt.response.media_type
+    kinds = {"JSON": is_json(media_type), "XML": media_type.endswith("xml"), "text": media_type == "text/plain"}
+    # Others are one kind: a device may name as many as it likes.
+    kind = next((name for name, fits in kinds.items() if fits), "other" if media_type else "without body")
+    return f"{request.method} {kind}"
 
 
 def _likeness(kind: CauseKind, exchange: Attempt | None) -> str:
