@@ -118,7 +118,6 @@ coverage-page: install
 
 bench: install
 	$(BIN)/python benchmarks/robot.py
-	$(BIN)/python benchmarks/hotpath.py
 	$(BIN)/python benchmarks/generator.py
 
 clean:
