@@ -1,7 +1,7 @@
 """The command ``roaas``: finds each subcommand in its package ("room") and runs it.
 
-The rooms are the packages conformance, loadtests, reference_robot and reports. A room is imported only when its command
-is used, so that ``roaas certify`` needs neither ROS nor Locust.
+The rooms are the packages conformance, loadtests, reference_robot, reports and ros_probe. A room is imported only when
+its command is used, so that ``roaas certify`` needs neither ROS nor Locust.
 """
 
 import os

@@ -24,8 +24,8 @@ from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.commandline.terminal import inert
 from conformance.commandline.without_folders import command_without_folders
 from conformance.contract.toml_file import TomlFileError
-from conformance.packs.table1.statement import Statement, load_robot_statement
-from conformance.packs.table1.thresholds import load_thresholds
+from conformance.papers_robot.statement import RobotStatement, load_robot_statement
+from conformance.papers_robot.thresholds import load_thresholds
 from conformance.statement.endpoints import Endpoints
 from loadtests.clients.failures import CallError
 from loadtests.described.device import DESCRIBED_ONLY, Named
@@ -103,7 +103,7 @@ def _run_load(settings: Settings, written: Path, summary: IO[str], stopping: Ite
     return CommandResult(code, path)
 
 
-def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
+def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement | None:
     """Return the statement of the robot to compare with; without a file, one with this robot's credentials.
 
     Raises:
@@ -116,7 +116,7 @@ def _other_robot(given: dict[str, Any], own: Statement) -> Statement | None:
     if where is None and not any(described.values()):
         return None
     shared = {name: given[name] or getattr(own.endpoints, name) for name in ("token_file", "ca_file", "timeout_s")}
-    return Statement(endpoints=Endpoints(rest=where, **described, **shared))
+    return RobotStatement(endpoints=Endpoints(rest=where, **described, **shared))
 
 
 @click.command(cls=ResultCommand)
@@ -290,7 +290,7 @@ def _papers_robot(statement: Path | None, options: dict[str, Any]) -> Settings:
             f"--{'call' if option == 'allow' else option} is for a device with a description: name that as well, as in "
             "roaas load http://robot:8000/openapi.json"
         )
-    said = load_robot_statement(statement) if statement is not None else Statement()
+    said = load_robot_statement(statement) if statement is not None else RobotStatement()
     file = options.pop("thresholds")
     limits = load_thresholds(file) if file else ()
     other = _other_robot(options, said)

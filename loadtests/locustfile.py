@@ -11,7 +11,7 @@ import locust.stats
 from locust import User, constant_throughput, events, tag, task
 from locust.exception import StopTest
 
-from conformance.packs.table1.statement import Statement
+from conformance.papers_robot.statement import RobotStatement
 from loadtests.clients.callers import Caller, Workload
 from loadtests.clients.endpoint import EndpointError
 from loadtests.clients.failures import CallError
@@ -93,7 +93,7 @@ def settings_of(options: Any) -> Settings:
     names = [name.replace("-", "_") for name in (*_TEXTS, *_FILES)]
     given = {name: getattr(options, name) for name in names}
     return settle(
-        CliOptions.of(**given, timeout_s=options.robot_timeout, allow_motion=options.allow_motion), Statement()
+        CliOptions.of(**given, timeout_s=options.robot_timeout, allow_motion=options.allow_motion), RobotStatement()
     )
 
 

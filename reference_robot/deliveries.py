@@ -7,7 +7,7 @@ from typing import Final, Self
 from mybot_delivery_app.msg import DeliveryRequestMsg
 from rclpy.serialization import deserialize_message
 
-from conformance.packs.table1.delivery import DeliveryFields
+from conformance.papers_robot.delivery import DeliveryFields
 
 # CDR (OMG DDS-RTPS 2.3, 10) of a DeliveryRequestMsg: encapsulation in little endian, int32, padding, six doubles.
 _CDR: Final = struct.Struct("<4si4x6d")

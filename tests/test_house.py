@@ -5,6 +5,7 @@ is what it does not see: circles between modules, modules that are named in stri
 """
 
 import ast
+import itertools
 import re
 import sys
 import tomllib
@@ -15,9 +16,10 @@ import pytest
 from processes import ended
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("conformance", "reference_robot", "loadtests", "reports")
+ROOMS = ("conformance", "reference_robot", "loadtests", "reports", "ros_probe")
 MOST_LINES = 600
-_MODULE_NAME = re.compile(rf"({'|'.join(ROOMS)})(\.\w+)+")
+_MODULE_NAME = re.compile(rf"(?:{'|'.join(ROOMS)})(?:\.\w+)+")
+_IMPORT = re.compile(rf"(?:^|[;\n]) *(?:from|import) ({_MODULE_NAME.pattern})")
 
 
 def _modules() -> list[Path]:
@@ -37,6 +39,12 @@ def _name(path: Path) -> str:
 @pytest.fixture(scope="module")
 def imports():
     return grimp.build_graph(*ROOMS, cache_dir=None)
+
+
+def test_no_contract_has_an_exception():
+    config = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    loose = {"ignore_imports", "allow_indirect_imports", "unmatched_ignore_imports_alerting"}
+    assert [contract["name"] for contract in config["contracts"] if loose & contract.keys()] == []
 
 
 def test_the_floors_hold():
@@ -64,14 +72,68 @@ def test_a_circle_would_be_seen():
     assert _circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": set(), "e": {"a"}}) == ["b", "c"]
 
 
-def test_modules_that_are_named_in_strings_exist_and_lie_no_higher():
-    floors = _floors()
+def test_modules_that_are_named_in_strings_exist_and_may_be_imported_there():
+    """A string is an import, unless it names the program of a process of its own (`-m`)."""
+    config = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
     names = {_name(path) for path in _modules()}
     for path in _modules():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Constant) and isinstance(node.value, str) and _MODULE_NAME.fullmatch(node.value):
-                assert node.value in names, f"{_name(path)} names {node.value!r}, which is not there"
-                assert _floor(floors, node.value) <= _floor(floors, _name(path)), f"{_name(path)} names {node.value!r}"
+        for named, starts in _named_in_strings(ast.parse(path.read_text(encoding="utf-8"))):
+            assert named in names, f"{_name(path)} names {named!r}, which is not there"
+            assert starts or not _forbidden(config["contracts"], _name(path), named), f"{_name(path)} names {named!r}"
+
+
+@pytest.mark.parametrize(
+    ("module", "text", "wrong"),
+    [
+        ("loadtests.cli", "import_module('conformance.cli.certify')", True),
+        ("loadtests.cli", "[python, '-m', 'conformance.cli.certify']", False),
+        ("loadtests.clients.wire", "import_module(name='loadtests.engine.run')", True),
+        ("conformance.engine.replay", "__import__('conformance.packs.table1.plugin')", True),
+        ("conformance.api.device", "exec('from conformance.engine.replay import replay')", True),
+        ("conformance.api.device", "[python, '-c', 'import loadtests.cli; loadtests.cli.load()']", True),
+        ("reports.reading", "import_module('conformance.verdict.verdicts')", True),
+        ("conformance.engine.replay", "import_module('conformance.api.device')", False),
+    ],
+)
+def test_a_string_that_imports_upward_would_be_seen(module, text, wrong):
+    config = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    ((named, starts), *_) = _named_in_strings(ast.parse(text))
+    assert (not starts and _forbidden(config["contracts"], module, named)) == wrong
+
+
+def _named_in_strings(tree):
+    """Yield each module of the house that a string names or imports, and whether the string is a program's name."""
+    programs = {
+        id(after)
+        for words in ast.walk(tree)
+        if isinstance(words, ast.List | ast.Tuple)
+        for before, after in itertools.pairwise(words.elts)
+        if isinstance(before, ast.Constant) and before.value == "-m"
+    }
+    prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}  # docstrings
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
+            imported = _IMPORT.findall(node.value)
+            whole = [node.value] if _MODULE_NAME.fullmatch(node.value) else []
+            yield from ((named, id(node) in programs) for named in whole + imported)
+
+
+def _forbidden(contracts, module, named):
+    """Return whether an import-linter contract forbids a module to import another one."""
+
+    def within(name, packages):
+        return any(f"{name}.".startswith(f"{package.removesuffix('.*')}.") for package in packages)
+
+    floors = _floors()
+    if _floor(floors, named) > _floor(floors, module):
+        return True
+    rooms = (module.partition(".")[0], named.partition(".")[0])
+    return any(
+        within(module, contract.get("source_modules", ())) and within(named, contract["forbidden_modules"])
+        if contract["type"] == "forbidden"
+        else contract["type"] == "independence" and rooms[0] != rooms[1] and set(rooms) <= set(contract["modules"])
+        for contract in contracts
+    )
 
 
 def _floors():

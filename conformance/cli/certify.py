@@ -12,7 +12,6 @@ from click.core import ParameterSource
 
 from conformance.api.call_rules import CallRules, told
 from conformance.cli.certify_init import init, init_described
-from conformance.cli.certify_target import hold_folder, told_apart, what_is_judged
 from conformance.cli.summary import print_summary
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
@@ -27,6 +26,7 @@ from conformance.contract.requirement_sets import RequirementSetError, judged_by
 from conformance.documents.description import DescriptionError
 from conformance.documents.openapi import operations_of
 from conformance.statement.statement import Statement, StatementError
+from conformance.target.naming import hold_folder, told_apart, what_is_judged
 from conformance.transport.reach import UnreachableError
 from conformance.verdict.effort import DEEP_MINUTES, EFFORTS, Effort
 
@@ -227,9 +227,9 @@ def _certify(
     # those after 20,000 new objects instead of 700 saves a twentieth of the processor time.
     gc.set_threshold(20_000)
     from conformance.engine.certification import certify as judge  # noqa: PLC0415
-    from conformance.engine.connecting import connection_of  # noqa: PLC0415
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
     from conformance.engine.suite import file_digest  # noqa: PLC0415
+    from conformance.target.connecting import connection_of  # noqa: PLC0415
     from conformance.verdict.baseline import BaselineError, load_baseline  # noqa: PLC0415
     from conformance.verdict.run import Given  # noqa: PLC0415
 

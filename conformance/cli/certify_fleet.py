@@ -9,7 +9,6 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from conformance.cli.certify_target import hold_folder
 from conformance.cli.summary import warning
 from conformance.commandline.result_command import CommandResult
 from conformance.commandline.started import Started
@@ -18,6 +17,7 @@ from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
 from conformance.fleet.fleet_file import TIME_LIMIT_S, FleetError, load_fleet, refuse_same_identity
 from conformance.fleet.member_run import MemberResult, Outcome
+from conformance.target.naming import hold_folder
 from conformance.verdict.effort import DEEP_MINUTES
 from conformance.verdict.finding import counted
 

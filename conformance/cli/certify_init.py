@@ -11,10 +11,10 @@ from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult
 from conformance.commandline.terminal import inert
 from conformance.contract.pack import Contract
-from conformance.engine.connecting import connection_of
-from conformance.engine.describing import fetch_description, is_wsdl
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Api, Calls, Statement, StatementError
+from conformance.target.connecting import connection_of
+from conformance.target.describing import fetch_description, is_wsdl
 
 
 def init(path: Path | None, chosen: Statement, contract: Contract, *, force: bool) -> CommandResult:

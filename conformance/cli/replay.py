@@ -152,7 +152,7 @@ def _connection(given: dict[str, Any]) -> Connection:
     Raises:
         click.UsageError: a credential cannot be used.
     """
-    from conformance.engine.connecting import connection_of  # noqa: PLC0415 - see replay()
+    from conformance.target.connecting import connection_of  # noqa: PLC0415 - see replay()
 
     try:
         return replace(connection_of(Endpoints(**given)), trust=None)
@@ -214,7 +214,7 @@ def _described(statement_file: Path, given: dict[str, Any]) -> tuple[Statement, 
         StatementError, ContractError, DescriptionError: one of them cannot be used.
         UnreachableError: the server of the description does not respond.
     """
-    from conformance.cli.certify_target import what_is_judged  # noqa: PLC0415 - see replay()
+    from conformance.target.naming import what_is_judged  # noqa: PLC0415 - see replay()
 
     folder = Path(click.get_current_context().with_resource(tempfile.TemporaryDirectory()))
     unset = ("base_url", "wsdl", "schemas", "profile", "ros_domain_id")

@@ -17,8 +17,8 @@ from conformance.cli.selftest_progress import Progress, compare
 from conformance.contract.toml_file import basic_string
 from conformance.documents.description import DescriptionError
 from conformance.documents.openapi import operations_of
-from conformance.engine.describing import described_contract
 from conformance.statement.endpoints import Endpoints
+from conformance.target.describing import described_contract
 from conformance.transport.reach import UnreachableError
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def described_device(options: dict[str, Any]) -> tuple[Contract, str]:
     Raises:
         click.UsageError: there is no usable description.
     """
-    from conformance.engine.connecting import connection_of  # noqa: PLC0415 - see selftest.py
+    from conformance.target.connecting import connection_of  # noqa: PLC0415 - see selftest.py
 
     try:
         contract, where, _ = described_contract(

@@ -10,9 +10,9 @@ from conformance.commandline.terminal import inert
 from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import basic_string
-from conformance.engine.connecting import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.statement import Statement
+from conformance.target.connecting import connection_of
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.run import Run

@@ -9,10 +9,10 @@ from conformance.commandline.endings import end_like_ctrl_c
 from conformance.commandline.extras import lacking_soap
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
-from conformance.engine.connecting import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import StatementError, empty_statement, load_statement
+from conformance.target.connecting import connection_of
 from conformance.verdict.effort import EFFORTS, Effort
 from conformance.verdict.run import Run
 

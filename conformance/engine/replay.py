@@ -23,13 +23,13 @@ from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.engine.by_description import SECURITY, fails_by_description
 from conformance.engine.certification import certify
-from conformance.engine.connecting import connection_of
 from conformance.engine.permission import moves, strangers
 from conformance.engine.refused import is_refused
 from conformance.engine.resending import read_sequence, send_again
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Calls, Statement, empty_statement
+from conformance.target.connecting import connection_of
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Response, Unanswered
 from conformance.verdict.effort import Effort

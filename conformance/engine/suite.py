@@ -13,14 +13,17 @@ from conformance.contract.requirement_sets import RequirementSet, current, load_
 from conformance.verdict.verdicts import holds_back
 
 _PACKAGE = Path(__file__).parents[1]
+_PROBE = _PACKAGE.parent / "ros_probe"
 # The rooms that decide what is asked and what is said of it.
 JUDGING = (
     "contract",
     "statement",
+    "papers_robot",
     "transport",
     "documents",
     "verdict",
     "observe",
+    "target",
     "api",
     "scenarios",
     "checkers",
@@ -52,6 +55,7 @@ def suite_digest(contract: Contract, package: Path = _PACKAGE) -> str:
         for pattern in ("*.py", "*.toml")
         for path in (package / room).rglob(pattern)
     }
+    modules |= {f"ros_probe/{path.name}": path for path in _PROBE.glob("*.py")}
     pack = {f"the contract: {path.relative_to(contract.directory).as_posix()}": path for path in _judging(contract)}
     digest = hashlib.sha256()
     for name, path in sorted({**modules, **pack}.items()):

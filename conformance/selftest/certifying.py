@@ -16,11 +16,11 @@ import msgspec
 
 from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
-from conformance.engine.connecting import connection_of
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.selftest.at_once import safe_path
 from conformance.selftest.robots import Robot
 from conformance.statement.statement import Statement, empty_statement, load_statement
+from conformance.target.connecting import connection_of
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 from conformance.verdict.run import Run

@@ -5,7 +5,7 @@ from typing import Any
 
 import gevent
 
-from conformance.packs.table1.thresholds import ApiStyle
+from conformance.papers_robot.thresholds import ApiStyle
 from loadtests.clients.failures import CallError
 from loadtests.clients.library import LibraryRest, LibrarySoap, Sent
 from loadtests.clients.payloads import Values

@@ -15,7 +15,7 @@ from requests.adapters import HTTPAdapter
 from zeep.transports import Transport
 from zeep.wsdl import Document
 
-from conformance.packs.table1.thresholds import Client
+from conformance.papers_robot.thresholds import Client
 from loadtests.clients.bounded import TOO_LONG, BoundedResponse, StayingSession
 from loadtests.clients.failures import CallError, connect_error, require_good
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values, rest_path

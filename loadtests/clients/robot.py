@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from conformance.commandline.secrecy import SECRETS
-from conformance.packs.table1.statement import Ros
+from conformance.papers_robot.statement import Ros
 from conformance.transport.credentials import Credential, Credentials, Kind
 from conformance.transport.reach import Trust
 from conformance.transport.tls import ClientCertificate

@@ -27,7 +27,7 @@ from websockets.exceptions import InvalidHandshake
 from websockets.frames import Frame, Opcode
 from websockets.uri import parse_uri
 
-from conformance.packs.table1.delivery import MESSAGE_FIELDS
+from conformance.papers_robot.delivery import MESSAGE_FIELDS
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import CallError, connect_error, shown
 from loadtests.clients.wire import Answer, Request, now_ns

@@ -11,17 +11,17 @@ import msgspec
 
 from conformance.api.permission import Permission
 from conformance.api.rest.interface import RestInterface
-from conformance.cli.certify_target import told_apart, what_is_judged
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.documents.description import DescriptionError, is_url
 from conformance.documents.openapi import Operation, operations_of
-from conformance.engine.connecting import connection_of
-from conformance.engine.describing import is_wsdl, soap_contract, trusting
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.motion_map import shape_of
 from conformance.statement.statement import Statement, StatementError, api_of
+from conformance.target.connecting import connection_of
+from conformance.target.describing import is_wsdl, soap_contract, trusting
+from conformance.target.naming import told_apart, what_is_judged
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswerError
 from conformance.transport.reach import UnreachableError

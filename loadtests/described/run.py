@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from conformance.documents.description import is_url
-from conformance.engine.describing import is_wsdl
-from conformance.packs.table1.statement import Load, Statement
+from conformance.papers_robot.statement import Load, RobotStatement
+from conformance.target.describing import is_wsdl
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
 from loadtests.described.operations import named_alike
 from loadtests.described.pairs import Choice
@@ -187,8 +187,8 @@ def _other(named: Named, options: Mapping[str, Any], against: str) -> tuple[Devi
     return _opened(named, {**elsewhere, "base_url": against})
 
 
-def _statement(device: Device) -> Statement:
+def _statement(device: Device) -> RobotStatement:
     """Return a device's statement as the load test reads it."""
     said, limits = device.statement, device.statement.load
     load = Load(max_rate=limits.max_rate, max_duration_s=limits.max_duration_s)
-    return Statement(robot=said.robot, endpoints=said.endpoints, load=load)
+    return RobotStatement(robot=said.robot, endpoints=said.endpoints, load=load)

@@ -1,6 +1,6 @@
 """The first plan of a run, from settings and robot."""
 
-from conformance.packs.table1.thresholds import ApiStyle
+from conformance.papers_robot.thresholds import ApiStyle
 from loadtests.clients.library import LIBRARY
 from loadtests.clients.robot import Robot
 from loadtests.schedule.plan import BLOCK_S, LIBRARY_RATE, Plan

@@ -6,7 +6,6 @@ from functools import partial
 
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.started import Started
-from conformance.packs.table1.ros_process import ProbeError
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Robot
 from loadtests.clients.wsdl import WsdlError, with_addresses
@@ -27,6 +26,7 @@ from loadtests.measuring.streams import hear
 from loadtests.result.outcome import Carried, Outcome, RunAborted
 from loadtests.schedule.plan import QUICK_ANSWER_S, SHORT_BLOCK_S, Plan
 from loadtests.settings.settings import Settings
+from ros_probe.process import ProbeError
 
 
 class Run:

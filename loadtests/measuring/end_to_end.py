@@ -12,14 +12,14 @@ from dataclasses import dataclass, field
 import gevent
 import numpy as np
 
-from conformance.packs.table1.delivery import COURIER, EXAMPLE, MESSAGE_FIELDS
+from conformance.papers_robot.delivery import COURIER, EXAMPLE, MESSAGE_FIELDS
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import CallError
 from loadtests.clients.payloads import BUILDERS, Values
+from loadtests.clients.probe import Probe
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import Bridge, bridge_requests
 from loadtests.clients.wire import Connection, Request, now_ns
-from loadtests.probe.client import Probe
 from loadtests.settings.settings import EndToEnd
 
 #: A delivery that has not arrived by then is lost.

@@ -8,7 +8,7 @@ from typing import Any
 
 from lxml import etree
 
-from conformance.packs.table1.delivery import COORDINATES, XSD_FIELDS
+from conformance.papers_robot.delivery import COORDINATES, XSD_FIELDS
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values
 from loadtests.clients.wire import Request
 from loadtests.clients.xml_reader import XmlError, parse_xml

@@ -19,7 +19,7 @@ from typing import Any, Self
 import msgspec
 import numpy as np
 
-from conformance.packs.table1.thresholds import ApiStyle, Client, Operation
+from conformance.papers_robot.thresholds import ApiStyle, Client, Operation
 from loadtests.schedule.rotation import turns_of_all
 from loadtests.schedule.segment import Segment
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field, fields
 from typing import Any, Self
 
-from conformance.packs.table1.statement import Statement
-from conformance.packs.table1.thresholds import Threshold
+from conformance.papers_robot.statement import RobotStatement
+from conformance.papers_robot.thresholds import Threshold
 from conformance.statement.endpoints import Endpoints
 from loadtests.settings.settings import STEP_S, Generator, Repeats, Selection
 
@@ -43,7 +43,7 @@ class CliOptions:
     allow_motion: bool = False
     thresholds: tuple[Threshold, ...] = ()
     rosbridge: str | None = None
-    against: Statement | None = None
+    against: RobotStatement | None = None
     end_to_end: bool = False
     ros_domain_id: int | None = None
     tolerance: float = TOLERANCE

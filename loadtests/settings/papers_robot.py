@@ -6,7 +6,7 @@ from pathlib import Path
 import msgspec
 
 from conformance.commandline.secret_file import read_secret
-from conformance.packs.table1.statement import Statement
+from conformance.papers_robot.statement import RobotStatement
 from conformance.statement.endpoints import Endpoints
 from conformance.transport.reach import trusted_host
 from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
@@ -19,7 +19,7 @@ from loadtests.settings.settings import Selection
 from loadtests.settings.target import Target
 
 
-def papers_robot(options: CliOptions, statement: Statement) -> Target:
+def papers_robot(options: CliOptions, statement: RobotStatement) -> Target:
     """Return the paper's robot as what is called, and the robot to compare with.
 
     Raises:

@@ -5,7 +5,7 @@ from typing import Self
 
 import msgspec
 
-from conformance.packs.table1.thresholds import Threshold
+from conformance.papers_robot.thresholds import Threshold
 from conformance.statement.load import ServiceLevel
 from loadtests.clients.described import Stream
 from loadtests.clients.robot import Robot

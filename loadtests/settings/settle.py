@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Self
 
-from conformance.packs.table1.statement import Statement
+from conformance.papers_robot.statement import RobotStatement
 from loadtests.schedule.plan import Load
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.contradictions import contradiction
@@ -27,7 +27,7 @@ _MOST_TOLERANCE = 10.0
 _DEFAULT_LIMIT = "the default limit for operations that move the robot; the statement's [load] {} lifts it"
 
 
-def settle(options: CliOptions, statement: Statement, target: Target | None = None) -> Settings:
+def settle(options: CliOptions, statement: RobotStatement, target: Target | None = None) -> Settings:
     """Return the settings of a run: options over statement over defaults.
 
     Args:
@@ -90,7 +90,7 @@ class _Allowed:
     duration_by: str
 
     @classmethod
-    def of(cls, statement: Statement, *, moves: bool) -> Self:
+    def of(cls, statement: RobotStatement, *, moves: bool) -> Self:
         """Return the limits of a statement, or those by default for operations that move the robot."""
         rates, duration = [], (statement.load.max_duration_s, "the statement's [load] max_duration_s")
         if statement.endpoints.request_rate is not None:
@@ -116,7 +116,11 @@ class _Allowed:
 
 
 def _end_to_end(
-    options: CliOptions, statement: Statement, operations: tuple[str, ...], most_rate: float | None, duration_s: float
+    options: CliOptions,
+    statement: RobotStatement,
+    operations: tuple[str, ...],
+    most_rate: float | None,
+    duration_s: float,
 ) -> EndToEnd | None:
     if not options.end_to_end:
         return None
@@ -128,7 +132,7 @@ def _end_to_end(
     return EndToEnd(domain_id, most_rate, duration_s)
 
 
-def _compared(settings: Settings, options: CliOptions, other: Statement, target: Target) -> Settings:
+def _compared(settings: Settings, options: CliOptions, other: RobotStatement, target: Target) -> Settings:
     """Return the settings of a run against another robot, whose own limits apply as well."""
     tolerance = options.tolerance
     if settings.steps.asked:
@@ -156,7 +160,7 @@ def _looks(options: CliOptions, load: Load, settings: Settings, other: _Allowed)
     return tuple(look for look in AGAINST_LOOKS if look * load.duration_s <= longest_s) or (1,)
 
 
-def _steps(options: CliOptions, statement: Statement, *, moves: bool) -> Steps:
+def _steps(options: CliOptions, statement: RobotStatement, *, moves: bool) -> Steps:
     """Return the load steps after the comparison; they use a read operation if there is one."""
     ceiling = _Allowed.of(statement, moves=moves).rate
     searches = options.knee_searches if options.knee else 0

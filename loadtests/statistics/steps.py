@@ -6,7 +6,7 @@ from typing import Any, Self
 
 import msgspec
 
-from conformance.packs.table1.thresholds import Threshold
+from conformance.papers_robot.thresholds import Threshold
 from conformance.statement.load import ServiceLevel
 from loadtests.schedule.arrivals import arrivals_due
 from loadtests.schedule.plan import Plan

@@ -5,7 +5,7 @@ from typing import Any
 
 from scipy import special
 
-from conformance.packs.table1.thresholds import Threshold
+from conformance.papers_robot.thresholds import Threshold
 from loadtests.statistics.figures import plain_quantiles
 from loadtests.statistics.histogram import SHARES, Histogram, edges_us
 from loadtests.statistics.intervals import figure_interval_ms

@@ -26,7 +26,7 @@ from rclpy.node import Node
 from std_msgs.msg import Header, String
 from unique_identifier_msgs.msg import UUID
 
-from conformance.packs.table1.delivery import COFFEE, COURIER
+from conformance.papers_robot.delivery import COFFEE, COURIER
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.goal_statuses import GoalStatuses
 from reference_robot.names import RosNames

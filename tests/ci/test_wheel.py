@@ -19,7 +19,7 @@ from conformance.packs.table1.selftest import PLAIN
 from conformance.selftest.robots import running
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("conformance", "reference_robot", "loadtests", "reports")
+ROOMS = ("conformance", "reference_robot", "loadtests", "reports", "ros_probe")
 SOURCES = ("pyproject.toml", "README.md", "LICENSE", "roaas.py", "roaas_pytest.py", "ci", *ROOMS)
 
 

@@ -21,9 +21,9 @@ from web_certificate import pair
 
 from conformance.api.rest import guard
 from conformance.commandline.secret_file import names_user
-from conformance.engine.connecting import connection_of
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import StatementError
+from conformance.target.connecting import connection_of
 from loadtests.clients.endpoint import Endpoint, EndpointError
 from roaas import main
 

@@ -25,7 +25,6 @@ from soap_devices import serving
 
 from conformance.api.rest.stops import UNDELIVERED
 from conformance.commandline.exit_codes import ExitCode
-from conformance.engine.describing import described_contract, soap_contract
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.fleet.fleet_file import Member
 from conformance.fleet.member_run import MemberResult, Outcome
@@ -34,6 +33,7 @@ from conformance.scenarios.motion.binding import binding_of
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import load_statement
+from conformance.target.describing import described_contract, soap_contract
 from conformance.transport.client import Connection
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.run import Run

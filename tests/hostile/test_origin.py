@@ -20,8 +20,8 @@ from conformance.api.rest.generated import _loaded
 from conformance.commandline.secret_file import read_secret
 from conformance.documents.description import DescriptionError
 from conformance.documents.json_schema import shape_of
-from conformance.engine.describing import described_contract, fetch_description, soap_contract
 from conformance.statement.endpoints import Endpoints
+from conformance.target.describing import described_contract, fetch_description, soap_contract
 from conformance.transport.client import Connection
 from conformance.transport.fetching import Fetcher
 from conformance.transport.reach import ElsewhereError, Trust, UnreachableError

@@ -10,10 +10,10 @@ import pytest
 from aiohttp import web
 from small_device import REFUSED, answers, described, error, small_device
 
-from conformance.engine.describing import described_contract
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Calls, empty_statement
+from conformance.target.describing import described_contract
 from conformance.transport.client import Connection
 from conformance.verdict.run import Run
 

@@ -9,10 +9,10 @@ from aiohttp import web
 from small_device import REFUSED, answers, described, error, reading, small_device
 
 from conformance.api.rest.stops import UNDELIVERED
-from conformance.engine.describing import described_contract
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Calls, empty_statement
+from conformance.target.describing import described_contract
 from conformance.transport.client import Connection
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.run import Run

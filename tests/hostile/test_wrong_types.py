@@ -11,8 +11,8 @@ from wrong_types import OPENAPI, SWAGGER, WRONG, places, with_wrong
 from conformance.documents.description import DescriptionError
 from conformance.documents.description_faults import invalid, repeated_ids, unfitting_examples
 from conformance.documents.openapi import operations_of
-from conformance.engine.describing import described_contract
 from conformance.statement.endpoints import Endpoints
+from conformance.target.describing import described_contract
 from conformance.transport.client import Connection
 
 _PYTHON = re.compile(r"\w+Error\b|NoneType|object (?:is|has) no|roaas-lazy|is not local|not subscriptable|not iterable")

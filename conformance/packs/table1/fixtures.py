@@ -12,7 +12,7 @@ from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliverie
 from conformance.packs.table1.robot.beats import Beats
 from conformance.packs.table1.robot.clock import Clock
 from conformance.packs.table1.robot.delivery_sender import DeliverySender
-from conformance.packs.table1.robot.probe.client import RosProbe
+from conformance.packs.table1.robot.probe import RosProbe
 from conformance.packs.table1.robot.refused_requests import RefusedRequests
 from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.robot.standstill import Standstill

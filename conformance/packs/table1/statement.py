@@ -10,8 +10,7 @@ from conformance.contract.classes import Prerequisite
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import Finite, NotNegative, Text
 from conformance.packs.table1.limits import DeclaredLimits, Limits
-from conformance.packs.table1.thresholds import Threshold
-from conformance.statement import load
+from conformance.papers_robot.statement import Load, RobotStatement, Ros
 from conformance.statement import statement as generic
 
 if TYPE_CHECKING:
@@ -58,37 +57,15 @@ class Motion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("turns_on_the_spot = false and min_radius_m must be declared together")
 
 
-class Ros(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The robot's ROS side, for the probe.
-
-    Attributes:
-        domain_id: its ROS domain; without it, no probe observes the robot.
-        delivery_topic: topic on which it publishes deliveries.
-        cmd_vel_topic: topic on which it publishes velocities.
-    """
-
-    domain_id: Annotated[int, msgspec.Meta(ge=0, le=232)] | None = None  # DDS's range
-    delivery_topic: Text = "/DeliveryRequestMsg/from_json"
-    cmd_vel_topic: Text = "/cmd_vel"
-
-
-class Load(load.Load, frozen=True, forbid_unknown_fields=True):
-    """What a load test may ask of the robot, and the latency thresholds that it is to keep."""
-
-    thresholds: tuple[Threshold, ...] = ()
-
-
-class Statement(generic.Statement, frozen=True):
+class Statement(RobotStatement, frozen=True):
     """A statement on the paper's robot.
 
     Attributes:
         declared: the limits that it names.
     """
 
-    load: Load = Load()
     declared: DeclaredLimits = DeclaredLimits()
     motion: Motion = Motion()
-    ros: Ros = Ros()
 
     @property
     def limits(self) -> Limits:
@@ -122,15 +99,6 @@ class Statement(generic.Statement, frozen=True):
         unresolved = limits.unresolved
         return lacking | ({Prerequisite.RESOLVED: f"not tested: {unresolved}"} if unresolved else {})
 
-    @property
-    def domain_id(self) -> int | None:
-        """The ROS domain that a probe may join, or None."""
-        return self.ros.domain_id
-
-    def on_domain(self, domain_id: int) -> Statement:
-        """Return the statement with a ROS domain."""
-        return msgspec.structs.replace(self, ros=msgspec.structs.replace(self.ros, domain_id=domain_id))
-
 
 class StatementFile(generic.StatementFile, frozen=True, forbid_unknown_fields=True):
     """The tables of a statement on the paper's robot, as they are written."""
@@ -148,18 +116,6 @@ class StatementFile(generic.StatementFile, frozen=True, forbid_unknown_fields=Tr
         """
         common: dict[str, Any] = self.common(contract, path)
         return Statement(**common, declared=self.limits, motion=self.motion, ros=self.ros)
-
-
-def load_robot_statement(path: Path) -> Statement:
-    """Read a statement on the paper's robot.
-
-    Raises:
-        StatementError: it cannot be read, or has an unknown key or a value of the wrong kind.
-    """
-    found = generic.load_statement(path, Contract.load())
-    if not isinstance(found, Statement):
-        raise TypeError(f"{path} was read as a statement on another kind of device")
-    return found
 
 
 def said_of(run: Run) -> Statement:

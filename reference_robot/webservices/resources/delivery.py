@@ -4,7 +4,7 @@ import re
 from typing import Final
 from urllib.parse import unquote_to_bytes
 
-from conformance.packs.table1.delivery import PATH_NAMES
+from conformance.papers_robot.delivery import PATH_NAMES
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.representation.checking import shown

@@ -5,7 +5,7 @@ import time
 from collections import deque
 from typing import Any, Final, Literal
 
-from conformance.packs.table1.delivery import COFFEE, COURIER
+from conformance.papers_robot.delivery import COFFEE, COURIER
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode

@@ -5,7 +5,7 @@ from typing import Final
 
 from lxml import etree
 
-from conformance.packs.table1.delivery import COFFEE
+from conformance.papers_robot.delivery import COFFEE
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.webservices.http.authorization import Scope
 from reference_robot.webservices.http.messages import Response

@@ -3,7 +3,7 @@
 import re
 
 from conformance.contract.pack import Contract
-from conformance.packs.table1 import delivery
+from conformance.papers_robot import delivery
 
 
 def test_the_path_of_the_openapi_description():

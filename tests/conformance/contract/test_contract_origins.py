@@ -10,8 +10,8 @@ from conformance.contract.classes import Level, Origin
 from conformance.contract.generic import generic_ledger
 from conformance.contract.pack import Contract
 from conformance.contract.sections import anchor_of, cited_in, sections_of
-from conformance.packs.table1.files import CONTRACT_DIR
 from conformance.packs.table1.limits import DeclaredLimits
+from conformance.papers_robot.files import CONTRACT_DIR
 
 TEXT = (CONTRACT_DIR / "contract.md").read_text(encoding="utf-8")
 SECTIONS = sections_of(TEXT)

@@ -5,8 +5,8 @@ import xmlschema
 from lxml import etree
 from zeep import Client
 
-from conformance.packs.table1.delivery import XSD_FIELDS
-from conformance.packs.table1.files import CONTRACT_DIR
+from conformance.papers_robot.delivery import XSD_FIELDS
+from conformance.papers_robot.files import CONTRACT_DIR
 
 NAMESPACE = "http://soap.turtlebot.mybot.org/"
 WSDL = "{http://schemas.xmlsoap.org/wsdl/}"

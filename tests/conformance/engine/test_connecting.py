@@ -7,9 +7,9 @@ import pytest
 from processes import ended
 from toy_server import serving
 
-from conformance.engine.connecting import connection_of, keyed
 from conformance.statement.endpoints import Auth, Endpoints
 from conformance.statement.statement import StatementError
+from conformance.target.connecting import connection_of, keyed
 
 _SECRET, _TOKEN = "correct horse", "a-token-of-the-device"
 _AUTH = Auth("POST /login", "/session/token")

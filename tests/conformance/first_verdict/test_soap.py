@@ -9,8 +9,8 @@ from camera import FILES, Camera
 from small_device import certified, small_device
 
 from conformance.documents.description import DescriptionError
-from conformance.engine.describing import soap_contract
 from conformance.statement.endpoints import Endpoints
+from conformance.target.describing import soap_contract
 from conformance.transport.client import Connection
 
 _OPERATIONS = {

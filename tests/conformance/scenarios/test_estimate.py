@@ -8,10 +8,10 @@ import json
 import pytest
 
 from conformance.documents.openapi import operations_of
-from conformance.engine.describing import described_contract
 from conformance.scenarios.estimate import Estimate, estimate
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import empty_statement
+from conformance.target.describing import described_contract
 from conformance.transport.client import Connection
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run

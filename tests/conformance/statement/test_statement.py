@@ -8,7 +8,7 @@ from conformance.contract.pack import Contract
 from conformance.packs.table1.limits import Noise
 from conformance.packs.table1.robot.robot import STILL, Velocity, is_near
 from conformance.packs.table1.statement import Statement
-from conformance.packs.table1.thresholds import ApiStyle, Operation, Quantile, Threshold
+from conformance.papers_robot.thresholds import ApiStyle, Operation, Quantile, Threshold
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import StatementError, load_statement
 

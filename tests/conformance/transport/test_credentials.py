@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 
 from conformance.commandline.secrecy import SECRETS
-from conformance.engine.connecting import connection_of
 from conformance.engine.resending import send_again
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import StatementError
+from conformance.target.connecting import connection_of
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.credentials import Credential, Credentials, Kind

@@ -14,10 +14,10 @@ from conformance.api.rest.guard import Guard
 from conformance.api.rest.interface import RestInterface
 from conformance.commandline.secrecy import SECRETS
 from conformance.contract.pack import Contract
-from conformance.engine.connecting import connection_of
 from conformance.engine.resending import send_again
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import empty_statement
+from conformance.target.connecting import connection_of
 from conformance.transport import raw
 from conformance.transport.client import HttpClient
 from conformance.transport.incomplete_request import PartialRequest

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from conformance.packs.table1.files import CONTRACT_DIR
+from conformance.papers_robot.files import CONTRACT_DIR
 from loadtests.clients import wsdl
 from loadtests.clients.robot import Robot
 from loadtests.clients.wsdl import WsdlError

@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 from conformance.commandline.exit_codes import ExitCode
 from conformance.packs.table1.statement import Load, Statement
-from conformance.packs.table1.thresholds import ThresholdsError, load_thresholds
+from conformance.papers_robot.thresholds import ThresholdsError, load_thresholds
 from conformance.statement.endpoints import Endpoints
 from loadtests.cli import load
 from loadtests.settings.cli_options import CliOptions

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from conformance.packs.table1.thresholds import ApiStyle, Operation, Quantile, Threshold
+from conformance.papers_robot.thresholds import ApiStyle, Operation, Quantile, Threshold
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Load, Plan
 from loadtests.statistics.figures import quantiles, series

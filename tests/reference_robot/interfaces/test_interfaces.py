@@ -16,7 +16,7 @@ from rclpy.serialization import serialize_message
 from tf2_msgs.msg import TFMessage
 
 import reference_robot
-from conformance.packs.table1.delivery import COFFEE, COORDINATES, COURIER, MESSAGE_FIELDS
+from conformance.papers_robot.delivery import COFFEE, COORDINATES, COURIER, MESSAGE_FIELDS
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.ros import RosRuntime
 

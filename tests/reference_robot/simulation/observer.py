@@ -13,7 +13,7 @@ from nav_msgs.srv import GetPlan
 from rclpy.action import ActionClient
 from std_msgs.msg import String
 
-from conformance.packs.table1.delivery import COORDINATES
+from conformance.papers_robot.delivery import COORDINATES
 from reference_robot.simulation.messages import LATCHED, MISSION_REPORTS, quaternion_of, yaw_of
 
 _PATIENCE_S = 60.0

@@ -10,7 +10,7 @@ from rclpy.qos import qos_profile_action_status_default
 from std_msgs.msg import String
 from unique_identifier_msgs.msg import UUID
 
-from conformance.packs.table1.delivery import EXAMPLE
+from conformance.papers_robot.delivery import EXAMPLE
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
 from reference_robot.simulation.delivery import Delivery

@@ -5,7 +5,7 @@ import json
 from hypothesis import given
 from hypothesis import strategies as st
 
-from conformance.packs.table1.delivery import MESSAGE_FIELDS
+from conformance.papers_robot.delivery import MESSAGE_FIELDS
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.simulation.missions import Mission, Missions, MissionState
 

@@ -13,7 +13,7 @@ import pytest
 from web_messages import delivery_path, fault_of, goal, query_envelope, twist
 from web_robot import ForeignRobot, RosProcess, Served, eventually, problem, ros_environment, running_robot
 
-from conformance.packs.table1.delivery import EXAMPLE
+from conformance.papers_robot.delivery import EXAMPLE
 from reference_robot import ros
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime

@@ -5,7 +5,7 @@ import struct
 import pytest
 from web_messages import delivery_envelope, delivery_path
 
-from conformance.packs.table1.delivery import EXAMPLE
+from conformance.papers_robot.delivery import EXAMPLE
 
 DOUBLES = ["0.1", "-0.0", "1e308", "-1.7976931348623157e308", "5e-324", "2.2250738585072011e-308", "+.5", "007", "1E+2"]
 

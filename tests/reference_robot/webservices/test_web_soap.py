@@ -5,7 +5,7 @@ import zeep
 from lxml import etree
 from web_messages import ENVELOPE, NAMESPACE, SOAP, delivery_envelope, fault_of, goal, query_envelope
 
-from conformance.packs.table1.delivery import EXAMPLE
+from conformance.papers_robot.delivery import EXAMPLE
 
 GOOD = delivery_envelope()
 UNKNOWN = '<s:Header><x:token xmlns:x="urn:x" {}/></s:Header>'

@@ -5,7 +5,7 @@ from typing import Any
 import httpx
 from lxml import etree
 
-from conformance.packs.table1.delivery import EXAMPLE, PATH_NAMES, XSD_FIELDS
+from conformance.papers_robot.delivery import EXAMPLE, PATH_NAMES, XSD_FIELDS
 
 ENVELOPE = '<s:Envelope xmlns:s="http://schemas.xmlsoap.org/soap/envelope/">{}<s:Body>{}</s:Body></s:Envelope>'
 SOAP = "{http://schemas.xmlsoap.org/soap/envelope/}"

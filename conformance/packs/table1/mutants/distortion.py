@@ -9,8 +9,8 @@ from typing import Any
 
 from conformance.mutation.changes import plain, rest, soap, success, unwanted, values
 from conformance.mutation.messages import Forward, Request, Response
-from conformance.packs.table1.delivery import COORDINATES, PATH_NAMES
 from conformance.packs.table1.mutants.paths import DELIVERIES, deliveries
+from conformance.papers_robot.delivery import COORDINATES, PATH_NAMES
 
 _NUMBER = r"([+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d{1,2})?)"
 _DELIVERY = re.compile(DELIVERIES + r"\+?0*([34])" + "".join(f"/{name}/{_NUMBER}" for name in PATH_NAMES), re.ASCII)

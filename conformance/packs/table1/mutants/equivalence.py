@@ -9,7 +9,6 @@ from conformance.mutation.changes import Make, Where, becomes, guarded, inputs, 
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import each, gone, named, says
-from conformance.packs.table1.delivery import COFFEE, COORDINATES, PATH_NAMES
 from conformance.packs.table1.mutants.delivery import OnlyOnce, segments
 from conformance.packs.table1.mutants.distortion import (
     EveryNth,
@@ -27,6 +26,7 @@ from conformance.packs.table1.mutants.in_background import later
 from conformance.packs.table1.mutants.paths import DELIVERIES, SENSORS, TNS, VELOCITY, deliveries
 from conformance.packs.table1.mutants.soap_responses import enveloped
 from conformance.packs.table1.mutants.velocity import times
+from conformance.papers_robot.delivery import COFFEE, COORDINATES, PATH_NAMES
 
 MUTANTS = Table()
 _rest_delivery = MUTANTS.of_class("equivalence", "rest", observer=True)

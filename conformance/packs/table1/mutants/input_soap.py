@@ -10,9 +10,9 @@ from conformance.mutation.changes import SOAP, Make, becomes, page, rewritten, s
 from conformance.mutation.messages import Request
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import named, xml
-from conformance.packs.table1.delivery import XSD_FIELDS
 from conformance.packs.table1.mutants.paths import TNS
 from conformance.packs.table1.mutants.soap_responses import is_fault
+from conformance.papers_robot.delivery import XSD_FIELDS
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("strict-input", "soap")

@@ -17,13 +17,13 @@ from conformance.documents.openapi import is_json
 from conformance.documents.representation import UnreadableError, flattened, read
 from conformance.documents.xml import NotXmlError, elements, parse, text_of
 from conformance.documents.xml_names import clark, local
-from conformance.packs.table1.delivery import COFFEE, COORDINATES, MESSAGE_FIELDS, PATH_NAMES
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_messages import NAMESPACE
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
-from conformance.packs.table1.robot.probe.client import ARRIVES_S
+from conformance.packs.table1.robot.probe import ARRIVES_S
 from conformance.packs.table1.robot.robot import ACCEPT_JSON, DELIVERIES
 from conformance.packs.table1.statement import said_of
+from conformance.papers_robot.delivery import COFFEE, COORDINATES, MESSAGE_FIELDS, PATH_NAMES
 from conformance.transport.exchange import Exchange, Listener, Request, Response
 
 # So many deliveries may wait to be looked for, and the oldest of them for so long, s.

@@ -9,7 +9,7 @@ from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_trace import Seen
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
 from conformance.packs.table1.robot.message_shapes import read_as
-from conformance.packs.table1.robot.probe.client import ARRIVES_S, Probe, ProbeError, RosProbe
+from conformance.packs.table1.robot.probe import ARRIVES_S, Probe, ProbeError, RosProbe
 from conformance.packs.table1.robot.robot import ACCEPT_JSON, DELIVERIES
 from conformance.packs.table1.statement import said_of
 from conformance.transport.client import Connection, HttpClient

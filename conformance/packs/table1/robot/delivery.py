@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.api.soap.forms import EXTREMES
-from conformance.packs.table1.delivery import COFFEE, COURIER, PATH_NAMES, DeliveryFields
 from conformance.packs.table1.robot.robot import DELIVERIES
+from conformance.papers_robot.delivery import COFFEE, COURIER, PATH_NAMES, DeliveryFields
 from conformance.transport.client import Headers
 from conformance.transport.exchange import Exchange
 from conformance.transport.put_off import until_taken

@@ -8,8 +8,8 @@ from conformance.documents.wsdl import read_file
 from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Element
-from conformance.packs.table1.delivery import EXAMPLE
-from conformance.packs.table1.files import CONTRACT_DIR
+from conformance.papers_robot.delivery import EXAMPLE
+from conformance.papers_robot.files import CONTRACT_DIR
 
 NAMESPACE: Final = "http://soap.turtlebot.mybot.org/"
 

@@ -15,9 +15,9 @@ from conformance.documents.xml import elements
 from conformance.documents.xml_names import clark, local
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Element
-from conformance.packs.table1.delivery import COFFEE
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_messages import NAMESPACE, delivery, request
+from conformance.papers_robot.delivery import COFFEE
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import Outgoing

@@ -8,12 +8,12 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.xml_style import TEXTS
-from conformance.packs.table1.delivery import COFFEE, COURIER
 from conformance.packs.table1.robot.deliveries_seen import NoObserverError, observer_of
 from conformance.packs.table1.robot.delivery import Delivery, lexical_deliveries, path_of
 from conformance.packs.table1.robot.delivery_sender import DeliverySender, Order
 from conformance.packs.table1.robot.delivery_trace import Deliveries
-from conformance.packs.table1.robot.probe.client import ProbeError, RosProbe
+from conformance.packs.table1.robot.probe import ProbeError, RosProbe
+from conformance.papers_robot.delivery import COFFEE, COURIER
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.verdict.effort import Effort

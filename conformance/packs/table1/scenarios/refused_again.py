@@ -11,7 +11,6 @@ from conformance.api.rest.validity import INVALID, VALID, validity
 from conformance.api.soap.callable_services import SoapServices
 from conformance.documents.json_text import read_json
 from conformance.observe.polling import poll_for
-from conformance.packs.table1.delivery import COFFEE, COURIER
 from conformance.packs.table1.robot.deliveries_seen import NoObserverError, observer_of
 from conformance.packs.table1.robot.delivery import Delivery, put_delivery
 from conformance.packs.table1.robot.delivery_sender import DeliverySender
@@ -21,7 +20,7 @@ from conformance.packs.table1.robot.geometry import Pose, length_of, wrapped
 from conformance.packs.table1.robot.goal import NEW, arrived, await_goal, await_none, difference, goal_body, put_goal
 from conformance.packs.table1.robot.goal_trace import Put
 from conformance.packs.table1.robot.goals import choose_goals
-from conformance.packs.table1.robot.probe.client import ProbeError, RosProbe
+from conformance.packs.table1.robot.probe import ProbeError, RosProbe
 from conformance.packs.table1.robot.refused_requests import Refused, RefusedRequests, is_refused, send_known
 from conformance.packs.table1.robot.robot import GOAL_PATH, Robot
 from conformance.packs.table1.robot.soap_services import send_delivery
@@ -31,6 +30,7 @@ from conformance.packs.table1.robot.stopping import bring_to_rest
 from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.packs.table1.scenarios.goal_life import await_motion, put_new
 from conformance.packs.table1.scenarios.invalid_goals import NO_FRAME, InvalidGoal
+from conformance.papers_robot.delivery import COFFEE, COURIER
 from conformance.scenarios.scenario import NoOccasionError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange

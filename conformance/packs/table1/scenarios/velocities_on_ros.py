@@ -5,7 +5,7 @@ from typing import Final
 
 from conformance.observe.polling import poll_for
 from conformance.packs.table1.limits import Limits
-from conformance.packs.table1.robot.probe.client import ARRIVES_S, Probe, ProbeError, RosProbe
+from conformance.packs.table1.robot.probe import ARRIVES_S, Probe, ProbeError, RosProbe
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity, is_near
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need

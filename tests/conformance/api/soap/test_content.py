@@ -9,7 +9,7 @@ from conformance.api.soap.messages import ordinary
 from conformance.documents.wsdl import read_file
 from conformance.documents.xml import parse
 from conformance.documents.xml_names import clark
-from conformance.packs.table1.files import CONTRACT_DIR
+from conformance.papers_robot.files import CONTRACT_DIR
 
 CONTRACT = read_file(CONTRACT_DIR / "subscribers.wsdl")
 SPACE = CONTRACT.target_namespace

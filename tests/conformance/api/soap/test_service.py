@@ -5,7 +5,7 @@ import time
 import pytest
 
 from conformance.api.soap.discovery import open_service
-from conformance.packs.table1.files import CONTRACT_DIR
+from conformance.papers_robot.files import CONTRACT_DIR
 from conformance.statement.statement import StatementError
 from conformance.transport.client import Connection
 from conformance.transport.reach import Trust

@@ -11,9 +11,9 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from conformance.packs.table1.robot.delivery import Delivery
-from conformance.packs.table1.robot.probe.client import Probe, ProbeError
+from conformance.packs.table1.robot.probe import Probe, ProbeError
 from conformance.packs.table1.robot.robot import Velocity
-from conformance.packs.table1.statement import Ros
+from conformance.papers_robot.statement import Ros
 from conformance.transport.passage import Recorder
 
 _SENT = Delivery(4, -0.0, 5e-324, 1.7976931348623157e308, 1 / 3, 76.02, -1e-300)
@@ -80,6 +80,6 @@ def test_a_domain_without_a_robot_is_told(domain_id):
 
 
 def test_the_suite_loads_no_ros():
-    modules = "conformance.packs.table1.robot.probe.client, conformance.packs.table1.rules.equivalence.test_ros_graph"
+    modules = "conformance.packs.table1.robot.probe, conformance.packs.table1.rules.equivalence.test_ros_graph"
     program = f"import sys, {modules}; print('rclpy' in sys.modules)"
     assert ended(sys.executable, "-c", program, check=True).stdout.strip() == "False"

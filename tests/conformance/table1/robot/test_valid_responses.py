@@ -4,8 +4,8 @@ import pytest
 
 from conformance.api.soap.service import SoapService
 from conformance.contract.interfaces import Interface
-from conformance.packs.table1.files import CONTRACT_DIR
 from conformance.packs.table1.robot.valid_responses import ValidResponses
+from conformance.papers_robot.files import CONTRACT_DIR
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.run import Run

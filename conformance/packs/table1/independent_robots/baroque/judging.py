@@ -10,7 +10,7 @@ import yaml
 from jsonschema import Draft202012Validator
 from lxml import etree
 
-from conformance.packs.table1.files import CONTRACT_DIR
+from conformance.papers_robot.files import CONTRACT_DIR
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d+)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _MOST_ATTRIBUTES = 100

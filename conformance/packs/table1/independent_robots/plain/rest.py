@@ -9,12 +9,12 @@ from urllib.parse import parse_qsl, unquote, urlsplit
 
 import yaml
 
-from conformance.packs.table1.files import CONTRACT_DIR
 from conformance.packs.table1.independent_robots.body import Body, BusyError, ConflictError, Goal, NoPlanError, stamp
 from conformance.packs.table1.independent_robots.plain import reading
 from conformance.packs.table1.independent_robots.plain.reading import RefusedError
 from conformance.packs.table1.independent_robots.plain.server import Answer
 from conformance.packs.table1.independent_robots.plain.writing import as_json, choose, element, written
+from conformance.papers_robot.files import CONTRACT_DIR
 
 _FRAMES = ("map", "odom")
 # The contract's own descriptions: what a vendor who builds contract-first serves.

@@ -11,7 +11,7 @@ from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import example
 from conformance.observe.clock import WALL_CLOCK
 from conformance.observe.polling import poll_for
-from conformance.packs.table1.delivery import COFFEE, COURIER, EXAMPLE
+from conformance.papers_robot.delivery import COFFEE, COURIER, EXAMPLE
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge

@@ -1,4 +1,4 @@
-"""A program of ours on the robot's ROS graph, in a process of its own, which is asked and answers in lines of JSON.
+"""Start the probe's process, and ask it in lines of JSON.
 
 So the suite and the load tests need no ROS themselves. Every wait has a deadline. In a process that gevent has patched,
 waiting blocks no other greenlet.
@@ -30,10 +30,10 @@ class SilentError(ProbeError):
 
 
 class RosProcess:
-    """A started program; call await_ready() before anything else.
+    """A started probe; call await_ready() before anything else.
 
     Args:
-        module: the program, as of ``python -m``.
+        role: observe, listen or publish.
         options: its options, beside the domain.
         domain_id: the robot's ROS domain.
 
@@ -41,7 +41,7 @@ class RosProcess:
         ProbeError: the process cannot be started.
     """
 
-    def __init__(self, module: str, *options: str, domain_id: int | None) -> None:
+    def __init__(self, role: str, *options: str, domain_id: int | None) -> None:
         # A robot that only looks on its own machine hears no multicast: without a word to it directly, the probe would
         # wait seconds for its next announcement. Robots elsewhere are found as ever.
         peers = ";".join(filter(None, [os.environ.get("ROS_STATIC_PEERS"), "127.0.0.1"]))
@@ -51,7 +51,7 @@ class RosProcess:
         try:
             # In a session of its own: Ctrl-C is for its parent, which then ends it.
             self._process = subprocess.Popen(  # noqa: S603 - our own program
-                [sys.executable, "-P", "-m", module, "--domain-id", str(domain_id), *options],
+                [sys.executable, "-P", "-m", "ros_probe", role, "--domain-id", str(domain_id), *options],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,

@@ -16,8 +16,6 @@ from conformance.commandline.out_folder import FolderError, held
 from conformance.contract.pack import Contract
 from conformance.documents.description import is_url
 from conformance.documents.openapi import operations_of
-from conformance.engine.connecting import connection_of, keyed
-from conformance.engine.describing import described_contract, is_wsdl, soap_contract
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.motion_map import MotionMap, shape_of
 from conformance.statement.statement import (
@@ -31,6 +29,8 @@ from conformance.statement.statement import (
     has_motion_map,
     load_statement,
 )
+from conformance.target.connecting import connection_of, keyed
+from conformance.target.describing import described_contract, is_wsdl, soap_contract
 
 
 def told_apart(targets: tuple[str, ...], openapi: str | None) -> tuple[str | None, Path | None]:

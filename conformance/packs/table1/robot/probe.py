@@ -1,4 +1,4 @@
-"""The suite's end of the ROS probe: asks for what it has received."""
+"""The suite's end of the ROS probe: asks it for the messages that it received."""
 
 import math
 import threading
@@ -6,9 +6,9 @@ from typing import Final
 
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.robot import Velocity
-from conformance.packs.table1.ros_process import ProbeError, RosProcess
-from conformance.packs.table1.statement import Ros
+from conformance.papers_robot.statement import Ros
 from conformance.transport.passage import EyeState, Recorder
+from ros_probe.process import ProbeError, RosProcess
 
 #: How long the robot's messages are waited for, s. DDS sends a lost sample again after its writer's next heartbeat, and
 #: Fast DDS has one every 3 s: on Wi-Fi a message may come so late.
@@ -16,6 +16,7 @@ ARRIVES_S: Final = 5.0
 
 # What the probe hears.
 _EYES: Final = ("deliveries", "velocities")
+_NS: Final = 1_000_000_000
 
 __all__ = ["ARRIVES_S", "Probe", "ProbeError", "RosProbe"]
 
@@ -40,7 +41,7 @@ class Probe(RosProcess):
     def __init__(self, ros: Ros, recorder: Recorder) -> None:
         self._recorder = recorder
         topics = ("--delivery-topic", ros.delivery_topic, "--cmd-vel-topic", ros.cmd_vel_topic)
-        super().__init__("conformance.packs.table1.robot.probe", *topics, domain_id=ros.domain_id)
+        super().__init__("observe", *topics, domain_id=ros.domain_id)
 
     def deliveries(self) -> list[Delivery]:
         """Return the DeliveryRequestMsg messages received since the last call, in order."""
@@ -54,8 +55,8 @@ class Probe(RosProcess):
         """Return and record the messages of one kind since the last call."""
         heard = []
         for message in self.ask(what)[what]:
-            at_s, *values = (float.fromhex(one) if isinstance(one, str) else one for one in message)
-            self._recorder.saw(what, at_s, values)
+            at_ns, *values = (float.fromhex(one) if isinstance(one, str) else one for one in message)
+            self._recorder.saw(what, at_ns / _NS, values)
             heard.append(values)
         return heard
 

@@ -4,14 +4,14 @@ import json
 import time
 from contextlib import suppress
 
-from conformance.packs.table1.ros_process import RosProcess, SilentError
+from ros_probe.process import RosProcess, SilentError
 
 
 class Probe(RosProcess):
     """A process on the ROS graph, in the role `listen` or `publish`; call `await_ready` first."""
 
     def __init__(self, role: str, domain_id: int, topic: str) -> None:
-        super().__init__("loadtests.probe", role, "--topic", topic, domain_id=domain_id)
+        super().__init__(role, "--delivery-topic", topic, domain_id=domain_id)
 
     def publish(self, values: tuple[float, ...]) -> int:
         """Publish a delivery; returns when that began (CLOCK_MONOTONIC, ns).
@@ -30,7 +30,8 @@ class Probe(RosProcess):
         wanted = [float(value).hex() for value in values]
         until = time.monotonic() + within_s
         with suppress(SilentError):
-            while (told := self.told(max(0.0, until - time.monotonic())))["values"] != wanted:
-                pass
-            return int(told["at_ns"])
+            while True:
+                ((at_ns, *heard),) = self.told(max(0.0, until - time.monotonic()))["deliveries"]
+                if heard == wanted:
+                    return int(at_ns)
         return None

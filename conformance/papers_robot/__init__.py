@@ -1,0 +1,1 @@
+"""What the paper says of its robot: for the pack that judges it, the robot itself, and the load test."""

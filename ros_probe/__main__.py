@@ -1,0 +1,50 @@
+"""The probe's process: `python -m ros_probe observe|listen|publish --domain-id N --delivery-topic NAME`.
+
+It writes a line of JSON that says that it is ready, or what its problem is. An observer then answers each line of its
+input ("deliveries", "velocities", "graph") with a line. A listener writes a line for each delivery when it arrives. A
+publisher reads lines of values, publishes each and writes `{"sent_ns": …}`. Times are of CLOCK_MONOTONIC, which all
+processes of a machine share, in ns; messages are `[time, value, …]` with values in the order of the ROS message, in
+hexadecimal, which loses no bit. The process ends when its input ends.
+"""
+
+import argparse
+import json
+import sys
+from typing import Any
+
+
+def _say(answer: dict[str, Any]) -> None:
+    sys.stdout.write(json.dumps(answer) + "\n")
+    sys.stdout.flush()
+
+
+def main() -> int:
+    """Run the probe; return 0 when its input ended, 3 without ROS or without a peer on the topic."""
+    parser = argparse.ArgumentParser(prog="python -m ros_probe", description=__doc__)
+    parser.add_argument("role", choices=["observe", "listen", "publish"])
+    parser.add_argument("--domain-id", type=int, required=True)
+    parser.add_argument("--delivery-topic", required=True)
+    parser.add_argument("--cmd-vel-topic")
+    options = parser.parse_args()
+    try:
+        # Imported here: a machine without ROS gets a message, not a traceback.
+        from ros_probe.node import ProbeNode  # noqa: PLC0415
+
+        node = ProbeNode(options.domain_id, options.delivery_topic, options.cmd_vel_topic)
+    except Exception as error:  # noqa: BLE001 - whatever keeps ROS from running, the parent process has to be told
+        _say({"problem": f"{type(error).__name__}: {error}"})
+        return 3
+    try:
+        problem = node.publish_to() if options.role == "publish" else node.observe(_say, live=options.role == "listen")
+        _say({"problem": problem} if problem else {"ready": True})
+        if problem:
+            return 3
+        for line in sys.stdin:
+            _say({"sent_ns": node.publish(json.loads(line))} if options.role == "publish" else node.answer(line))
+    finally:
+        node.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
