@@ -5,7 +5,7 @@ from types import MappingProxyType
 from typing import Any
 
 from conformance.contract.pack import Contract
-from conformance.documents.wsdl import Operation
+from conformance.documents.wsdl import SoapOperation
 from conformance.documents.xml_node import Node
 from conformance.transport.exchange import Listener
 from conformance.verdict.run import Run
@@ -66,7 +66,7 @@ class Device:
         """Return whether a value that GET returns equals the one that was sent, within the device's tolerance."""
         return bool(shown == wanted)
 
-    def messages(self, service: Soap, operation: Operation) -> Iterator[Node]:  # noqa: ARG002 - for packs
+    def messages(self, service: Soap, operation: SoapOperation) -> Iterator[Node]:  # noqa: ARG002 - for packs
         """Yield SOAP messages that the device accepts, the most promising first; empty if the default one suffices."""
         return iter(())
 

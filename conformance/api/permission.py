@@ -43,12 +43,11 @@ class Permission:
             base_url: scheme and host of the device, whatever the WSDL says.
         """
         # xmlschema and lxml take a third of a second, which other devices need not pay.
-        from conformance.documents.soap_services import base_of  # noqa: PLC0415
         from conformance.documents.wsdl_pack import services_of  # noqa: PLC0415
 
         found = services_of(self._run.contract)
         for port in found.ports if found else ():
-            self.may_post_to(moved(port.url, base_of(found), base_url) if found else port.url)
+            self.may_post_to(moved(port.url, found.base, base_url) if found else port.url)
 
     def forbid_post_to(self, url: str) -> None:
         """Withdraw may_post_to(): a service whose operations act has the same URL."""

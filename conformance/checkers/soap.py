@@ -9,7 +9,7 @@ from lxml import etree
 
 from conformance.api.soap.envelope import Envelope, Fault, NotSoapError, read_root
 from conformance.documents.traceback import inside_shown
-from conformance.documents.wsdl import Description, DescriptionError
+from conformance.documents.wsdl import Wsdl, WsdlError
 from conformance.documents.xml import NotXmlError, elements, has_doctype, parse
 from conformance.documents.xml_names import ENVELOPE, clark, local, namespace
 from conformance.transport.exchange import Attempt, Exchange, Response
@@ -234,12 +234,12 @@ def _type(response: Response) -> str:
     return f"Content-Type {response.header('content-type')!r}"
 
 
-def answers_of(*described: Description) -> frozenset[str]:
+def answers_of(*described: Wsdl) -> frozenset[str]:
     """Return the tags of the response elements of a service, by descriptions of it, as the contract's and its own."""
     found: set[str] = set()
     for description in described:
         try:
             found |= {operation.response for operation in description.operations if operation.response}
-        except DescriptionError:
+        except WsdlError:
             continue
     return frozenset(found)

@@ -16,7 +16,7 @@ from conformance.contract.described import MOTION, SOAP, TITLE, WEB_SERVER
 from conformance.contract.locating import MANIFEST
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import basic_string
-from conformance.documents.soap_services import SoapDescription, SoapOperation, SoapPort, read_services
+from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl, read_services
 from conformance.documents.xml_names import local
 from conformance.documents.xsd_shapes import Element
 
@@ -35,7 +35,7 @@ def label_of(port: SoapPort, operation: SoapOperation) -> str:
 
 def write_soap_pack(
     folder: Path,
-    found: SoapDescription,
+    found: Wsdl,
     location: str,
     documents: Mapping[str, bytes],
     address: str = "",
@@ -76,12 +76,12 @@ def write_soap_pack(
     return folder
 
 
-def _operations(found: SoapDescription) -> dict[str, Any]:
+def _operations(found: Wsdl) -> dict[str, Any]:
     """Return the operations in the form in which those of other APIs are known."""
     paths: dict[str, Any] = {}
     for port, operation in each(found.ports):
         marks = {"x-roaas-reads": True} if _READS.match(operation.name) else {}
-        marks |= {"x-roaas-never": True} if operation.remark else {}
+        marks |= {"x-roaas-never": True} if found.remark(operation) else {}
         paths[label_of(port, operation).partition(" ")[2]] = {
             "post": {
                 "operationId": operation.name,
@@ -99,7 +99,7 @@ def _statuses(port: SoapPort, operation: SoapOperation) -> dict[str, Any]:
     return {status: {"description": ""} for status in known}
 
 
-def label_in(found: SoapDescription, path: str, body: bytes) -> str | None:
+def label_in(found: Wsdl, path: str, body: bytes) -> str | None:
     """Return the operation that a message to a path is for, or None."""
     payload = _PAYLOAD.search(body)
     name = payload[1].decode() if payload else ""
@@ -127,7 +127,7 @@ def own_wsdl(contract: Contract) -> str:
 
 
 @lru_cache(maxsize=4)
-def services_of(contract: Contract) -> SoapDescription | None:
+def services_of(contract: Contract) -> Wsdl | None:
     """Return what the WSDL of a pack describes; None if the pack has none.
 
     Raises:

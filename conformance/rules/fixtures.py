@@ -17,7 +17,7 @@ from conformance.api.soap.service import SoapService
 from conformance.checkers.rest import RestCheckers
 from conformance.checkers.soap import PASSIVE, SoapCheckers, answers_of
 from conformance.documents.openapi import operations_of
-from conformance.documents.wsdl import Description
+from conformance.documents.wsdl import Wsdl
 from conformance.scenarios.motion.binding import binding_of
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.other_exchanges import OtherExchanges
@@ -66,7 +66,7 @@ def _watched(
             listener.answered(exchange)
 
 
-def _descriptions(service: SoapService) -> Iterator[Description]:
+def _descriptions(service: SoapService) -> Iterator[Wsdl]:
     """Yield what the robot says of a service, and what the contract does."""
     if service.own is not None:
         yield service.own

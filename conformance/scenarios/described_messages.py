@@ -17,7 +17,7 @@ from conformance.api.soap.messages import ordinary, simple_leaves, unknown_in, w
 from conformance.api.soap.username_token import block_of
 from conformance.commandline.device_options import advice
 from conformance.documents.addressing import addressing_blocks
-from conformance.documents.soap_services import SoapDescription, SoapOperation, SoapPort
+from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl
 from conformance.documents.wsdl_pack import services_of
 from conformance.documents.xml import parse
 from conformance.documents.xml_node import Node
@@ -43,7 +43,7 @@ class DescribedMessages:
         token: the user whose token each message carries, or None.
     """
 
-    found: SoapDescription
+    found: Wsdl
     values: dict[str, tuple[object, ...]] = field(default_factory=dict)
     token: UsernameToken | None = None
 

@@ -13,7 +13,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.messages import declarations, simple_leaves, with_text
 from conformance.documents.multipart import root_of
 from conformance.documents.openapi import operations_of
-from conformance.documents.soap_services import SoapDescription, SoapOperation, SoapPort, base_of
+from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl
 from conformance.documents.wsdl_pack import each, label_of, services_of
 from conformance.documents.xml import NotXmlError, elements, parse
 from conformance.documents.xml_names import clark
@@ -207,8 +207,8 @@ def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
     # What one operation answers, another asks for: those that ask for nothing that must be known come first.
     for port, operation in sorted(each(found.ports), key=lambda one: caller.asks(one[1])):
         rule = described[label_of(port, operation)]
-        why = operation.remark or ("" if rule.may else str(rule))
-        why = why or ("" if is_same(port.url, base_of(found)) else f"its port is at another server, {port.url}")
+        why = found.remark(operation) or ("" if rule.may else str(rule))
+        why = why or ("" if is_same(port.url, found.base) else f"its port is at another server, {port.url}")
         if why:
             caller.left_out.append((label_of(port, operation), why))
         else:
@@ -281,7 +281,7 @@ def _usual(caller: _Caller, port: SoapPort, operation: SoapOperation) -> tuple[E
     return declared, node, kind
 
 
-def _invalid(found: SoapDescription, declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
+def _invalid(found: Wsdl, declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
     """Yield messages that the schema forbids, each wrong in one thing."""
     tried: list[tuple[str, Node]] = []
     for path, part in declarations(declared, node):

@@ -22,7 +22,7 @@ from conformance.transport.reach import Folder, Trust, UnreachableError, is_same
 from conformance.verdict.finding import counted
 
 if TYPE_CHECKING:
-    from conformance.documents.soap_services import SoapDescription
+    from conformance.documents.wsdl import Wsdl
 
 #: The folder of the pack, in the folder of the results.
 FOLDER: Final = "description"
@@ -202,12 +202,10 @@ def _without_cases(document: Schema) -> tuple[str, ...]:
     return (f"{large[0]}{more} had no generated requests: the schemas have too many parts for that.",)
 
 
-def _server_of_ports(found: SoapDescription, source: str, trust: Trust) -> tuple[str, str]:
+def _server_of_ports(found: Wsdl, source: str, trust: Trust) -> tuple[str, str]:
     """Return the server of a WSDL's ports, and a remark where that is another one than the user named."""
-    from conformance.documents.soap_services import base_of  # noqa: PLC0415 - as below
-
     if not is_url(source):
-        return base_of(found), ""
+        return found.base, ""
     url = found.ports[0].url
     if trust.trusts(url):
         return server_of(trust.place(url)), ""
@@ -247,7 +245,7 @@ def soap_contract(
     """
     import msgspec  # noqa: PLC0415 - read already where this is used
 
-    from conformance.documents.soap_services import WsdlError, base_of, read_services  # noqa: PLC0415
+    from conformance.documents.wsdl import WsdlError, read_services  # noqa: PLC0415
     from conformance.documents.wsdl_imports import SchemaFolder  # noqa: PLC0415
 
     # xmlschema and lxml take a third of a second, which other devices need not pay.
@@ -290,7 +288,7 @@ def soap_contract(
         raise DescriptionError(str(error)) from error
     except ValueError as error:
         raise DescriptionError(f"{source} could not be read: {error}") from error
-    base = base_of(found) if address else base_url or endpoints.rest
+    base = found.base if address else base_url or endpoints.rest
     remark = ""
     if base is None:
         base, remark = _server_of_ports(found, source, trust)
@@ -299,9 +297,11 @@ def soap_contract(
     elsewhere = (
         f"Port {port.name} is at {port.url}, another server, and is not called."
         for port in found.ports
-        if not is_same(port.url, base_of(found)) and not is_same(port.url, base)
+        if not is_same(port.url, found.base) and not is_same(port.url, base)
     )
-    uncalled = (f"{label_of(port, one)} is not called: {one.remark}." for port, one in each(found.ports) if one.remark)
+    uncalled = (
+        f"{label_of(port, one)} is not called: {why}." for port, one in each(found.ports) if (why := found.remark(one))
+    )
     pack = write_soap_pack(out / FOLDER, found, source, documents, address, named=named, foreign=foreign, moves=moves)
     Contract.load.cache_clear()
     remarks = (*filter(None, [remark]), *elsewhere, *uncalled, *found.notes)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from conformance.documents.openapi import Operation
-from conformance.documents.soap_services import SoapOperation, SoapPort, base_of
+from conformance.documents.wsdl import SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import each, label_of
 from conformance.documents.xml_names import local
 from conformance.documents.xml_node import Node
@@ -29,7 +29,7 @@ def _found(messages: DescribedMessages, operation: Operation) -> tuple[SoapPort,
 
 def at_hand(messages: DescribedMessages, operation: Operation) -> bool:
     """Return whether the port of an operation is at the server of the first one; others are not called."""
-    return is_same(_found(messages, operation)[0].url, base_of(messages.found))
+    return is_same(_found(messages, operation)[0].url, messages.found.base)
 
 
 def described_message(device: Device, messages: DescribedMessages, operation: Operation) -> Described:

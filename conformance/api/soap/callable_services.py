@@ -9,7 +9,7 @@ from conformance.api.soap.calls import SoapResponse, call
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import example
 from conformance.contract.interfaces import Interface
-from conformance.documents.wsdl import Operation
+from conformance.documents.wsdl import SoapOperation
 from conformance.documents.xml_node import Node
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
@@ -64,7 +64,7 @@ def callable_services(soap: SoapServices, *ids: str) -> list[SoapService]:
     return found
 
 
-def accepted_messages(soap: SoapServices, service: SoapService, *ids: str) -> list[tuple[Operation, Node]]:
+def accepted_messages(soap: SoapServices, service: SoapService, *ids: str) -> list[tuple[SoapOperation, Node]]:
     """Return each operation with a message that the robot accepts; where there is none, note it at the requirements.
 
     Raises:
@@ -77,7 +77,9 @@ def accepted_messages(soap: SoapServices, service: SoapService, *ids: str) -> li
     return accepted
 
 
-def is_gone(soap: SoapServices, service: SoapService, accepted: tuple[Operation, Node], answer: SoapResponse) -> bool:
+def is_gone(
+    soap: SoapServices, service: SoapService, accepted: tuple[SoapOperation, Node], answer: SoapResponse
+) -> bool:
     """Return whether a refusal says nothing of the request: what the operation reads has ended since it was accepted.
 
     Args:

@@ -2,47 +2,40 @@
 
 from collections.abc import Iterator
 
-from conformance.documents.wsdl import Description, DescriptionError, Operation, name
-from conformance.documents.xml_names import WSDL, WSDL_SOAP, clark, local
+from conformance.documents.wsdl import SoapOperation, Wsdl
+from conformance.documents.xml_names import local
 from conformance.documents.xsd import SchemaError
 from conformance.documents.xsd_shapes import Complex, Element, Simple
 
 
-def names(contract: Description, robot: Description) -> Iterator[str]:
+def names(contract: Wsdl, robot: Wsdl) -> Iterator[str]:
     """Yield the names that differ between the robot's description and the contract's.
 
     Raises:
-        DescriptionError: the robot's has no binding or no port type.
+        WsdlError: the robot's has no binding or no port type.
     """
     for what, wanted, found in (
         ("target namespace", contract.target_namespace, robot.target_namespace),
-        ("port type", name(contract.port_type), name(robot.port_type)),
-        ("binding", name(contract.binding), name(robot.binding)),
+        ("port type", contract.bound[0].port_type, robot.bound[0].port_type),
+        ("binding", contract.bound[0].binding, robot.bound[0].binding),
     ):
         if wanted != found:
             yield f"{what} {found!r}, not {wanted!r}"
-    for what, here, there in (
-        ("service", _services(contract), _services(robot)),
-        ("port", {name(port) for port in contract.ports}, {name(port) for port in robot.ports}),
-    ):
+    for what in ("service", "name"):
+        here, there = ({getattr(port, what) for port in one.bound} for one in (contract, robot))
         # A robot may have further services and ports, such as one for SOAP 1.2.
         for missing in sorted(here - there):
-            yield f"{what} {', '.join(sorted(there)) or 'none'!r}, not {missing!r}"
+            kind = "port" if what == "name" else what
+            yield f"{kind} {', '.join(sorted(there)) or 'none'!r}, not {missing!r}"
 
 
-def _services(description: Description) -> set[str]:
-    parents = [port.getparent() for port in description.ports]
-    return {name(service) for service in parents if service is not None}
-
-
-def operations(contract: Description, robot: Description) -> Iterator[str]:
+def operations(contract: Wsdl, robot: Wsdl) -> Iterator[str]:
     """Yield the differences between the operations of the robot's description and of the contract's.
 
     Raises:
-        DescriptionError: the robot's has no binding or no port type.
+        WsdlError: the robot's has no binding or no port type.
     """
     there = {operation.name: operation for operation in robot.operations}
-    actions = _soap_actions(contract), _soap_actions(robot)
     for wanted in contract.operations:
         found = there.get(wanted.name)
         if found is None:
@@ -53,23 +46,13 @@ def operations(contract: Description, robot: Description) -> Iterator[str]:
             ("output element", wanted.response, found.response),
             ("messages", ", ".join(wanted.messages), ", ".join(found.messages)),
             ("parts", str(wanted.parts), str(found.parts)),
-            ("soapAction", actions[0].get(wanted.name), actions[1].get(wanted.name)),
+            ("soapAction", wanted.action, found.action),  # a missing one is an empty one (WSDL 1.1, 3.4)
         ):
             if here != other:
                 yield f"{what} {other or '(none)'} of {wanted.name}, not {here or '(none)'}"
 
 
-def _soap_actions(description: Description) -> dict[str, str]:
-    """Return soapAction by operation; a missing one is the same as an empty one (WSDL 1.1, 3.4)."""
-    found: dict[str, str] = {}
-    for operation in description.binding.findall(clark(WSDL, "operation")):
-        bound = operation.find(clark(WSDL_SOAP, "operation"))
-        if bound is not None:
-            found[name(operation)] = bound.get("soapAction") or ""
-    return found
-
-
-def actions(contract: Description, robot: Description) -> Iterator[str]:
+def actions(contract: Wsdl, robot: Wsdl) -> Iterator[str]:
     """Yield each wsam:Action that the contract does not allow: as printed, or with ``Request`` as JAX-WS RI has it."""
     there = {operation.name: operation for operation in robot.operations}
     for wanted in contract.operations:
@@ -81,18 +64,23 @@ def actions(contract: Description, robot: Description) -> Iterator[str]:
 
 
 def _action(
-    operation: Operation, side: str, wanted: str | None, found: str | None, ends: tuple[str, ...]
+    operation: SoapOperation, side: str, wanted: str | None, found: str | None, ends: tuple[str, ...]
 ) -> Iterator[str]:
     allowed = [f"{wanted}{end}" for end in ends]
     if wanted is not None and found not in allowed:
         yield f"wsam:Action {found!r} of the {side} of {operation.name}, not {' or '.join(map(repr, allowed))}"
 
 
-def types(contract: Description, robot: Description) -> Iterator[str]:
-    """Yield the differences between the types of the messages, element by element."""
+def types(contract: Wsdl, robot: Wsdl) -> Iterator[str]:
+    """Yield the differences between the types of the messages, element by element.
+
+    Raises:
+        WsdlError: the robot's has no binding or no port type.
+    """
+    _ = robot.bound
     for operation in contract.operations:
         for tag in (operation.request, operation.response):
-            if tag is None:
+            if not tag:
                 continue
             wanted = contract.shape(tag)
             try:
@@ -146,12 +134,3 @@ def _often(element: Element) -> str:
 
 def _listed(elements: tuple[Element, ...]) -> str:
     return ", ".join(child.tag for child in elements) or "nothing"
-
-
-def broken(robot: Description) -> str:
-    """Return why a description cannot be compared; empty where it can."""
-    try:
-        _ = robot.binding, robot.port_type
-    except DescriptionError as error:
-        return str(error)
-    return ""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from conformance.api.soap.address import split
-from conformance.documents.wsdl import Description, DescriptionError, describe
+from conformance.documents.wsdl import Wsdl, WsdlError, describe
 from conformance.statement.statement import StatementError
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError
@@ -35,7 +35,7 @@ class PublishedWsdl:
         """Its source, if that is a URL."""
         return self.source if self.source is not None and "://" in self.source else None
 
-    def interpreted(self, beside: str, connection: Connection) -> tuple[Description | None, str]:
+    def interpreted(self, beside: str, connection: Connection) -> tuple[Wsdl | None, str]:
         """Return the description, or why it cannot be read.
 
         A WSDL from a file may refer to documents on the robot, which are looked for ``beside`` the service.
@@ -48,7 +48,7 @@ class PublishedWsdl:
                 self.source,
                 lambda location: fetch(location, self.url or beside, connection, Folder(str(self.source))),
             )
-        except DescriptionError as error:
+        except WsdlError as error:
             return None, str(error)
         return described, ""
 

@@ -10,13 +10,13 @@ from pathlib import Path
 
 from conformance.api.soap.published_wsdl import PublishedWsdl, fetch
 from conformance.contract.interfaces import Interface
-from conformance.documents.wsdl import Description, DescriptionError, Operation, faults, read_file
+from conformance.documents.wsdl import SoapOperation, Wsdl, WsdlError, read_file, unusable
 from conformance.documents.xml_node import Node
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
 from conformance.transport.reach import Folder
 
-KnownMessages = Callable[["SoapService", Operation], Iterable[Node]]
+KnownMessages = Callable[["SoapService", SoapOperation], Iterable[Node]]
 
 MEDIA_TYPE = "text/xml; charset=utf-8"
 
@@ -89,22 +89,22 @@ class SoapService:
         return twin
 
     @cached_property
-    def contract(self) -> Description:
+    def contract(self) -> Wsdl:
         """What the contract says of the service.
 
         Raises:
-            DescriptionError: the contract's files cannot be used, or it has no such service.
+            WsdlError: the contract's files cannot be used, or it has no such service.
         """
         if self.contract_wsdl_path is None:
-            raise DescriptionError(f"the contract has no {self.name} service")
+            raise WsdlError(f"the contract has no {self.name} service")
         return read_file(self.contract_wsdl_path)
 
     @cached_property
-    def _interpreted(self) -> tuple[Description | None, str]:
+    def _interpreted(self) -> tuple[Wsdl | None, str]:
         return self.published.interpreted(self.endpoint, self.client.connection)
 
     @property
-    def own(self) -> Description | None:
+    def own(self) -> Wsdl | None:
         """What the robot says of the service; None where it says nothing that could be read (see own_problem)."""
         return self._interpreted[0]
 
@@ -114,9 +114,9 @@ class SoapService:
         return self._interpreted[1]
 
     @cached_property
-    def described(self) -> Description:
+    def described(self) -> Wsdl:
         """What a client would go by: the robot's own description where it can be used, else the contract's."""
-        return self.own if self.own is not None and not next(faults(self.own), "") else self.contract
+        return self.own if self.own is not None and not next(unusable(self.own), "") else self.contract
 
     def fetch(self, location: str) -> bytes:
         """Read a document that the robot's WSDL refers to, or the contract's where the robot has none.

@@ -11,7 +11,7 @@ from conformance.api.soap.calls import SoapResponse, call
 from conformance.api.soap.envelope import NotSoapError, read_root
 from conformance.api.soap.messages import ordinary, simple_leaves, with_text
 from conformance.api.soap.service import SoapService
-from conformance.documents.wsdl import Operation
+from conformance.documents.wsdl import SoapOperation
 from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import XSD, XSI, clark, namespace
 from conformance.documents.xml_node import Node
@@ -66,7 +66,7 @@ def call_valid(service: SoapService, payload: Node, *, headers: tuple[Node, ...]
     return call(service, require_valid_message(service, payload), headers=headers)
 
 
-def example(service: SoapService, operation: Operation) -> Node | None:
+def example(service: SoapService, operation: SoapOperation) -> Node | None:
     """Return a message that the robot accepts for the operation; the first call tries several, and sends them.
 
     Raises:
@@ -79,7 +79,7 @@ def example(service: SoapService, operation: Operation) -> Node | None:
     return service.examples[operation.name]
 
 
-def _found(service: SoapService, operation: Operation) -> Node | None:
+def _found(service: SoapService, operation: SoapOperation) -> Node | None:
     declared = service.contract.shape(operation.request) if operation.request else None
     if declared is None:
         return None
@@ -100,7 +100,7 @@ def _found(service: SoapService, operation: Operation) -> Node | None:
     return None
 
 
-def candidates(service: SoapService, operation: Operation, declared: Element) -> Iterator[Node]:
+def candidates(service: SoapService, operation: SoapOperation, declared: Element) -> Iterator[Node]:
     """Yield messages of an operation to try, likeliest first, at least one.
 
     Raises:
@@ -121,7 +121,7 @@ def candidates(service: SoapService, operation: Operation, declared: Element) ->
         yield made
 
 
-def quiet_example(service: SoapService) -> tuple[Operation, Node] | None:
+def quiet_example(service: SoapService) -> tuple[SoapOperation, Node] | None:
     """Return the first operation with a message that the robot accepts; None where there is none.
 
     Raises:
@@ -136,7 +136,7 @@ def quiet_example(service: SoapService) -> tuple[Operation, Node] | None:
     return None
 
 
-def _size(service: SoapService, operation: Operation) -> int:
+def _size(service: SoapService, operation: SoapOperation) -> int:
     declared = service.contract.shape(operation.request) if operation.request else None
     return len(ordinary(declared, optional=True).paths()) if declared is not None else 1000
 

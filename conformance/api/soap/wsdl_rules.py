@@ -6,7 +6,7 @@ from typing import Final
 
 from lxml import etree
 
-from conformance.documents.wsdl import Description, name, qname
+from conformance.documents.wsdl import Wsdl, name, qname
 from conformance.documents.xml import elements
 from conformance.documents.xml_names import WSDL, WSDL_SOAP, XSD, clark, local, namespace
 from conformance.documents.xsd import SchemaError
@@ -43,7 +43,7 @@ _ATTRIBUTES: Final[dict[str, tuple[str, ...]]] = {
 _ORDER: Final = {"import": 0, "types": 1}
 
 
-def r2003(description: Description) -> Iterator[str]:
+def r2003(description: Wsdl) -> Iterator[str]:
     """Types with XML Schema, and xsd:import only inside xsd:schema."""
     if not description.schemas:
         yield "no xsd:schema in wsdl:types"
@@ -53,7 +53,7 @@ def r2003(description: Description) -> Iterator[str]:
             yield f"an xsd:import in {parent.tag}"
 
 
-def r2028(description: Description) -> Iterator[str]:
+def r2028(description: Wsdl) -> Iterator[str]:
     """The structure that the schema of WSDL 1.1 and R2022, R2023 allow."""
     for root in description.definitions:
         ranks = [_ORDER.get(local(str(child.tag)), 2) for child in elements(root) if _is_part(child)]
@@ -83,7 +83,7 @@ def _structure(element: etree._Element) -> Iterator[str]:
             yield f"wsdl:{local(str(child.tag))} in wsdl:{kind}"
 
 
-def r2105(description: Description) -> Iterator[str]:
+def r2105(description: Wsdl) -> Iterator[str]:
     """A targetNamespace on every schema that declares something."""
     for document in description.schemas:
         if document.inline and not document.namespace:
@@ -96,7 +96,7 @@ def r2105(description: Description) -> Iterator[str]:
                 yield f"a schema without targetNamespace that has {local(declared[0])}"
 
 
-def _bodies(description: Description) -> Iterator[tuple[etree._Element, str, etree._Element]]:
+def _bodies(description: Wsdl) -> Iterator[tuple[etree._Element, str, etree._Element]]:
     """Each soap:body of the SOAP bindings, with its operation's name and its message."""
     signatures = {
         name(operation): operation
@@ -108,12 +108,12 @@ def _bodies(description: Description) -> Iterator[tuple[etree._Element, str, etr
         for side in ("input", "output"):
             for body in operation.findall(f"{clark(WSDL, side)}/{clark(WSDL_SOAP, 'body')}"):
                 part = declared.find(clark(WSDL, side)) if declared is not None else None
-                message = description.message(part.get("message")) if part is not None else None
+                message = description.find("w:message", part, "message") if part is not None else None
                 if message is not None:
                     yield body, name(operation), message
 
 
-def r2201(description: Description) -> Iterator[str]:
+def r2201(description: Wsdl) -> Iterator[str]:
     """At most one part in each soap:body (with R2210: in its message, where it names none)."""
     for body, operation, message in _bodies(description):
         named = body.get("parts")
@@ -122,7 +122,7 @@ def r2201(description: Description) -> Iterator[str]:
             yield f"{count} parts in one soap:body of {operation}"
 
 
-def r2204(description: Description) -> Iterator[str]:
+def r2204(description: Wsdl) -> Iterator[str]:
     """Parts by element."""
     for _, operation, message in _bodies(description):
         for part in message.findall(clark(WSDL, "part")):
@@ -130,7 +130,7 @@ def r2204(description: Description) -> Iterator[str]:
                 yield f"part {name(part)!r} of {name(message)} without element, for {operation}"
 
 
-def r2206(description: Description) -> Iterator[str]:
+def r2206(description: Wsdl) -> Iterator[str]:
     """A type or an element, which is a global one that exists."""
     for part in description.all("w:message/w:part"):
         if bool(part.get("element")) == bool(part.get("type")):
@@ -145,7 +145,7 @@ def r2206(description: Description) -> Iterator[str]:
                 return
 
 
-def r2304(description: Description) -> Iterator[str]:
+def r2304(description: Wsdl) -> Iterator[str]:
     """Operations of different names."""
     for port_type in description.all("w:portType"):
         counted = Counter(name(operation) for operation in port_type.findall(clark(WSDL, "operation")))
@@ -154,27 +154,27 @@ def r2304(description: Description) -> Iterator[str]:
         )
 
 
-def r2401(description: Description) -> Iterator[str]:
+def r2401(description: Wsdl) -> Iterator[str]:
     """A soap:binding of WSDL 1.1."""
     if not description.all("w:binding[s:binding]"):
         yield "no wsdl:binding with a soap:binding"
 
 
-def r2701(description: Description) -> Iterator[str]:
+def r2701(description: Wsdl) -> Iterator[str]:
     """A transport."""
     for binding in description.all("w:binding/s:binding"):
         if not binding.get("transport"):
             yield "soap:binding without transport"
 
 
-def r2702(description: Description) -> Iterator[str]:
+def r2702(description: Wsdl) -> Iterator[str]:
     """SOAP over HTTP."""
     for binding in description.all("w:binding/s:binding"):
         if binding.get("transport") != _HTTP:
             yield f"transport {binding.get('transport')!r}"
 
 
-def r2705(description: Description) -> Iterator[str]:
+def r2705(description: Wsdl) -> Iterator[str]:
     """One style, document (which is what is meant where none is named)."""
     for binding in description.all("w:binding[s:binding]"):
         default = binding.find(clark(WSDL_SOAP, "binding"))
@@ -187,7 +187,7 @@ def r2705(description: Description) -> Iterator[str]:
             yield f"style {' and '.join(sorted(styles))}"
 
 
-def r2706(description: Description) -> Iterator[str]:
+def r2706(description: Wsdl) -> Iterator[str]:
     """Literal use (which is what is meant where none is named, R2707)."""
     for kind in ("body", "header", "headerfault", "fault"):
         for element in description.all(f"w:binding//s:{kind}"):
@@ -195,7 +195,7 @@ def r2706(description: Description) -> Iterator[str]:
                 yield f"soap:{kind} with use {element.get('use')!r}"
 
 
-def r2710(description: Description) -> Iterator[str]:
+def r2710(description: Wsdl) -> Iterator[str]:
     """Different elements in the Body for different operations."""
     counted = Counter(operation.request for operation in description.operations)
     yield from (
@@ -203,7 +203,7 @@ def r2710(description: Description) -> Iterator[str]:
     )
 
 
-def r2716(description: Description) -> Iterator[str]:
+def r2716(description: Wsdl) -> Iterator[str]:
     """No namespace attribute on soap:body and its like."""
     for kind in ("body", "header", "headerfault", "fault"):
         for element in description.all(f"w:binding//s:{kind}"):
@@ -211,7 +211,7 @@ def r2716(description: Description) -> Iterator[str]:
                 yield f"soap:{kind} with namespace {element.get('namespace')!r}"
 
 
-def r2718(description: Description) -> Iterator[str]:
+def r2718(description: Wsdl) -> Iterator[str]:
     """The operations of the port type, each once."""
     port_types = {name(element): element for element in description.all("w:portType")}
     for binding in description.all("w:binding[s:binding]"):
@@ -224,7 +224,7 @@ def r2718(description: Description) -> Iterator[str]:
             yield f"{name(binding)} with {', '.join(sorted(bound)) or 'nothing'}, not {', '.join(sorted(wanted))}"
 
 
-def r2801(description: Description) -> Iterator[str]:
+def r2801(description: Wsdl) -> Iterator[str]:
     """XML Schema 1.0."""
     for types in description.all("w:types"):
         for child in elements(types):
@@ -236,7 +236,7 @@ def r2801(description: Description) -> Iterator[str]:
         yield f"schemas that do not compile: {error}"
 
 
-def r4003(description: Description) -> Iterator[str]:
+def r4003(description: Wsdl) -> Iterator[str]:
     """UTF-8 or UTF-16, all documents."""
     for root in [*description.definitions, *(document.root for document in description.schemas)]:
         encoding = (root.getroottree().docinfo.encoding or "UTF-8").upper()
@@ -244,7 +244,7 @@ def r4003(description: Description) -> Iterator[str]:
             yield f"encoding {encoding!r}"
 
 
-RULES: Final[dict[str, Callable[[Description], Iterator[str]]]] = {
+RULES: Final[dict[str, Callable[[Wsdl], Iterator[str]]]] = {
     "R2003": r2003,
     "R2028": r2028,
     "R2105": r2105,

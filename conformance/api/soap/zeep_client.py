@@ -13,7 +13,6 @@ from zeep.exceptions import Fault as ZeepFault
 from zeep.transports import Transport
 
 from conformance.api.soap.service import SoapService
-from conformance.documents.wsdl import name
 from conformance.transport.exchange import Exchange, NoAnswerError
 
 _OK = 200
@@ -73,7 +72,7 @@ class ZeepCaller:
         client = Client(self.source, transport=self._transport, settings=Settings(strict=True))
         described = service.own if own and service.own is not None else service.contract
         bindings = {str(key).rpartition("}")[2]: key for key in client.wsdl.bindings}
-        self._proxy = client.create_service(bindings[name(described.binding)], service.endpoint)
+        self._proxy = client.create_service(bindings[described.bound[0].binding], service.endpoint)
 
     def call(self, operation: str, *arguments: Any, **named: Any) -> tuple[Any, str, Exchange | None]:
         """Call an operation.

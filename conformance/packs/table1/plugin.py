@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from conformance.api import device
-from conformance.documents.wsdl import Operation
+from conformance.documents.wsdl import SoapOperation
 from conformance.documents.xml_node import Node
 from conformance.packs.table1.robot.clock import Clock
 from conformance.packs.table1.robot.examples import Examples
@@ -128,7 +128,7 @@ class Device(device.Device):
         room = limits.tolerance_angular_rad_s if "angular" in place else limits.tolerance_linear_m_s
         return abs(shown - wanted) <= room + limits.tolerance * abs(wanted)
 
-    def messages(self, service: device.Soap, operation: Operation) -> Iterator[Node]:
+    def messages(self, service: device.Soap, operation: SoapOperation) -> Iterator[Node]:
         """Yield SOAP messages that the robot takes, likeliest first; none where the obvious one will do."""
         from conformance.packs.table1.robot.soap_services import known_messages  # noqa: PLC0415 - see the class
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 
 import pytest
 
@@ -14,7 +15,7 @@ from conformance.api.soap.envelope import EMPTY
 from conformance.api.soap.published_wsdl import get
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.wsdl_rules import RULES
-from conformance.documents.wsdl import Description, DescriptionError, describe, faults, name
+from conformance.documents.wsdl import Wsdl, WsdlError, describe, name, unusable
 from conformance.documents.xml_names import WSDL_SOAP, clark
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError
@@ -23,7 +24,7 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.phase("settling")
-_COMPARED: dict[str, tuple[Callable[[Description, Description], Iterator[str]], str]] = {
+_COMPARED: dict[str, tuple[Callable[[Wsdl, Wsdl], Iterator[str]], str]] = {
     "wsdl-names": (comparison.names, "a WSDL with the names of the contract"),
     "wsdl-operations": (comparison.operations, "a WSDL with the operations of the contract"),
     "wsdl-types": (comparison.types, "a WSDL with the types of the contract"),
@@ -36,7 +37,7 @@ class _Served:
     """The description that a robot serves, the request for it, and what is wrong with it."""
 
     exchange: Exchange
-    description: Description | None
+    description: Wsdl | None
     problem: str
 
 
@@ -69,11 +70,11 @@ def _served(service: SoapService) -> _Served:
         return _Served(exchange, None, "a document that is not XML")
     try:
         description = describe(answer.body, source, service.fetch)
-    except DescriptionError as error:
+    except WsdlError as error:
         return _Served(exchange, None, str(error))
-    missing = [(place, why) for place, why in description.missing if is_same(place, source)]
+    missing = [(place, why) for place, why in description.documents.missing.items() if is_same(place, source)]
     # A document of another host (a public schema) matters only where something that is used comes from it.
-    problem = next((f"a reference to {place}: {why}" for place, why in missing), "") or next(faults(description), "")
+    problem = next((f"a reference to {place}: {why}" for place, why in missing), "") or next(unusable(description), "")
     return _Served(exchange, description, problem)
 
 
@@ -94,12 +95,10 @@ def test_same_as_contract(soap: SoapServices, judge: Judge, effort: Effort) -> N
     for service in _services(soap, *ids):
         for _ in range(repetitions(effort, 3)):
             served = _served(service)
-            broken = served.problem if served.description is None else comparison.broken(served.description)
             for name_, (compare, expected) in _COMPARED.items():
-                found = (
-                    [broken] if broken or served.description is None else compare(service.contract, served.description)
-                )
-                problem = next(iter(found), "")
+                same = partial(compare, service.contract)
+                found = iter([served.problem]) if served.description is None else _guarded(same, served.description)
+                problem = next(found, "")
                 expect(judge, f"describe/{name_}", served.exchange).that(not problem, expected, problem)
 
 
@@ -161,9 +160,9 @@ def test_profile(soap: SoapServices, judge: Judge, effort: Effort) -> None:
                 expect(judge, f"describe/wsdl-{rule}", served.exchange).that(not problem, expected, problem)
 
 
-def _guarded(check: Callable[[Description], Iterator[str]], description: Description) -> Iterator[str]:
+def _guarded(check: Callable[[Wsdl], Iterator[str]], description: Wsdl) -> Iterator[str]:
     """Yield the violations that a check finds; a description too broken for the check is a violation as well."""
     try:
         yield from check(description)
-    except DescriptionError as error:
+    except WsdlError as error:
         yield str(error)

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from conformance.documents.multipart import parts_of
-from conformance.documents.soap_services import ENVELOPE_12
 from conformance.documents.traceback import inside_shown
+from conformance.documents.wsdl import ENVELOPE_12
 from conformance.documents.wsdl_pack import services_of
 from conformance.documents.xml import elements, text_of
 from conformance.documents.xml_names import local

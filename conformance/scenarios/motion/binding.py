@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import INVALID, validity
 from conformance.documents.json_text import read_json
-from conformance.documents.soap_services import SoapOperation, SoapPort
+from conformance.documents.wsdl import SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import each, label_of
 from conformance.documents.xml import NotXmlError, elements, parse
 from conformance.documents.xml_names import local

@@ -124,7 +124,7 @@ def exchanges(contract: Contract) -> tuple[Exchange, ...]:
     return tuple(found)
 
 
-def _services(contract: Contract) -> Iterator[tuple[Interface, wsdl.Description]]:
+def _services(contract: Contract) -> Iterator[tuple[Interface, wsdl.Wsdl]]:
     for interface, path in (
         (Interface.PUBLISHERS, contract.publishers_path),
         (Interface.SUBSCRIBERS, contract.subscribers_path),
@@ -217,7 +217,7 @@ def _walk(schema: Schema, steps: tuple[str, ...]) -> Iterator[tuple[tuple[str, .
         yield from _walk(items, (*steps, ITEM))
 
 
-def _of_wsdl(description: wsdl.Description, by_name: dict[str, Exchange]) -> Iterator[Place]:
+def _of_wsdl(description: wsdl.Wsdl, by_name: dict[str, Exchange]) -> Iterator[Place]:
     for operation in description.operations:
         for part, tag in (("request", operation.request), ("answer", operation.response)):
             declared = description.shape(tag) if tag else None

@@ -6,7 +6,7 @@ import pytest
 from lxml import etree
 
 from conformance.api.soap.messages import ordinary, unknown_in
-from conformance.documents.soap_services import WsdlError, read_services
+from conformance.documents.wsdl import WsdlError, read_services
 from conformance.documents.wsdl_imports import SchemaFolder
 from conformance.documents.xml_names import XSD
 
@@ -298,11 +298,11 @@ def test_header_parts_and_attachments_of_a_binding():
     plain = wsdl.replace('<w:input><s:body use="literal"/></w:input>', f'<w:input><s:body use="literal"/>{header}')
     for more, remark in (("", ""), ('<m:part><m:content part="a" type="image/png"/></m:part>', "attachments")):
         text = plain.replace('<s:body use="literal"/>', packaged.replace("MORE", more), 1)
-        (port,) = read_services(text.encode(), "http://device/a.wsdl", lambda _: b"").ports
-        (operation,) = port.operations
+        found = read_services(text.encode(), "http://device/a.wsdl", lambda _: b"")
+        (operation,) = found.ports[0].operations
         assert (operation.request, operation.headers) == ("{urn:t}Get", ("{urn:t}Head",))
-        assert remark in operation.remark
-        assert bool(operation.remark) is bool(remark)
+        assert remark in found.remark(operation)
+        assert bool(found.remark(operation)) is bool(remark)
 
 
 def _nested(kind: str, inner: str) -> str:
@@ -485,10 +485,11 @@ def test_what_real_services_have_is_compiled(content: str) -> None:
 def test_an_operation_whose_smallest_request_is_too_large_is_not_called(content: str, remark: str) -> None:
     content = content.replace("Got", "Put").replace("Get", "Got").replace("Put", "Get")
 
-    (port,) = _read(_schema("urn:t", content)).ports
+    found = _read(_schema("urn:t", content))
 
-    assert port.operations[0].remark.startswith(remark)
-    assert bool(port.operations[0].remark) is bool(remark)
+    said = found.remark(found.ports[0].operations[0])
+    assert said.startswith(remark)
+    assert bool(said) is bool(remark)
 
 
 def test_a_service_of_many_operations_is_read_in_linear_time() -> None:

@@ -7,7 +7,7 @@ from body import Body
 from lxml import etree
 from soap_devices import PASSWORD, SOAP_12, USER, Device, abstract, messages, operation, wsdl
 
-from conformance.documents.soap_services import read_services
+from conformance.documents.wsdl import read_services
 from conformance.scenarios.described_messages import DescribedMessages
 from conformance.transport.username_token import UsernameToken
 

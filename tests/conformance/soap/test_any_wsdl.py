@@ -13,7 +13,7 @@ from soap_devices import PASSWORD, SOAP_11, USER, camera, scale, serving, table
 
 from conformance.api.call_rules import CallRules
 from conformance.contract.pack import Contract
-from conformance.documents.soap_services import WsdlError, read_services
+from conformance.documents.wsdl import WsdlError, read_services
 from conformance.documents.wsdl_pack import write_soap_pack
 from conformance.rules.soap import test_soap
 from conformance.scenarios.rule import Rule

@@ -10,7 +10,7 @@ from conformance.api.soap.envelope import envelope
 from conformance.api.soap.service import MEDIA_TYPE, SoapService
 from conformance.api.soap.valid_messages import call_valid, require_valid_message
 from conformance.api.soap.xml_style import XmlStyle, serialize
-from conformance.documents.wsdl import Operation
+from conformance.documents.wsdl import SoapOperation
 from conformance.documents.xml import elements
 from conformance.documents.xml_names import clark, local
 from conformance.documents.xml_node import Node
@@ -96,7 +96,7 @@ def position(subscribers: SoapService) -> tuple[float, float] | None:
     return None if x is None or y is None else (x, y)
 
 
-def known_messages(service: SoapService, operation: Operation) -> Iterator[Node]:
+def known_messages(service: SoapService, operation: SoapOperation) -> Iterator[Node]:
     """Yield messages that the robot is likely to accept for an operation; none where the generic suite finds its own.
 
     Raises:

@@ -6,7 +6,7 @@ import pytest
 
 from conformance.api.soap import comparison
 from conformance.api.soap.wsdl_rules import RULES
-from conformance.documents.wsdl import DescriptionError, describe, faults, read_file
+from conformance.documents.wsdl import WsdlError, describe, read_file, unusable
 from conformance.documents.xml_names import clark
 from conformance.papers_robot.files import CONTRACT_DIR
 
@@ -44,7 +44,7 @@ AS_JAX_WS_RI = WSDL.replace(b'schemaLocation="publishers.xsd"', b'schemaLocation
 )
 def test_as_jax_ws_ri_imports_it_and_relative_to_the_wsdl(wsdl, schema):
     robot, asked = layout(wsdl, {schema: XSD})
-    assert (asked, compared(robot), list(faults(robot))) == ([schema], [], [])
+    assert (asked, compared(robot), list(unusable(robot))) == ([schema], [], [])
 
 
 def test_inline():
@@ -79,7 +79,7 @@ def test_split_by_include_and_wsdl_import():
 
 def test_what_is_missing_is_told():
     robot, _ = layout(WSDL, {})
-    assert robot.missing == (("http://robot:5555/publishers.xsd", "not there"),)
+    assert robot.documents.missing == {"http://robot:5555/publishers.xsd": "not there"}
     assert compared(robot)
 
 
@@ -89,12 +89,12 @@ def test_endless_references_end():
         include = f'<xs:include schemaLocation="a?n={number + 1}"/>'
         return f'<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema">{include}</xs:schema>'.encode()
 
-    assert "more than" in describe(WSDL, BASE, fetch).missing[0][1]
+    assert "more than" in next(iter(describe(WSDL, BASE, fetch).documents.missing.values()))
 
 
 @pytest.mark.parametrize("document", [b"", b"<a/>", b"<html>", b"\x00"])
 def test_what_is_no_wsdl(document):
-    with pytest.raises(DescriptionError):
+    with pytest.raises(WsdlError):
         describe(document, BASE, lambda _: b"")
 
 
