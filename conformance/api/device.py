@@ -8,6 +8,7 @@ from conformance.contract.pack import Contract
 from conformance.documents.wsdl import SoapOperation
 from conformance.documents.xml_node import Node
 from conformance.transport.exchange import Listener
+from conformance.verdict.case import Checker
 from conformance.verdict.run import Run
 
 # A RestInterface, a SoapService and a Question: their modules import this one.
@@ -75,7 +76,11 @@ class Device:
         return ()
 
     def observers(self, api: Rest) -> Iterable[Listener]:  # noqa: ARG002 - for packs
-        """Return listeners that judge every exchange of the run."""
+        """Return what listens to every exchange of the run."""
+        return ()
+
+    def checkers(self, api: Rest | None, services: Iterable[Soap]) -> Iterable[Checker]:  # noqa: ARG002 - for packs
+        """Return what judges every exchange of the run by the pack's contract."""
         return ()
 
     def halt(self, api: Rest) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from conformance.api.device import device_of
 from conformance.api.rest.habits import Habits
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.address import split
@@ -121,9 +122,11 @@ def _listeners(robot: RobotUnderTest, target: Mapping[str, Any], traces: Recordi
     """Yield what judges the exchanges of a run, whichever check sent them."""
     run, services = robot.run, list(_services(robot, target))
     checkers: list[Checker] = []
-    if rest := target.get("rest"):
-        api = RestInterface(run, HttpClient(str(rest), Connection()))
-        yield from api.device.observers(api)
+    rest = target.get("rest")
+    api = RestInterface(run, HttpClient(str(rest), Connection())) if rest else None
+    device = api.device if api is not None else device_of(run)
+    yield Observers(run.judge, device.checkers(api, services), by_rule=False)
+    if api is not None:
         checkers.append(_crashes(api, traces))
         checkers.append(RestCheckers(run.contract, api.client.base_url, [one.endpoint for one in services]))
     if services:

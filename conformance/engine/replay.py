@@ -292,8 +292,6 @@ def _observed_to_fail(contract: Contract, base_url: str, requirement: str, excha
     run = Run(empty_statement(contract), contract)
     with closing(HttpClient(base_url, Connection())) as client:
         api = RestInterface(run, client)
-        checked = Observers(run.judge, [RestCheckers(contract, base_url)])
-        for observer in (checked, *api.device.observers(api)):
-            observer.answered(exchange)
+        Observers(run.judge, [RestCheckers(contract, base_url), *api.device.checkers(api, ())]).answered(exchange)
     evidence = run.judge.of(requirement)
     return bool(evidence and evidence.failures)

@@ -8,6 +8,7 @@ from typing import Final
 
 import pytest
 
+from conformance.api.device import device_of
 from conformance.api.interfaces import Interfaces
 from conformance.api.rest.habits import Habits
 from conformance.api.rest.kept_exchanges import KeptExchanges
@@ -49,12 +50,13 @@ def _watched(
     """
     services = interfaces.soap.there.values()
     api = interfaces.rest
+    device = api.device if api is not None else device_of(run)
     checkers: list[Checker] = []
-    listeners: list[Listener] = []
+    listeners: list[Listener] = [Observers(run.judge, device.checkers(api, services), by_rule=False)]
     if api is not None:
         elsewhere = [service.endpoint for service in services]
         checkers += [Habits(api), RestCheckers(run.contract, api.client.base_url, elsewhere)]
-        listeners += api.device.observers(api)
+        listeners += device.observers(api)
         listeners += [one for one in (other_exchanges, kept_exchanges) if one is not None]
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
         answers = {service.endpoint: answers_of(*_descriptions(service)) for service in services}

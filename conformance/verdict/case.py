@@ -32,5 +32,17 @@ class Case:
     requirement: str = ""
 
 
+def case(
+    requirement: str,
+    holds: bool,  # noqa: FBT001 - reads as a sentence: case(id, answer.status == 200, ...)
+    exchange: Attempt | None,
+    expected: str,
+    found: str = "",
+    cause: str = "",
+) -> Case:
+    """Return a case of a requirement; the arguments are as in Case."""
+    return Case(holds, exchange, expected, found, cause, requirement=requirement)
+
+
 #: Judges the exchanges of a run one after another, in the order in which they ended.
 Checker = Callable[[Attempt], Iterator[Case]]

@@ -1,6 +1,7 @@
 """Judge every exchange of a run by checkers, whichever check sent it."""
 
 from collections.abc import Iterable
+from contextlib import nullcontext
 from typing import Final
 
 from conformance.transport.exchange import Attempt, Exchange, Listener, Unanswered
@@ -16,10 +17,11 @@ class Observers(Listener):
     Args:
         judge: records their cases.
         checkers: the checkers.
+        by_rule: whether a server error that they judge is a broken rule of its own (see Judge.by_rule).
     """
 
-    def __init__(self, judge: Judge, checkers: Iterable[Checker]) -> None:
-        self._judge = judge
+    def __init__(self, judge: Judge, checkers: Iterable[Checker], *, by_rule: bool = True) -> None:
+        self._judge, self._by_rule = judge, by_rule
         self._checkers = tuple(checkers)
 
     def answered(self, exchange: Exchange) -> None:
@@ -38,7 +40,7 @@ class Observers(Listener):
 
     def _check(self, attempt: Attempt) -> None:
         """Call each checker; what one cannot judge is no reason not to judge the rest of the run."""
-        with self._judge.by_rule():
+        with self._judge.by_rule() if self._by_rule else nullcontext():
             for checker in self._checkers:
                 try:
                     for case in checker(attempt):

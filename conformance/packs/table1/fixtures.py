@@ -1,23 +1,23 @@
 """pytest fixtures of every run on the paper's robot: its clock, the ROS probe, and the robot itself."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import partial
 
 import pytest
 
 from conformance.api.interfaces import Interfaces
 from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.plugin import Device
-from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliveries
 from conformance.packs.table1.robot.beats import Beats
 from conformance.packs.table1.robot.clock import Clock
+from conformance.packs.table1.robot.deliveries_seen import read_awaited
 from conformance.packs.table1.robot.delivery_sender import DeliverySender
 from conformance.packs.table1.robot.probe import RosProbe
 from conformance.packs.table1.robot.refused_requests import RefusedRequests
 from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.robot.standstill import Standstill
 from conformance.packs.table1.robot.stopping import bring_to_rest
-from conformance.packs.table1.robot.valid_responses import ValidResponses
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.scenarios.stage import Stage
@@ -64,36 +64,36 @@ def standstill(api: RestInterface, _standstills: list[Standstill]) -> Standstill
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _validated(run: Run, interfaces: Interfaces, connection: Connection) -> None:
-    """Judge every successful SOAP response of the run by the XSD, from the first one on."""
+def _described(run: Run, interfaces: Interfaces) -> None:
+    """Fetch the robot's own descriptions, by which every SOAP response of the run is judged."""
     for service in interfaces.soap.there.values():
         if service.name not in run.unreachable:
             _ = service.described
-    connection.listeners.append(ValidResponses(run.judge, interfaces.soap.there.values()))
 
 
 @pytest.fixture(scope="session")
-def _accepted(run: Run, interfaces: Interfaces) -> list[AcceptedDeliveries]:
-    """Return what listens to the deliveries of the run; empty without a REST interface."""
-    device = interfaces.rest.device if interfaces.rest is not None else None
-    if not isinstance(device, Device) or not run.allow_motion:
+def _lists_read(run: Run, interfaces: Interfaces) -> list[Callable[..., None]]:
+    """Return what reads the list of deliveries if some await that; empty without a REST interface."""
+    api = interfaces.rest
+    if api is None or not isinstance(api.device, Device) or not run.allow_motion:
         return []
-    for one in device.accepted:
+    found = [partial(read_awaited, api.client, one) for one in api.device.accepted]
+    for read in found:
         with suppress(NoAnswerError):
-            one.read()  # what is listed before the first delivery is older
-    return device.accepted
+            read()  # what is listed before the first delivery is older
+    return [*found]
 
 
 @pytest.fixture
-def accepted(_accepted: list[AcceptedDeliveries]) -> AcceptedDeliveries:
-    """Return what listens to the deliveries of the run.
+def read_deliveries(_lists_read: list[Callable[..., None]]) -> Callable[..., None]:
+    """Return what reads the list of deliveries until none is awaited there.
 
     Raises:
         NotPossibleError: there is no REST interface to read their list at.
     """
-    if not _accepted:
+    if not _lists_read:
         raise NotPossibleError("there is no REST interface whose list shows the deliveries")
-    return _accepted[0]
+    return partial(_lists_read[0], to_the_last=True)
 
 
 @pytest.fixture
@@ -106,7 +106,7 @@ def refused(api: RestInterface) -> RefusedRequests:
 
 @pytest.fixture(autouse=True)
 def _looked_at(
-    _standstills: list[Standstill], _accepted: list[AcceptedDeliveries], _beats: list[Beats]
+    _standstills: list[Standstill], _lists_read: list[Callable[..., None]], _beats: list[Beats]
 ) -> Iterator[None]:
     """Look after each check whether an earlier attempt moves the robot, for deliveries that it has accepted, and more.
 
@@ -116,14 +116,14 @@ def _looked_at(
     with suppress(NoAnswerError):  # the next check meets that as well
         for standstill in _standstills:
             standstill.look()
-        for accepted in _accepted:
-            accepted.read()
+        for read in _lists_read:
+            read()
         for beats in _beats:
             beats.beat()
 
 
 @pytest.fixture(scope="session")
-def _beats(interfaces: Interfaces, _validated: None) -> list[Beats]:
+def _beats(interfaces: Interfaces, _described: None) -> list[Beats]:
     """Return what reads the robot's state between the checks; empty without a REST interface."""
     api = interfaces.rest
     return [Beats(api, interfaces)] if api is not None and isinstance(api.device, Device) else []

@@ -12,10 +12,11 @@ from conformance.packs.table1.robot.clock import Clock
 from conformance.packs.table1.robot.examples import Examples
 from conformance.packs.table1.statement import Statement, StatementFile, said_of
 from conformance.transport.exchange import Listener
+from conformance.verdict.case import Checker
 
 if TYPE_CHECKING:
-    from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliveries
-    from conformance.packs.table1.robot.interface_observer import InterfaceObserver
+    from conformance.packs.table1.checkers.deliveries import Deliveries
+    from conformance.packs.table1.checkers.interfaces import AcrossInterfaces
     from conformance.packs.table1.robot.refused_requests import RefusedRequests
 
 _TEMPLATE = """
@@ -70,8 +71,8 @@ class Device(device.Device):
     doubts = MappingProxyType({"safety": "to claim it, declare limits and hold time below"})
     fixtures = ("conformance.packs.table1.fixtures",)
     comes_and_goes = frozenset({"GetGoal"})
-    #: Observers to which one reading more may tell whether something is wrong.
-    doubting: "tuple[InterfaceObserver, ...]" = ()
+    #: Checkers to which one reading more may tell whether something is wrong.
+    doubting: "tuple[AcrossInterfaces, ...]" = ()
 
     @property
     def settle_s(self) -> float:
@@ -84,8 +85,8 @@ class Device(device.Device):
         return said_of(self.run).limits.hold_s
 
     @cached_property
-    def accepted(self) -> "list[AcceptedDeliveries]":
-        """What listens to the deliveries of the run; empty without a REST interface."""
+    def accepted(self) -> "list[Deliveries]":
+        """What judges the deliveries of the run; empty without a REST interface."""
         return []
 
     @cached_property
@@ -141,22 +142,34 @@ class Device(device.Device):
         return plan_questions(api)
 
     def observers(self, api: device.Rest) -> Iterable[Listener]:
-        """Return what judges every exchange with the robot's resources."""
-        from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliveries  # noqa: PLC0415 - see the class
-        from conformance.packs.table1.robot.goal_observer import GoalObserver  # noqa: PLC0415 - see the class
-        from conformance.packs.table1.robot.interface_observer import InterfaceObserver  # noqa: PLC0415 - see the class
-        from conformance.packs.table1.robot.list_observer import ListObserver  # noqa: PLC0415 - see the class
-        from conformance.packs.table1.robot.observer import Observer  # noqa: PLC0415 - see the class
-        from conformance.packs.table1.robot.plan_observer import PlanObserver  # noqa: PLC0415 - see the class
+        """Return what keeps the requests that were refused."""
         from conformance.packs.table1.robot.refused_requests import RefusedRequests  # noqa: PLC0415 - see the class
-        from conformance.packs.table1.robot.soap_pose_observer import SoapPoseObserver  # noqa: PLC0415 - see the class
 
-        accepted, refused = AcceptedDeliveries(api), RefusedRequests(api)
-        self.accepted.append(accepted)
-        self.refused.append(refused)
-        self.doubting = (InterfaceObserver(api),)
-        others = (GoalObserver, PlanObserver, ListObserver, SoapPoseObserver)
-        return (Observer(api, self.clock), *(one(api) for one in others), *self.doubting, accepted, refused)
+        self.refused.append(RefusedRequests(api))
+        return self.refused
+
+    def checkers(self, api: device.Rest | None, services: Iterable[device.Soap]) -> Iterable[Checker]:
+        """Return what judges every exchange with the robot's resources and services."""
+        # Imported here: see the class.
+        from conformance.packs.table1.checkers.deliveries import Deliveries  # noqa: PLC0415
+        from conformance.packs.table1.checkers.goals import Goals  # noqa: PLC0415
+        from conformance.packs.table1.checkers.interfaces import AcrossInterfaces  # noqa: PLC0415
+        from conformance.packs.table1.checkers.lists import Lists  # noqa: PLC0415
+        from conformance.packs.table1.checkers.plans import Plans  # noqa: PLC0415
+        from conformance.packs.table1.checkers.soap_poses import SoapPoses  # noqa: PLC0415
+        from conformance.packs.table1.checkers.soap_responses import SoapResponses  # noqa: PLC0415
+        from conformance.packs.table1.checkers.state import State  # noqa: PLC0415
+
+        validity = SoapResponses(services)
+        if api is None:
+            return [validity]
+        url, said = api.client.url, said_of(self.run)
+        self.accepted.append(Deliveries(url, has_probe=said.ros.domain_id is not None))
+        self.doubting = (AcrossInterfaces(url, said.limits),)
+        state = State(url, said.limits, self.clock, api.client.connection.credentials)
+        judges: list[Checker] = [validity, state, Goals(url), Plans(url, said), Lists(url), SoapPoses(url)]
+        judges += [*self.doubting, *self.accepted]
+        return judges
 
     def halt(self, api: device.Rest) -> None:
         """Cancel and stop what the robot may be doing, without waiting until it stands still."""

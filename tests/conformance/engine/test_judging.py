@@ -14,10 +14,15 @@ from aiohttp import web
 from processes import ended
 from small_device import certified, described, reading, small_device
 
+from conformance.contract.pack import Contract
+from conformance.engine.judging import judge_stored
+from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.history.reading import read_history
 from conformance.history.writing import HISTORY_NAME, HistoryWriter
+from conformance.statement.statement import empty_statement
 from conformance.transport.exchange import Request, Response
 from conformance.transport.passage import Heard, Passage
+from conformance.verdict.run import Run
 
 _STATE = {"type": "object", "required": ["on"], "properties": {"on": {"type": "boolean"}}}
 # What the rules for every response say of this device.
@@ -154,3 +159,23 @@ def test_a_trace_of_an_earlier_version_is_named_and_the_rest_is_judged(run, tmp_
     done = ended(sys.executable, "-m", "roaas", "judge", tmp_path / "out")
     assert (done.returncode, "fail: http/date-format (" in done.stdout) == (1, True), done.stdout
     assert "the trace of survey: not judged" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "requirement"),
+    [
+        ("/robot/pose/", b"[]", "rest-resources/pose-type"),
+        ("/robot/velocity/", b'{"linear": 1}', "rest-resources/velocity-type"),
+        ("/robot/sensors/", b'[{"name": "l", "topic": "/l", "type": "L"}]', "rest-resources/sensors-named-in-full"),
+    ],
+)
+def test_a_pack_s_own_clauses_are_judged_from_a_history(tmp_path, path, body, requirement):
+    contract = Contract.load()
+    run = Run(empty_statement(contract), contract, claims=tuple(contract.classes))
+    request = Request("GET", f"http://robot{path}", (("Host", "robot"), ("Accept", "*/*")))
+    response = Response(200, (("Content-Type", "application/json"),), body, 1.0, received_s=1.0)
+    _stored(tmp_path, [Passage(request, 1, 1, 1, 1.0, 1.0, 1.0, 10.0, response, heard=Heard.ALWAYS)], started="now")
+    document = {"started": "now", "target": {"rest": "http://robot"}}
+    judged = judge_stored(RobotUnderTest(run), document, tmp_path)
+    part = run.judge.of(requirement)
+    assert (part.failures, run.judge.faults) == (1, {}), judged

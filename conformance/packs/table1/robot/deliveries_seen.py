@@ -5,6 +5,7 @@ from typing import Any, Final, Protocol
 from conformance.api.rest.interface import RestInterface
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.observe.polling import Patience, poll, poll_for
+from conformance.packs.table1.checkers.deliveries import Deliveries
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_trace import Seen
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
@@ -17,6 +18,8 @@ from conformance.transport.client import Connection, HttpClient
 # How long after the last message another is still looked for, s.
 QUIET_S: Final = 0.15
 _STEP_S: Final = 0.02
+# Between two readings of a list in which deliveries are awaited, s.
+_AGAIN_S: Final = 0.1
 
 
 class DeliveryObserver(Protocol):
@@ -151,3 +154,17 @@ def observer_of(api: RestInterface, probe: RosProbe) -> DeliveryObserver:
     if not exchange.response.ok:
         raise NoObserverError(f"{reason}, and the robot has no list of deliveries ({exchange.came})")
     return ListObserver(api.client, api.run.effort.usual_ms / 1000)
+
+
+def read_awaited(rest: HttpClient, deliveries: Deliveries, *, to_the_last: bool = False) -> None:
+    """Read the robot's list if accepted deliveries await that, or until none does.
+
+    Raises:
+        NoAnswerError: no HTTP response came.
+    """
+    until = WALL_CLOCK.now() + ARRIVES_S
+    while deliveries.awaits(WALL_CLOCK.now()) or (to_the_last and deliveries.is_waiting):
+        deliveries.has_list = rest.send("GET", DELIVERIES, headers=ACCEPT_JSON).response.ok
+        if not to_the_last or WALL_CLOCK.now() > until:
+            break
+        WALL_CLOCK.sleep(_AGAIN_S)

@@ -7,13 +7,14 @@ import pytest
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.envelope import envelope
-from conformance.packs.table1.robot.accepted_deliveries import AcceptedDeliveries
+from conformance.packs.table1.checkers.deliveries import Deliveries
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_messages import delivery
 from conformance.packs.table1.robot.robot import DELIVERIES
 from conformance.packs.table1.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
 _BASE = "http://robot:7003"
@@ -25,7 +26,7 @@ class Robot:
 
     def __init__(self, *earlier: Delivery) -> None:
         self.api = RestInterface(Run(statement=Statement()), HttpClient(_BASE, Connection()))
-        self.observer = AcceptedDeliveries(self.api)
+        self.observer = Observers(self.api.run.judge, [Deliveries(self.api.client.url, has_probe=False)])
         self.stamps, self._listed, self._now = count(), [], 100.0
         for one in earlier:
             self.hold(one)

@@ -4,10 +4,11 @@ import pytest
 from toy_messages import goal
 
 from conformance.api.rest.interface import RestInterface
-from conformance.packs.table1.robot.goal_observer import GoalObserver
+from conformance.packs.table1.checkers.goals import Goals
 from conformance.packs.table1.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
 _BASE = "http://robot:7003"
@@ -19,9 +20,13 @@ def api() -> RestInterface:
     return RestInterface(Run(statement=Statement()), HttpClient(_BASE, Connection()))
 
 
+def watching(api: RestInterface) -> Observers:
+    return Observers(api.run.judge, [Goals(api.client.url)])
+
+
 def refuted(api: RestInterface, *rounds: list[dict]) -> set[str]:
     """What is refuted by goals as they are shown, with something put before each of the rounds."""
-    observer = GoalObserver(api)
+    observer = watching(api)
     url = f"{_BASE}/robot/navigation/action/goal/"
     for shown in rounds:
         observer.answered(Exchange(Request("PUT", url, ()), Response(201, (), b"", 1.0)))
@@ -83,7 +88,7 @@ def test_another_goal_may_follow_and_that_before_it_be_put_again(api):
 )
 def test_the_response_to_a_put_has_the_goal_of_its_request(api, shown, wrong):
     sent = Request("PUT", f"{_BASE}/robot/navigation/action/goal/", _JSON, json.dumps(goal("<b>&amp;")).encode())
-    GoalObserver(api).answered(Exchange(sent, Response(202, _JSON, json.dumps(shown).encode(), 1.0)))
+    watching(api).answered(Exchange(sent, Response(202, _JSON, json.dumps(shown).encode(), 1.0)))
     assert api.run.judge.refuted().get("rest-resources/goal-id", 0) == wrong
 
 
@@ -102,5 +107,5 @@ def turned(x: float, frame: str = "map") -> dict:
 def test_the_response_to_a_put_has_the_pose_of_its_request_in_the_same_frame(api, shown, wrong):
     body = {"goal": goal("1", x=0.123456)["goal"]}
     sent = Request("PUT", f"{_BASE}/robot/navigation/action/goal/", _JSON, json.dumps(body).encode())
-    GoalObserver(api).answered(Exchange(sent, Response(202, _JSON, json.dumps(shown).encode(), 1.0)))
+    watching(api).answered(Exchange(sent, Response(202, _JSON, json.dumps(shown).encode(), 1.0)))
     assert api.run.judge.refuted().get("rest-resources/goal-put", 0) == wrong

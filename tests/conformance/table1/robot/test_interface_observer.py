@@ -6,16 +6,15 @@ import math
 import pytest
 from toy_messages import STILL, ZERO, goal, header, odometry, pose
 
-from conformance.api.rest.interface import RestInterface
 from conformance.documents.writing import xml_bytes
+from conformance.packs.table1.checkers.interfaces import AcrossInterfaces
+from conformance.packs.table1.checkers.lists import Lists
+from conformance.packs.table1.checkers.plans import Plans
 from conformance.packs.table1.robot.delivery_messages import NAMESPACE
-from conformance.packs.table1.robot.interface_observer import InterfaceObserver
-from conformance.packs.table1.robot.list_observer import ListObserver
-from conformance.packs.table1.robot.plan_observer import PlanObserver
 from conformance.packs.table1.robot.robot import GOAL_PATH, PLAN, POSE, SENSORS, VELOCITY
 from conformance.packs.table1.statement import Statement
-from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response, Unanswered
+from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
 _BASE = "http://robot"
@@ -58,10 +57,10 @@ _PUT = ("PUT", GOAL_PATH, b"{}", 202, "application/json", b"{}")
 _PUT_VELOCITY = ("PUT", VELOCITY, b"{}", 204, "application/json", b"")
 
 
-def _refuted(kind, reads, apart_s=1.0) -> set[str]:
+def _refuted(checker, reads, apart_s=1.0) -> set[str]:
     """Return what is refuted by exchanges that follow each other."""
     run = Run(statement=Statement())
-    observer = kind(RestInterface(run, HttpClient(_BASE, Connection())))
+    observer = Observers(run.judge, [checker])
     for number, (method, path, sent, status, media_type, body) in enumerate(reads, 1):
         response = Response(status, (("Content-Type", media_type),), body, 1.0, received_s=10 + number * apart_s)
         observer.answered(Exchange(Request(method, _BASE + path, (), sent), response))
@@ -98,7 +97,7 @@ def _speeds(other, value):
 )
 def test_a_good_robot_is_not_blamed(reads):
     apart_s = 0.1 if _PUT_VELOCITY in reads else 1.0
-    assert _refuted(InterfaceObserver, reads, apart_s) == set()
+    assert _refuted(AcrossInterfaces(_BASE.__add__, Statement().limits), reads, apart_s) == set()
 
 
 @pytest.mark.parametrize(
@@ -118,12 +117,12 @@ def test_a_good_robot_is_not_blamed(reads):
 )
 def test_one_that_shows_something_else_twice_is_found(reads, requirement):
     between = [_json(SENSORS, [])] * 3
-    assert _refuted(InterfaceObserver, [*reads, *between, *reads]) == {requirement}
+    assert _refuted(AcrossInterfaces(_BASE.__add__, Statement().limits), [*reads, *between, *reads]) == {requirement}
 
 
 def test_what_has_no_response_may_have_changed_the_goal():
     run = Run(statement=Statement())
-    observer = InterfaceObserver(RestInterface(run, HttpClient(_BASE, Connection())))
+    observer = Observers(run.judge, [AcrossInterfaces(_BASE.__add__, Statement().limits)])
     for number in range(4):
         for method, path, sent, status, media_type, body in (_json(GOAL_PATH, _A), _soap("Goal", None)):
             response = Response(status, (("Content-Type", media_type),), body, 1.0, received_s=number + 1.0)
@@ -157,7 +156,7 @@ def _plan(x, query="x=5&y=0"):
     ],
 )
 def test_a_plan_starts_where_the_robot_stands(reads, found):
-    assert ("rest-resources/plan-start" in _refuted(PlanObserver, reads)) is found
+    assert ("rest-resources/plan-start" in _refuted(Plans(_BASE.__add__, Statement()), reads)) is found
 
 
 _LIDAR = {"name": "lidar", "topic": "/scan", "type": "sensor_msgs/msg/LaserScan"}
@@ -177,4 +176,4 @@ _LIDAR = {"name": "lidar", "topic": "/scan", "type": "sensor_msgs/msg/LaserScan"
     ],
 )
 def test_each_list_that_is_read_has_no_entry_twice_and_full_types(entries, requirement):
-    assert _refuted(ListObserver, [_json(SENSORS, entries)]) == ({requirement} if requirement else set())
+    assert _refuted(Lists(_BASE.__add__), [_json(SENSORS, entries)]) == ({requirement} if requirement else set())

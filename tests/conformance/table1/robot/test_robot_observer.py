@@ -6,13 +6,14 @@ import pytest
 from toy_messages import STILL, ZERO, odometry
 
 from conformance.api.rest.interface import RestInterface
+from conformance.packs.table1.checkers.state import State
 from conformance.packs.table1.limits import DeclaredLimits
 from conformance.packs.table1.robot.clock import Clock
-from conformance.packs.table1.robot.observer import Observer
 from conformance.packs.table1.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.credentials import Credential, Credentials, Kind
 from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
 _BASE = "http://robot:7003/r2d2"
@@ -20,8 +21,14 @@ _BASE = "http://robot:7003/r2d2"
 
 def opened(statement: Statement) -> RestInterface:
     api = RestInterface(Run(statement=statement), HttpClient(_BASE + "/", Connection()))
-    api.client.connection.listeners.append(Observer(api, Clock()))
+    watch(api)
     return api
+
+
+def watch(api: RestInterface) -> None:
+    connection = api.client.connection
+    checker = State(api.client.url, api.run.statement.limits, Clock(), connection.credentials)
+    connection.listeners[:] = [Observers(api.run.judge, [checker])]
 
 
 @pytest.mark.parametrize(("received_s", "refuted"), [(100.001, set()), (100.1, {"rest-resources/pose-stamp"})])
@@ -44,7 +51,7 @@ def see(api, path, value, *, status=200, headers=(("Accept", "*/*"),), method="G
     body = value if isinstance(value, bytes) else json.dumps(value).encode()
     request = Request(method, _BASE + path, (("Host", "robot:7003"), *headers), query=query)
     said = (("Content-Type", "application/json"), *((("Retry-After", after),) if after else ()))
-    exchange = Exchange(request, Response(status, said, body, 0.0))
+    exchange = Exchange(request, Response(status, said, body, 0.0, received_s=time.monotonic()))
     for listener in api.client.connection.listeners:
         listener.answered(exchange)
 
@@ -149,6 +156,7 @@ def test_odd_requests_are_left_to_others(api, odd):
 def test_only_what_has_the_credentials_is_judged(api, kind, name):
     credentials = Credentials((Credential(kind, "a:secret", name),))
     api.client.connection = replace(api.client.connection, credentials=credentials)
+    watch(api)
     see(api, "/robot/pose/", b"", status=401)
     for sent in (credentials.wrong, credentials):
         assert not found(api)
@@ -163,9 +171,9 @@ def test_undeclared_limits_are_not_known():
     assert not found(api)
 
 
-def test_a_limit_declared_as_high_as_one_that_nobody_declared_is_judged(api):
+def test_a_limit_declared_as_high_as_one_that_nobody_declared_is_judged():
     undeclared = Statement().limits
-    api.run.statement = Statement(declared=DeclaredLimits(linear_m_s=undeclared.linear_m_s))
+    api = opened(Statement(declared=DeclaredLimits(linear_m_s=undeclared.linear_m_s)))
     fast = {"linear": ZERO | {"x": 2 * undeclared.linear_m_s}, "angular": ZERO | {"z": 9.0}}
     for second in range(1, 4):
         see(api, "/robot/pose/", odometry(second))

@@ -5,10 +5,10 @@ from typing import Any
 import pytest
 from toy_messages import exchange, odometry
 
+from conformance.packs.table1.checkers.single_readings import BesideOdometry, OneSample, Place
 from conformance.packs.table1.limits import DeclaredLimits, Noise
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.robot import STILL, Velocity
-from conformance.packs.table1.robot.single_readings import BesideOdometry, OneSample, Place
 from conformance.scenarios.rule import record
 from conformance.verdict.evidence import Judge
 from conformance.verdict.run import Run
@@ -155,8 +155,8 @@ def test_a_velocity_that_is_gone_while_the_robot_drives_is_judged():
 )
 def test_one_sample_is_told_in_one_way(told, cases, failures):
     judge: Judge = Run().judge
-    sample = OneSample(judge, DeclaredLimits(tolerance_abs=0.02).resolved())
+    sample = OneSample(DeclaredLimits(tolerance_abs=0.02).resolved())
     for stamp, x in told:
-        sample.odometry((stamp, 0), odometry(x=x), _EXCHANGE)
+        record(judge, _SAMPLE, sample.odometry((stamp, 0), odometry(x=x), _EXCHANGE))
     assert judge.counts([_SAMPLE])[_SAMPLE] == cases
     assert judge.refuted().get(_SAMPLE, 0) == failures

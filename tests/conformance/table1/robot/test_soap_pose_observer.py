@@ -1,15 +1,14 @@
 """Poses over SOAP beside those over REST: one message under one stamp, and stamps that do not run backwards."""
 
 import json
-from types import SimpleNamespace
 
 import pytest
 from toy_messages import STILL, ZERO, odometry
 
 from conformance.documents.writing import xml_bytes
+from conformance.packs.table1.checkers.soap_poses import SoapPoses
 from conformance.packs.table1.robot.delivery_messages import NAMESPACE
 from conformance.packs.table1.robot.robot import POSE
-from conformance.packs.table1.robot.soap_pose_observer import SoapPoseObserver
 from conformance.transport.exchange import Exchange, Request, Response
 
 _FAST = STILL | {"linear": ZERO | {"x": 0.3}}
@@ -21,14 +20,7 @@ _ENVELOPE = (
 
 def found_in(*read):
     """What is found where these odometry messages are read, each over "rest" or "soap", one after another."""
-    found = []
-
-    def check(_, holds, *__, **what):
-        found.extend([] if holds else [what["cause"]])
-
-    judge = SimpleNamespace(check=check)
-    api = SimpleNamespace(run=SimpleNamespace(judge=judge), client=SimpleNamespace(url=lambda path: f"http://r2{path}"))
-    observer = SoapPoseObserver(api)
+    found, checker = [], SoapPoses(lambda path: f"http://r2{path}")
     for number, (over, message) in enumerate(read):
         if over == "rest":
             request, media_type, body = Request("GET", f"http://r2{POSE}"), "application/json", json.dumps(message)
@@ -40,8 +32,8 @@ def found_in(*read):
                 _ENVELOPE.format(NAMESPACE, returned),
             )
         answer = Response(200, (("Content-Type", media_type),), body.encode(), 1.0, received_s=float(number))
-        observer.answered(Exchange(request, answer))
-    return found
+        found += checker(Exchange(request, answer))
+    return [one.cause for one in found if not one.holds]
 
 
 @pytest.mark.parametrize(

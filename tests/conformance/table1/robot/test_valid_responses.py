@@ -4,10 +4,11 @@ import pytest
 
 from conformance.api.soap.service import SoapService
 from conformance.contract.interfaces import Interface
-from conformance.packs.table1.robot.valid_responses import ValidResponses
+from conformance.packs.table1.checkers.soap_responses import SoapResponses
 from conformance.papers_robot.files import CONTRACT_DIR
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
 _URL = "http://robot:5555/turtlesim_subscriber_ws"
@@ -40,5 +41,5 @@ def test_an_invalid_response_is_found_whoever_asked(body, status, refuted):
     vars(service)["described"] = service.contract  # as a check has found it
     run = Run()
     response = Response(status, (("Content-Type", "text/xml"),), body.encode(), 1.0)
-    ValidResponses(run.judge, [service]).answered(Exchange(Request("POST", _URL, (), b"<a/>"), response))
+    Observers(run.judge, [SoapResponses([service])]).answered(Exchange(Request("POST", _URL, (), b"<a/>"), response))
     assert set(run.judge.refuted()) == ({"soap-subscribers/response-valid"} if refuted else set())

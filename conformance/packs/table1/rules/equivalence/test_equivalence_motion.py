@@ -6,10 +6,10 @@ from operator import attrgetter
 from typing import Any
 
 from conformance.documents.json_schema import Shape
+from conformance.packs.table1.checkers.single_readings import BesideOdometry, Place
 from conformance.packs.table1.robot.geometry import pose_of
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST
 from conformance.packs.table1.robot.robot import Odometry, Velocity
-from conformance.packs.table1.robot.single_readings import BesideOdometry, Place
 from conformance.packs.table1.robot.state_over_soap import StateRead, answered
 from conformance.packs.table1.scenarios.interfaces_in_motion import goals_over_soap, interfaces_in_motion
 from conformance.packs.table1.scenarios.trace import Driven

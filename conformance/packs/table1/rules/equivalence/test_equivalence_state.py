@@ -12,6 +12,7 @@ from conformance.api.rest.snapshot import steady
 from conformance.api.soap.service import SoapService
 from conformance.documents.json_schema import Shape
 from conformance.documents.representation import flattened, from_element, projected
+from conformance.packs.table1.checkers.single_readings import BesideOdometry
 from conformance.packs.table1.robot.agreement import Slack, disagreement, entries_of, unstamped
 from conformance.packs.table1.robot.delivery_messages import request
 from conformance.packs.table1.robot.geometry import Pose, pose_of
@@ -20,7 +21,6 @@ from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHA
 from conformance.packs.table1.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.packs.table1.robot.plan import plan_of, query, reachable
 from conformance.packs.table1.robot.robot import POSE, SENSORS, SERVICES, STILL, Robot, Velocity
-from conformance.packs.table1.robot.single_readings import BesideOdometry
 from conformance.packs.table1.robot.soap_services import ask, outgoing, returned
 from conformance.packs.table1.robot.state_over_soap import STATES, answered, compare
 from conformance.scenarios.rule import record

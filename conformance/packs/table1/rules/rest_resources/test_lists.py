@@ -1,4 +1,4 @@
-"""The lists of sensors and of navigation services; their entries are judged by ListObserver, whoever reads them."""
+"""The lists of sensors and of navigation services; their entries are judged by a checker, whoever reads them."""
 
 import pytest
 

@@ -1,11 +1,10 @@
 """Judge every list of a run, whichever check requests it; one over SOAP also by the lists over REST around it."""
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from conformance.api.rest.interface import RestInterface
 from conformance.documents.json_schema import Shape
 from conformance.documents.representation import from_element
 from conformance.packs.table1.robot.agreement import entries_of
@@ -14,7 +13,8 @@ from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHA
 from conformance.packs.table1.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.packs.table1.robot.robot import SENSORS, SERVICES
 from conformance.packs.table1.robot.soap_services import returned
-from conformance.transport.exchange import Exchange, Listener
+from conformance.transport.exchange import Attempt, Exchange
+from conformance.verdict.case import Case, case
 
 #: Path, shapes of the list and of a type named in full, and requirement, by what is in a SOAP response with the list.
 _LISTS: Final[Mapping[bytes, tuple[str, Shape, Shape, str]]] = {
@@ -48,41 +48,42 @@ class _Seen:
         return tuple(self.shape.schema["items"]["properties"])
 
 
-class ListObserver(Listener):
-    """Listens to all exchanges of one run and judges the lists over SOAP.
+class Lists:
+    """Judges the lists in all exchanges of one run.
 
-    One that differs counts where REST shows the same entries before and after it: a robot's graph may change.
+    One over SOAP that differs counts where REST shows the same entries before and after it: a robot's graph may change.
 
     Args:
-        api: the robot's REST interface.
+        url: returns the URL of a path.
     """
 
-    def __init__(self, api: RestInterface) -> None:
-        self._judge = api.run.judge
+    def __init__(self, url: Callable[[str], str]) -> None:
         self._seen = {name: _Seen(*what) for name, what in _LISTS.items()}
-        self._by_url = {api.client.url(seen.path): seen for seen in self._seen.values()}
+        self._by_url = {url(seen.path): seen for seen in self._seen.values()}
 
-    def answered(self, exchange: Exchange) -> None:
+    def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Take one exchange of the run; only those with a list count."""
-        request, response = exchange.request, exchange.response
+        if not isinstance(attempt, Exchange):
+            return
+        request, response = attempt.request, attempt.response
         if request.method == "GET" and request.url in self._by_url and response.media_type == "application/json":
-            self._over_rest(self._by_url[request.url], exchange)
+            yield from self._over_rest(self._by_url[request.url], attempt)
         elif request.method == "POST" and response.ok:
             for name, seen in self._seen.items():
                 if name in response.body:
-                    self._over_soap(seen, exchange)
+                    self._over_soap(seen, attempt)
 
-    def _over_rest(self, seen: _Seen, exchange: Exchange) -> None:
+    def _over_rest(self, seen: _Seen, exchange: Exchange) -> Iterator[Case]:
         value, problem = read_as(exchange.response, seen.shape)
         if problem:
             return
-        self._judge_entries(seen, value, exchange)
+        yield from self._judge_entries(seen, value, exchange)
         listed, (others, seen.others) = entries_of(value, seen.names), (seen.others, [])
         for entries, other in others if listed == seen.listed else ():
             if _sent_s(exchange) < other.response.received_s:
                 continue
             odd = sorted(set(entries) ^ set(listed)) or ["an entry twice"]
-            self._judge.check(
+            yield case(
                 seen.requirement,
                 holds=False,
                 exchange=other,
@@ -92,11 +93,11 @@ class ListObserver(Listener):
             )
         seen.listed, seen.received_s = listed, exchange.response.received_s
 
-    def _judge_entries(self, seen: _Seen, entries: list[Any], exchange: Exchange) -> None:
+    def _judge_entries(self, seen: _Seen, entries: list[Any], exchange: Exchange) -> Iterator[Case]:
         """Judge that no entry of a list is there twice, and that each type is named in full."""
         listed, what = entries_of(entries, seen.names), seen.requirement.rpartition("/")[2]
         twice = next((one for one, two in itertools.pairwise(listed) if one == two), "")
-        self._judge.check(
+        yield case(
             f"rest-resources/{what}-unique",
             not twice,
             exchange,
@@ -105,7 +106,7 @@ class ListObserver(Listener):
             cause="twice",
         )
         short = next((entry["type"] for entry in entries if seen.full.problem(entry["type"])), "")
-        self._judge.check(
+        yield case(
             f"rest-resources/{what}-named-in-full",
             not short,
             exchange,

@@ -5,22 +5,23 @@ A fault in one of fifty responses is found only by reading often, so the reads o
 
 import math
 from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from http import HTTPStatus
 from statistics import median
 from typing import Any, Final
 
-from conformance.api.rest.interface import RestInterface
 from conformance.documents.json_schema import Shape
-from conformance.observe.clock import WALL_CLOCK
+from conformance.packs.table1.checkers.single_readings import BesideOdometry, OneSample
+from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.clock import Clock
 from conformance.packs.table1.robot.geometry import length_of
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST, VECTOR3, read_as
 from conformance.packs.table1.robot.robot import FARTHEST, LINEAR, POSE, VELOCITY, Velocity
-from conformance.packs.table1.robot.single_readings import BesideOdometry, OneSample
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S, SEVERAL
-from conformance.packs.table1.statement import said_of
-from conformance.scenarios.rule import record
-from conformance.transport.exchange import Exchange, Listener
+from conformance.transport.credentials import Credentials
+from conformance.transport.exchange import Attempt, Exchange
+from conformance.verdict.case import Case, case
 
 _READINGS: Final[dict[str, tuple[str, Shape, str]]] = {
     POSE: ("rest-resources/pose-type", ODOMETRY, "status 200 with a complete nav_msgs/Odometry"),
@@ -42,9 +43,8 @@ class _Samples:
         self._stamp: tuple[int, int] | None = None
         self._begun = -math.inf
 
-    def add(self, twist: Any, stamp: tuple[int, int] | None) -> None:
-        """Add a velocity; ``stamp`` is that of the odometry read last by any resource."""
-        now = WALL_CLOCK.now()
+    def add(self, twist: Any, stamp: tuple[int, int] | None, now: float) -> None:
+        """Add a velocity at a time, s; ``stamp`` is that of the odometry read last by any resource."""
         if self._newest and stamp == self._stamp and now - self._begun < LONGEST_SAMPLE_S:
             self._newest[-1] = twist
             return
@@ -58,13 +58,19 @@ class _Samples:
         return max(abs(median(float(twist[part][axis]) for twist in self._newest)) for axis in "xyz")
 
 
-class Observer(Listener):
-    """Listens to all exchanges of one run and judges the plain GETs."""
+class State:
+    """Judges the plain GETs of the state in all exchanges of one run.
 
-    def __init__(self, api: RestInterface, clock: Clock) -> None:
-        self._api = api
-        self._clock = clock
-        self._readings = {api.client.url(path): (path, *reading) for path, reading in _READINGS.items()}
+    Args:
+        url: returns the URL of a path.
+        limits: the robot's limits.
+        clock: takes the odometry's stamps.
+        credentials: of the client.
+    """
+
+    def __init__(self, url: Callable[[str], str], limits: Limits, clock: Clock, credentials: Credentials) -> None:
+        self._limits, self._clock, self._credentials = limits, clock, credentials
+        self._readings = {url(path): (path, *reading) for path, reading in _READINGS.items()}
         self._last_stamp: tuple[int, int] | None = None
         self._last_received = 0.0
         # When the odometry had a stamp that it had not before, and what told a velocity although there was no odometry.
@@ -72,82 +78,82 @@ class Observer(Listener):
         self._none: bool = False
         self._velocity_of_none: Exchange | None = None
         # Single readings, one after another.
-        self._sample = OneSample(api.run.judge, said_of(api.run).limits)
-        self._beside = BesideOdometry[Velocity](said_of(api.run).limits)
+        self._sample = OneSample(limits)
+        self._beside = BesideOdometry[Velocity](limits)
         self._read_until = 0.0
         self._fast = {path: _Samples() for path in _READINGS}
 
-    def answered(self, exchange: Exchange) -> None:
+    def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Judge one exchange if it is a plain GET of the robot's state."""
-        reading = self._readings.get(exchange.request.url)
-        if reading is None or exchange.request.method != "GET" or not self._plain(exchange):
+        reading = self._readings.get(attempt.request.url)
+        if reading is None or not isinstance(attempt, Exchange) or not self._plain(attempt):
             return
-        response = exchange.response
+        exchange, response = attempt, attempt.response
         if response.status == HTTPStatus.TOO_MANY_REQUESTS:
             return
         path, id_, shape, expected = reading
-        judge = self._api.run.judge
         if response.status == HTTPStatus.SERVICE_UNAVAILABLE:
-            self._unavailable(path, exchange)
+            yield from self._unavailable(path, exchange)
             return
         value, problem = read_as(response, shape)
-        if not judge.check(id_, not problem, exchange, expected, found=problem):
+        yield case(id_, not problem, exchange, expected, found=problem)
+        if problem:
             return
-        self._single(path, value, exchange)
+        yield from self._single(path, value, exchange)
         if path == POSE:
             self._none = False
-            self._odometry(value, exchange, response.elapsed_ms)
+            yield from self._odometry(value, exchange)
             value = value["twist"]["twist"]
             self._velocity_of_none = None
         else:
             self._velocity_of_none = exchange if self._none else None
             value = {"linear": value} if path == LINEAR else value
-        self._limits(self._fast[path], value, exchange)
+        yield from self._within_limits(self._fast[path], value, exchange)
 
-    def _single(self, path: str, value: Any, exchange: Exchange) -> None:
+    def _single(self, path: str, value: Any, exchange: Exchange) -> Iterator[Case]:
         """Compare single readings that came one after another; skip those read by several clients at once."""
-        judge, limits = self._api.run.judge, said_of(self._api.run).limits
-        received = _received_s(exchange)
+        received = exchange.response.received_s
         if received - exchange.response.elapsed_ms / 1000 < self._read_until:
-            self._sample, self._beside = OneSample(judge, limits), BesideOdometry(limits, self._beside.out)
+            self._sample, self._beside = OneSample(self._limits), BesideOdometry(self._limits, self._beside.out)
         self._read_until = max(self._read_until, received)
         if path == POSE:
             stamp = value["header"]["stamp"]["sec"], value["header"]["stamp"]["nanosec"]
-            self._sample.odometry(stamp, value, exchange)
+            yield from self._sample.odometry(stamp, value, exchange)
             velocity = Velocity.of(value["twist"]["twist"])
-            outcomes = self._beside.odometry(stamp[0] + stamp[1] / 1e9, velocity, received)
-            record(judge, "rest-resources/velocity-odometry", outcomes)
+            for one in self._beside.odometry(stamp[0] + stamp[1] / 1e9, velocity, received):
+                yield replace(one, requirement="rest-resources/velocity-odometry")
         elif path == VELOCITY:
             self._beside.reading(Velocity.of(value), exchange, received)
 
-    def _unavailable(self, path: str, exchange: Exchange) -> None:
+    def _unavailable(self, path: str, exchange: Exchange) -> Iterator[Case]:
         """Judge a 503: it must have Retry-After, and the velocity must be 503 as well."""
-        judge = self._api.run.judge
         name = "pose-unavailable" if path == POSE else "pose-fresh"
         after = bool(exchange.response.header("retry-after"))
-        judge.check(f"rest-resources/{name}", after, exchange, "Retry-After with 503")
+        yield case(f"rest-resources/{name}", after, exchange, "Retry-After with 503")
         if path == POSE:
             # Not at once: the velocity may have been asked for just before the odometry came, or was too old.
             if self._none and self._velocity_of_none is not None:
                 earlier = self._velocity_of_none
                 expected = "503 for the velocity while the pose is 503"
-                judge.check("rest-resources/pose-fresh", holds=False, exchange=earlier, expected=expected)
+                yield case("rest-resources/pose-fresh", holds=False, exchange=earlier, expected=expected)
             self._none, self._velocity_of_none = True, None
 
     def _plain(self, exchange: Exchange) -> bool:
         """Return whether a request has only usual headers, so that the robot must answer 200."""
         # A check may send other credentials than the client's own, or none, to see them refused.
-        credentials = self._api.client.connection.credentials
-        request, own = exchange.request, credentials.fields(shown=True)
-        if not set(own) <= set(request.headers) or request.query != credentials.target("", shown=True):
+        request, own = exchange.request, self._credentials.fields(shown=True)
+        if (
+            request.method != "GET"
+            or not set(own) <= set(request.headers)
+            or request.query != self._credentials.target("", shown=True)
+        ):
             return False
         fields = {name.lower(): value for name, value in request.headers if (name, value) not in own}
         return fields.keys() <= _PLAIN_FIELDS and fields.get("accept", "") in _PLAIN_ACCEPT and not request.raw
 
-    def _odometry(self, odometry: Any, exchange: Exchange, elapsed_ms: float) -> None:
-        judge = self._api.run.judge
+    def _odometry(self, odometry: Any, exchange: Exchange) -> Iterator[Case]:
         length = length_of(odometry["pose"]["pose"]["orientation"])
-        judge.check(
+        yield case(
             "rest-resources/pose-quaternion",
             abs(length - 1) <= _UNIT,
             exchange,
@@ -155,12 +161,12 @@ class Observer(Listener):
             found=f"an orientation of length {length:.6g}",
         )
         # Of several clients' answers one is told after another, when all have come.
-        now = _received_s(exchange)
+        now, elapsed_ms = exchange.response.received_s, exchange.response.elapsed_ms
         sent = now - elapsed_ms / 1000
         stamp = (int(odometry["header"]["stamp"]["sec"]), int(odometry["header"]["stamp"]["nanosec"]))
         # Two answers that crossed on their way say nothing of order.
         if self._last_stamp is not None and sent >= self._last_received:
-            judge.check(
+            yield case(
                 "rest-resources/pose-stamp",
                 stamp >= self._last_stamp,
                 exchange,
@@ -171,7 +177,7 @@ class Observer(Listener):
         if stamp != self._last_stamp:
             self._fresh_at = now
         elif sent > self._fresh_at + _OLD_S:
-            judge.check(
+            yield case(
                 "rest-resources/pose-fresh",
                 holds=False,
                 exchange=exchange,
@@ -184,10 +190,10 @@ class Observer(Listener):
         self._last_stamp = max(stamp, self._last_stamp) if self._last_stamp else stamp
         self._last_received = max(self._last_received, now)
 
-    def _limits(self, samples: _Samples, twist: Any, exchange: Exchange) -> None:
+    def _within_limits(self, samples: _Samples, twist: Any, exchange: Exchange) -> Iterator[Case]:
         """Judge that the measured speed is within the declared limits, also while the robot pursues a goal."""
-        limits = said_of(self._api.run).limits
-        samples.add(twist, self._last_stamp)
+        limits = self._limits
+        samples.add(twist, self._last_stamp, exchange.response.received_s)
         linear, angular = limits.tolerance_linear_m_s, limits.tolerance_angular_rad_s
         for part, limit, absolute, noise in (
             ("linear", limits.navigation_m_s, linear, limits.noise.linear_m_s),
@@ -198,15 +204,10 @@ class Observer(Listener):
                 continue
             fastest = samples.fastest(part)
             room = absolute + FARTHEST * noise / math.sqrt(SEVERAL)
-            self._api.run.judge.check(
+            yield case(
                 "safety/limits-hold",
                 fastest <= limit * (1 + limits.tolerance) + room,
                 exchange,
                 f"a measured {part} speed within the limit of {limit:g}",
                 found=f"a {part} speed of {fastest:.4g}",
             )
-
-
-def _received_s(exchange: Exchange) -> float:
-    """Return when a response arrived, s of the monotonic clock."""
-    return exchange.response.received_s or WALL_CLOCK.now()

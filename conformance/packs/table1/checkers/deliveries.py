@@ -6,13 +6,12 @@ whichever check has sent them.
 
 import json
 import math
-import time
 from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 from urllib.parse import unquote
 
-from conformance.api.rest.interface import RestInterface
 from conformance.documents.openapi import is_json
 from conformance.documents.representation import UnreadableError, flattened, read
 from conformance.documents.xml import NotXmlError, elements, parse, text_of
@@ -21,15 +20,14 @@ from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_messages import NAMESPACE
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
 from conformance.packs.table1.robot.probe import ARRIVES_S
-from conformance.packs.table1.robot.robot import ACCEPT_JSON, DELIVERIES
-from conformance.packs.table1.statement import said_of
+from conformance.packs.table1.robot.robot import DELIVERIES
 from conformance.papers_robot.delivery import COFFEE, COORDINATES, MESSAGE_FIELDS, PATH_NAMES
-from conformance.transport.exchange import Exchange, Listener, Request, Response
+from conformance.transport.exchange import Attempt, Exchange, Request, Response
+from conformance.verdict.case import Case, case
 
 # So many deliveries may wait to be looked for, and the oldest of them for so long, s.
 _MANY: Final = 10
 _WAITS_S: Final = 1.0
-_STEP_S: Final = 0.1
 # What the list holds at least.
 _HELD: Final = 50
 # So many lists are remembered: several clients may read it at once.
@@ -57,55 +55,54 @@ class _Accepted:
         return now_s - self.exchange.response.received_s
 
 
-class AcceptedDeliveries(Listener):
-    """Listens to all exchanges of one run, keeps the accepted deliveries, and looks for them in each list that is read.
+class Deliveries:
+    """Keeps the accepted deliveries of one run, and looks for them in each list that is read.
 
     Args:
-        api: the robot's REST interface.
+        url: returns the URL of a path.
+        has_probe: whether the robot's own topic is watched, which alone shows what was published.
+
+    Attributes:
+        has_list: whether the robot has a list, as far as it was read.
     """
 
-    def __init__(self, api: RestInterface) -> None:
-        self._api = api
-        self._url = api.client.url(DELIVERIES)
+    def __init__(self, url: Callable[[str], str], *, has_probe: bool) -> None:
+        self._url, self._has_probe = url(DELIVERIES), has_probe
         self._waiting: list[_Accepted] = []
         # Entries of the list that was read last, with how often each is there; None: none was read.
         self._before: Counter[str] | None = None
         # New entries that no accepted delivery has been found for, yet: its response may come after the list.
         self._new: Counter[tuple[Delivery, str]] = Counter()
-        self._has_list = True
+        self.has_list = True
         # The lists that were read last, with the time of the response, s: what a later one shows has to have these.
         self._lists: list[tuple[float, list[str]]] = []
 
-    def answered(self, exchange: Exchange) -> None:
+    def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Take one exchange of the run: a delivery, or the list of them."""
-        request = exchange.request
-        if request.method == "GET" and request.url == self._url:
-            self._look(exchange)
+        if not isinstance(attempt, Exchange):
             return
-        if not exchange.response.ok or not self._has_list:
+        exchange, request = attempt, attempt.request
+        if request.method == "GET" and request.url == self._url:
+            yield from self._look(exchange)
+            return
+        if not exchange.response.ok or not self.has_list:
             return
         values = self._of_path(request) or _of_message(request)
         if values is not None:
             self._waiting.append(_Accepted(values, "rest" if request.method == "PUT" else "soap", exchange))
 
-    def read(self, *, to_the_last: bool = False) -> None:
-        """Read the list if many deliveries wait to be looked for, or one for long; or until none does.
-
-        Raises:
-            NoAnswerError: no HTTP response came.
-        """
-        until = time.monotonic() + ARRIVES_S
-        while self._has_list and (self._is_due or (to_the_last and self._waiting)):
-            self._has_list = self._api.client.send("GET", DELIVERIES, headers=ACCEPT_JSON).response.ok
-            if not to_the_last or time.monotonic() > until:
-                break
-            time.sleep(_STEP_S)
-
-    @property
-    def _is_due(self) -> bool:
+    def awaits(self, now_s: float) -> bool:
+        """Return whether many deliveries wait to be looked for, or one for long, so that the list should be read."""
+        if not self.has_list:
+            return False
         if self._before is None or len(self._waiting) >= _MANY:
             return True
-        return bool(self._waiting) and self._waiting[0].age_s(time.monotonic()) > _WAITS_S
+        return self.is_waiting and self._waiting[0].age_s(now_s) > _WAITS_S
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a delivery waits to be looked for in a list."""
+        return self.has_list and bool(self._waiting)
 
     def _of_path(self, request: Request) -> Delivery | None:
         """Return the values of a delivery PUT; None for any other request."""
@@ -114,7 +111,7 @@ class AcceptedDeliveries(Listener):
         code, *rest = map(unquote, request.url.removeprefix(self._url).split("/"))
         return _delivery(code, rest[1::2]) if tuple(rest[::2]) == PATH_NAMES else None
 
-    def _look(self, exchange: Exchange) -> None:
+    def _look(self, exchange: Exchange) -> Iterator[Case]:
         """Judge a list in any format by the one before, and by JSON the deliveries that were accepted before it."""
         value = _listed(exchange.response)
         if value is None:
@@ -123,7 +120,7 @@ class AcceptedDeliveries(Listener):
             json.dumps([entry["request"], entry["accepted"], entry["interface"]], sort_keys=True) for entry in value
         ]
         is_default = is_json(exchange.response.media_type)
-        self._judge_kept(exchange, shown, "rest-delivery/list" if is_default else "rest-formats/same-values")
+        yield self._judge_kept(exchange, shown, "rest-delivery/list" if is_default else "rest-formats/same-values")
         if not is_default:
             return
         entries = Counter(shown)
@@ -144,13 +141,13 @@ class AcceptedDeliveries(Listener):
             later = zip(waiting[number + 1 :], found[number + 1 :], strict=True)
             overtaken = any(listed for other, listed in later if other.interface == one.interface)
             if found[number]:
-                self._judge(one, there=True)
+                yield from self._judge(one, there=True)
             elif whole and one.age_s(asked_s) < (_WAITS_S if overtaken else ARRIVES_S):
                 self._waiting.append(one)
             elif whole:
-                self._judge(one, there=False)
+                yield from self._judge(one, there=False)
 
-    def _judge_kept(self, exchange: Exchange, entries: list[str], requirement: str) -> None:
+    def _judge_kept(self, exchange: Exchange, entries: list[str], requirement: str) -> Case:
         """Judge whether a list has each entry of the one before, unchanged; a full one may lack the oldest."""
         received_s = exchange.response.received_s
         asked_s = received_s - exchange.response.elapsed_ms / 1000
@@ -166,11 +163,9 @@ class AcceptedDeliveries(Listener):
                 kept.pop()
         wrong = [entry for entry, there in zip(before, kept, strict=False) if not there][:1]
         expected, found = "the entries of the list that was read before", "".join(wrong)
-        self._api.run.judge.check(
-            requirement, not wrong, exchange, expected, found=found and f"none with {found}", cause="changed"
-        )
         if not wrong:
             self._lists = [*self._lists[-_LISTS:], (received_s, entries)]
+        return case(requirement, not wrong, exchange, expected, found=found and f"none with {found}", cause="changed")
 
     def _take(self, one: _Accepted, there: Counter[tuple[Delivery, str]]) -> bool:
         """Return whether there is an entry for a delivery that is no other's; it is then this one's."""
@@ -179,12 +174,10 @@ class AcceptedDeliveries(Listener):
         self._new[one.entry] -= 1
         return True
 
-    def _judge(self, one: _Accepted, *, there: bool) -> None:
-        run = self._api.run
-        # Where the robot's own topic is watched, that alone shows what was published.
-        published = () if said_of(run).ros.domain_id is not None else (f"equivalence/delivery-{one.interface}",)
+    def _judge(self, one: _Accepted, *, there: bool) -> Iterator[Case]:
+        published = () if self._has_probe else (f"equivalence/delivery-{one.interface}",)
         for id_ in ("rest-delivery/list-values", *published):
-            run.judge.check(
+            yield case(
                 id_,
                 there,
                 one.exchange,

@@ -5,14 +5,15 @@ the right one in the end, so only the first responses after a change show the fa
 """
 
 from collections import Counter, deque
+from collections.abc import Callable, Iterator
 from typing import Any, Final
 
-from conformance.api.rest.interface import RestInterface
 from conformance.documents.representation import UnreadableError, flattened, projected, read
 from conformance.packs.table1.robot.goal import difference
 from conformance.packs.table1.robot.message_shapes import GOAL, GOAL_POSE, read_as
 from conformance.packs.table1.robot.robot import GOAL_PATH
-from conformance.transport.exchange import Exchange, Listener, Request, Response
+from conformance.transport.exchange import Attempt, Exchange, Request, Response
+from conformance.verdict.case import Case, case
 
 # A value that is the old goal's after so many changes, and after most of those that change it, is so by rule.
 _OFTEN: Final = 3
@@ -26,16 +27,15 @@ _PROGRESS: Final = "status."
 Shown = dict[str, Any]
 
 
-class GoalObserver(Listener):
-    """Listens to all exchanges of one run and judges the goals in them.
+class Goals:
+    """Judges the goals in all exchanges of one run.
 
     Args:
-        api: the robot's REST interface.
+        url: returns the URL of a path.
     """
 
-    def __init__(self, api: RestInterface) -> None:
-        self._judge = api.run.judge
-        self._url = api.client.url(GOAL_PATH)
+    def __init__(self, url: Callable[[str], str]) -> None:
+        self._url = url(GOAL_PATH)
         # What was shown last before something was asked of the goal, and since then.
         self._before: Shown | None = None
         self._since: list[Shown] = []
@@ -46,12 +46,13 @@ class GoalObserver(Listener):
         self._stale: Counter[str] = Counter()
         self._living: set[str] = set()
 
-    def answered(self, exchange: Exchange) -> None:
+    def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Take one exchange of the run; only those about the goal count."""
-        if exchange.request.url != self._url:
+        if not isinstance(attempt, Exchange) or attempt.request.url != self._url:
             return
+        exchange = attempt
         if exchange.request.method == "PUT" and exchange.request.raw is None:
-            self._judge_response(exchange)
+            yield from self._judge_response(exchange)
         if exchange.request.method != "GET":
             self._before = self._since[-1] if self._since else self._before
             self._since = []
@@ -64,7 +65,7 @@ class GoalObserver(Listener):
             return
         shown = flattened(projected(value, GOAL.schema))
         self._newest.append((shown, exchange))
-        self._compare()
+        yield from self._compare()
         if self._before == shown and not self._since:
             return  # a robot may take a while to show another goal
         self._since = [*self._since[-2:], shown]
@@ -74,9 +75,9 @@ class GoalObserver(Listener):
             one, other = self._since[-2:]
             self._living |= {_whole(place) for place, value in one.items() if other.get(place) != value}
         elif self._before is not None and self._first is not None:
-            self._look(self._before, self._since[0], self._since[1], self._first)
+            yield from self._look(self._before, self._since[0], self._since[1], self._first)
 
-    def _judge_response(self, exchange: Exchange) -> None:
+    def _judge_response(self, exchange: Exchange) -> Iterator[Case]:
         """Judge that the response to a PUT has the goal in the request, as far as it has one.
 
         A robot may have transformed the pose to another frame.
@@ -86,7 +87,7 @@ class GoalObserver(Listener):
             return
         id_, other = (one.get("goal_id", {}).get("id") for one in (sent, shown))
         if id_ and other:
-            self._judge.check(
+            yield case(
                 "rest-resources/goal-id",
                 other == id_,
                 exchange,
@@ -98,7 +99,7 @@ class GoalObserver(Listener):
         if target is None or understood is None or target["header"]["frame_id"] != understood["header"]["frame_id"]:
             return
         differs = difference(shown, {"goal": sent["goal"]})
-        self._judge.check(
+        yield case(
             "rest-resources/goal-put",
             not differs,
             exchange,
@@ -107,7 +108,7 @@ class GoalObserver(Listener):
             cause="another pose in the response",
         )
 
-    def _compare(self) -> None:
+    def _compare(self) -> Iterator[Case]:
         """Judge a GET by the GETs before and after it, if those agree and nothing changed the goal in between."""
         if len(self._newest) < _SHOWN:
             return
@@ -116,7 +117,7 @@ class GoalObserver(Listener):
             return
         odd = [place for place, value in first.items() if between.get(place) != value]
         odd = [place for place in odd if not place.startswith(_PROGRESS)]
-        self._judge.check(
+        yield case(
             "rest-resources/goal-get",
             not odd,
             exchange,
@@ -125,7 +126,7 @@ class GoalObserver(Listener):
             cause=f"{odd[0]} now and then" if odd else "",
         )
 
-    def _look(self, before: Shown, first: Shown, later: Shown, exchange: Exchange) -> None:
+    def _look(self, before: Shown, first: Shown, later: Shown, exchange: Exchange) -> Iterator[Case]:
         """Judge the first goal shown after a change: each field is the old goal's or the new one's, not mixed."""
         others = {place for place, value in later.items() if before.get(place) != value}
         stale = {place for place in others if first.get(place) == before.get(place)}
@@ -134,7 +135,7 @@ class GoalObserver(Listener):
         self._stale.update(stale if stale != others else ())
         for place in sorted(stale):
             often = self._stale[place] >= max(_OFTEN, _MOST * self._changed[place])
-            self._judge.check(
+            yield case(
                 "rest-resources/goal-get",
                 not often or _whole(place) in self._living,
                 exchange,

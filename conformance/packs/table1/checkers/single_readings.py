@@ -20,8 +20,7 @@ from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.robot import FARTHEST, Velocity, is_near
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case
-from conformance.verdict.evidence import Judge
+from conformance.verdict.case import Case, case
 
 Stamp = tuple[int, int]
 _SAMPLE: Final = "rest-resources/pose-sample"
@@ -52,17 +51,15 @@ class OneSample:
     returns to exactly the numbers from before. Only such a return fails.
 
     Args:
-        judge: takes the evidence.
         limits: the robot's limits, whose noise may be in each response.
     """
 
-    def __init__(self, judge: Judge, limits: Limits) -> None:
-        self._judge = judge
+    def __init__(self, limits: Limits) -> None:
         self._slack = _ABSOLUTE + FARTHEST * max(msgspec.structs.astuple(limits.noise))
         self._stamp: Stamp | None = None
         self._told: deque[tuple[dict[str, float], Exchange]] = deque(maxlen=_TOLD)
 
-    def odometry(self, stamp: Stamp, message: Any, exchange: Exchange) -> None:
+    def odometry(self, stamp: Stamp, message: Any, exchange: Exchange) -> Iterator[Case]:
         """Judge one reading; readings come in the order of their requests."""
         if stamp != self._stamp:
             self._stamp = stamp
@@ -73,7 +70,7 @@ class OneSample:
         (first, _), (between, odd), (last, _) = self._told
         if first == last:
             problem = _difference(between, first, self._slack)
-            self._judge.check(
+            yield case(
                 _SAMPLE,
                 not problem,
                 odd,

@@ -5,20 +5,20 @@ The allowed step length depends on the request, so that other checks judge it.
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from statistics import median
 from typing import Any, Final
 from urllib.parse import parse_qsl, urlsplit
 
-from conformance.api.rest.interface import RestInterface
 from conformance.documents.representation import UnreadableError, local_name, parse_xml, read
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, read_as
 from conformance.packs.table1.robot.plan import START_OFF, plan_of
 from conformance.packs.table1.robot.robot import FARTHEST, PLAN, POSE
 from conformance.packs.table1.robot.state_over_soap import answered
-from conformance.packs.table1.statement import said_of
-from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener, Response
+from conformance.packs.table1.statement import Statement
+from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange, Response
+from conformance.verdict.case import Case, case
 
 # Shorter than this, m, or than so many of the path's own steps, is no leap.
 _LEAP_M: Final = 1.0
@@ -42,30 +42,30 @@ _STANDS_M: Final = 0.02
 _OFTEN: Final = 2
 
 
-class PlanObserver(Listener):
-    """Listens to all exchanges of one run and judges the plans in them.
+class Plans:
+    """Judges the plans in all exchanges of one run.
 
     Args:
-        api: the robot's REST interface.
+        url: returns the URL of a path.
+        said: the robot's statement.
     """
 
-    def __init__(self, api: RestInterface) -> None:
-        self._judge = api.run.judge
-        self._url = api.client.url(f"{PLAN}?")
-        self._at = api.client.url(POSE)
-        motion = said_of(api.run).motion
+    def __init__(self, url: Callable[[str], str], said: Statement) -> None:
+        self._url, self._at, motion = url(f"{PLAN}?"), url(POSE), said.motion
         self._frame, self._in_map = motion.frame, Pose(*motion.odom_to_map)
-        self._noise_m = FARTHEST * said_of(api.run).limits.noise.position_m
+        self._noise_m = FARTHEST * said.limits.noise.position_m
         # The pose that was read last since anything was asked of the robot; plans from where it is, since then.
         self._here: Exchange | None = None
         self._from_here: list[tuple[Pose, Exchange]] = []
         self._elsewhere = 0
 
-    def answered(self, exchange: Exchange) -> None:
+    def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Judge one exchange if it is a plan."""
-        response = exchange.response
+        if not isinstance(attempt, Exchange):
+            return
+        exchange, response = attempt, attempt.response
         if exchange.request.url == self._at and exchange.request.method == "GET":
-            self._read_pose(exchange)
+            yield from self._read_pose(exchange)
         elif exchange.request.method not in SAFE_METHODS and b":Get" not in exchange.request.body:
             self._here, self._from_here = None, []
         if not response.ok or response.media_type not in _JUDGED:
@@ -82,15 +82,15 @@ class PlanObserver(Listener):
             return  # which others judge
         plan = plan_of(value)
         poses = plan.poses
-        self._judge_end(exchange, asked, poses[-1])
-        self._judge_start(exchange, asked, poses[0])
-        self._judge_frame(exchange, asked.get("frame_id", ""), plan.frames)
+        yield from self._judge_end(exchange, asked, poses[-1])
+        yield from self._judge_start(exchange, asked, poses[0])
+        yield from self._judge_frame(exchange, asked.get("frame_id", ""), plan.frames)
         if not any(name.startswith("start") for name in asked) and asked.get("frame_id", "map") == self._frame:
             self._from_here.append((poses[0], exchange))
         if response.media_type == "application/json":
-            self._judge_leaps(exchange, poses)
+            yield from self._judge_leaps(exchange, poses)
 
-    def _read_pose(self, exchange: Exchange) -> None:
+    def _read_pose(self, exchange: Exchange) -> Iterator[Case]:
         """Judge the plans since the pose that was read before, if the robot stood there and still does."""
         plans, before = self._from_here, self._here
         self._here, self._from_here = exchange, []
@@ -106,7 +106,7 @@ class PlanObserver(Listener):
             off_m = min(start.distance(here), start.distance(after)) - START_OFF - self._noise_m
             # A single reading may be wrong.
             self._elsewhere += off_m > 0
-            self._judge.check(
+            yield case(
                 _JUDGED[asked.response.media_type][1],
                 off_m <= 0 or self._elsewhere < _OFTEN,
                 asked,
@@ -115,13 +115,13 @@ class PlanObserver(Listener):
                 cause="starts where the robot is not",
             )
 
-    def _judge_end(self, exchange: Exchange, asked: Mapping[str, str], end: Pose) -> None:
+    def _judge_end(self, exchange: Exchange, asked: Mapping[str, str], end: Pose) -> Iterator[Case]:
         """Judge that a path ends at the position in the request, where that is clear."""
         there = Pose(_number(asked.get("x", "")), _number(asked.get("y", "")), 0.0)
         tolerance_m = _number(asked.get("tolerance", str(_TOLERANCE_M)))
         if not (abs(there.x) < _FAR_M and abs(there.y) < _FAR_M and tolerance_m >= _NEAR_M):
             return
-        self._judge.check(
+        yield case(
             _JUDGED[exchange.response.media_type][0],
             end.distance(there) <= tolerance_m * 1.05 + _NEAR_M,
             exchange,
@@ -130,12 +130,12 @@ class PlanObserver(Listener):
             cause="ends elsewhere",
         )
 
-    def _judge_start(self, exchange: Exchange, asked: Mapping[str, str], start: Pose) -> None:
+    def _judge_start(self, exchange: Exchange, asked: Mapping[str, str], start: Pose) -> Iterator[Case]:
         """Judge that a path starts at the position in the request, where it has one."""
         given = Pose(_number(asked.get("start_x", "")), _number(asked.get("start_y", "")), 0.0)
         if not (abs(given.x) < _FAR_M and abs(given.y) < _FAR_M):
             return
-        self._judge.check(
+        yield case(
             _JUDGED[exchange.response.media_type][1],
             start.distance(given) <= START_OFF,
             exchange,
@@ -144,14 +144,14 @@ class PlanObserver(Listener):
             cause="starts elsewhere",
         )
 
-    def _judge_frame(self, exchange: Exchange, asked: str, frames: frozenset[str]) -> None:
+    def _judge_frame(self, exchange: Exchange, asked: str, frames: frozenset[str]) -> Iterator[Case]:
         """Judge that a path and its poses are in the frame in the request; all in one, where it names none.
 
         A leading slash is no part of a frame's name (tf2 drops it).
         """
         named = {frame.removeprefix("/") for frame in frames}
         odd = sorted(named - {asked.removeprefix("/")}) if asked else sorted(named)[1:]
-        self._judge.check(
+        yield case(
             _JUDGED[exchange.response.media_type][2],
             not odd,
             exchange,
@@ -160,9 +160,9 @@ class PlanObserver(Listener):
             cause="another frame",
         )
 
-    def _judge_leaps(self, exchange: Exchange, poses: tuple[Pose, ...]) -> None:
+    def _judge_leaps(self, exchange: Exchange, poses: tuple[Pose, ...]) -> Iterator[Case]:
         leap = longest_leap(poses)
-        self._judge.check(
+        yield case(
             "rest-resources/plan-continuous",
             not leap,
             exchange,

@@ -1,20 +1,20 @@
 """Judge the goal and the velocity that are read over SOAP, as XML or by HEAD, by what is read as JSON around them."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from typing import Any, Final
 
-from conformance.api.rest.interface import RestInterface
 from conformance.documents.json_schema import Shape
 from conformance.documents.representation import UnreadableError, read
+from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.goal import difference
 from conformance.packs.table1.robot.message_shapes import GOAL, TWIST
 from conformance.packs.table1.robot.robot import GOAL_PATH, VELOCITY, Velocity, is_near
 from conformance.packs.table1.robot.state_over_soap import answered
-from conformance.packs.table1.statement import said_of
-from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener, Unanswered
+from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange
+from conformance.verdict.case import Case, case
 
 # One interface may be behind the other: once is none too often, and neither is any time so soon after a change, s.
 _OFTEN: Final = 2
@@ -49,36 +49,43 @@ class _State:
     since: list[tuple[Any, Exchange, str]] = field(default_factory=list)
 
 
-class InterfaceObserver(Listener):
-    """Listens to all exchanges of one run, and compares what the interfaces and formats show of one state.
+class AcrossInterfaces:
+    """Compares what the interfaces and formats show of one state, in all exchanges of one run.
 
     Args:
-        api: the robot's REST interface.
+        url: returns the URL of a path.
+        limits: the robot's limits.
 
     Attributes:
         suspects: whether a value was another one for the first time, so that another look will tell.
     """
 
-    def __init__(self, api: RestInterface) -> None:
-        limits = said_of(api.run).limits
-
+    def __init__(self, url: Callable[[str], str], limits: Limits) -> None:
         def faster(one: Any, other: Any) -> str:
             near = is_near(limits, Velocity.of(one), Velocity.of(other), 2)
             return "" if near else f"{Velocity.of(one)} for {Velocity.of(other)}"
 
-        self._judge = api.run.judge
         self._settle_s = limits.settle_s
         velocity = _State("GetVelocity", TWIST, "equivalence/pose", faster)
         goal = _State("GetGoal", GOAL, "equivalence/goal", difference)
         self._states = {velocity.name: velocity, goal.name: goal}
-        self._by_url = {api.client.url(VELOCITY): velocity, api.client.url(GOAL_PATH): goal}
+        self._by_url = {url(VELOCITY): velocity, url(GOAL_PATH): goal}
         self._acted_s = self._received_s = 0.0
         self._others: Counter[tuple[str, str]] = Counter()
-        self.suspects = False
+        self.suspects = self._acted_by_hand = False
 
-    def answered(self, exchange: Exchange) -> None:
+    def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Take one exchange of the run."""
+        if isinstance(attempt, Exchange):
+            yield from self._answered(attempt)
+        elif attempt.request.method not in SAFE_METHODS:  # it may have been carried out
+            self._forget(self._received_s)
+
+    def _answered(self, exchange: Exchange) -> Iterator[Case]:
         request, response = exchange.request, exchange.response
+        if self._acted_by_hand:
+            self._acted_by_hand = False
+            self._forget(response.received_s)
         sent_s = response.received_s - response.elapsed_ms / 1000
         crossed, self._received_s = sent_s < self._received_s, max(self._received_s, response.received_s)
         state = self._by_url.get(request.url)
@@ -97,16 +104,11 @@ class InterfaceObserver(Listener):
         elif request.method == "HEAD" and state is not None and state.shape is GOAL:
             state.since.append((None if response.status == HTTPStatus.NOT_FOUND else _THERE, exchange, _HEAD))
         elif request.method == "GET" and state is not None and len(response.body) < _LARGE:
-            self._read(state, exchange)
+            yield from self._read(state, exchange)
 
-    def by_hand(self, exchange: Exchange) -> None:
-        """Take a request that was written by hand: whatever it did is not known."""
-        self._forget(max(exchange.response.received_s, self._received_s))
-
-    def unanswered(self, request: Unanswered) -> None:
-        """Take a request without a response: it may have been carried out."""
-        if request.request.method not in SAFE_METHODS:
-            self._forget(self._received_s)
+    def forget(self, *, deletes: bool) -> None:  # noqa: ARG002 - see Observers
+        """Forget what was read before a request that was written by hand: what it did is not known."""
+        self._acted_by_hand = True
 
     def _forget(self, at_s: float) -> None:
         """Begin anew, as something may have changed the states."""
@@ -114,7 +116,7 @@ class InterfaceObserver(Listener):
         for state in self._states.values():
             state.before, state.since = _UNREAD, []
 
-    def _read(self, state: _State, exchange: Exchange) -> None:
+    def _read(self, state: _State, exchange: Exchange) -> Iterator[Case]:
         """Take a value over REST."""
         response = exchange.response
         value: Any = None
@@ -135,10 +137,10 @@ class InterfaceObserver(Listener):
             return
         if state.before is not _UNREAD and not _differs(state, state.before, value):
             for other, one, requirement in state.since:
-                self._compare(state, (other, one, requirement), value)
+                yield from self._compare(state, (other, one, requirement), value)
         state.before, state.since = value, []
 
-    def _compare(self, state: _State, read_otherwise: tuple[Any, Exchange, str], value: Any) -> None:
+    def _compare(self, state: _State, read_otherwise: tuple[Any, Exchange, str], value: Any) -> Iterator[Case]:
         """Judge a value that was read over SOAP or as XML between two equal ones."""
         other, exchange, requirement = read_otherwise
         if state.shape is TWIST and exchange.response.received_s < self._acted_s + self._settle_s + _BEHIND_S:
@@ -148,7 +150,7 @@ class InterfaceObserver(Listener):
         self._others[key] += bool(found)
         self.suspects = bool(found) and self._others[key] < _OFTEN
         soon = exchange.response.received_s < self._acted_s + _BEHIND_S and requirement != _HEAD
-        self._judge.check(
+        yield case(
             requirement,
             not found or soon or self._others[key] < _OFTEN,
             exchange,
