@@ -1,4 +1,4 @@
-"""A robot on asyncio, h11, jsonschema and lxml, as elaborate as the contract lets it be.
+"""The robot `plain` on asyncio and h11, writing with lxml and PyYAML, as elaborate as the contract lets it be.
 
 Freedoms that it takes:
 
@@ -13,8 +13,8 @@ Freedoms that it takes:
 - The odometry's frame is moved and turned against the map's; the robot settles slowly, and says so.
 - SOAP: default namespaces, comments and CDATA in answers, faults in place of an empty GetGoalResponse, malformed XML
   answered by a fault; the WSDL imports its schema from ``?xsd=1`` and names actions as JAX-WS RI does.
-- It lists deliveries, answers 422 or 400 as its schema validator sees fit, and describes itself in OpenAPI 3.0
-  and in WADL with nested resources.
+- It lists deliveries, answers 400 where a number in the target is none, and describes itself in OpenAPI 3.0 and in
+  WADL with nested resources.
 """
 
 from collections.abc import Callable
@@ -48,7 +48,7 @@ def serve(
     """
     body = kind(build, yields=True)
     loop = Loop()
-    rest_at = loop.listen(Rest(body).answer, rest_port)
+    rest_at = loop.listen(Rest(body), rest_port)
     soap = Soap(body)
-    soap.base = loop.listen(soap.answer, soap_port)
+    soap.base = loop.listen(soap, soap_port)
     return rest_at, f"{soap.base}/turtlesim_publisher_ws?wsdl", loop.stop

@@ -1,13 +1,15 @@
 """HTTP/1.1 on asyncio's streams, framed by h11."""
 
 import asyncio
-import re
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from email.message import Message
 from email.utils import formatdate
 
 import h11
+
+from conformance.packs.table1.independent_robots.baroque.writing import problem
+from conformance.packs.table1.independent_robots.plain.server import Application, origin_form
 
 _MAX_HEAD = 48 * 1024
 _MAX_BODY = 1024 * 1024
@@ -21,20 +23,9 @@ class Ask:
     """A request."""
 
     method: str
-    path: str
-    query: str
-    fields: dict[str, str]
+    target: str
+    headers: Message
     body: bytes = b""
-
-
-@dataclass
-class Reply:
-    """A response; with None as its body it has neither a length nor a media type."""
-
-    status: int
-    body: bytes | None = None
-    media_type: str = ""
-    fields: list[tuple[str, str]] = field(default_factory=list)
 
 
 class Loop:
@@ -45,11 +36,11 @@ class Loop:
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
 
-    def listen(self, answer: Callable[[Ask], Reply], port: int) -> str:
-        """Serve the function ``answer`` on loopback. Return the URL."""
+    def listen(self, application: Application, port: int) -> str:
+        """Serve an application on loopback. Return its URL."""
 
         async def listen() -> int:
-            server = await asyncio.start_server(lambda r, w: _talk(answer, r, w), "127.0.0.1", port, backlog=128)
+            server = await asyncio.start_server(lambda r, w: _talk(application, r, w), "127.0.0.1", port, backlog=128)
             return int(server.sockets[0].getsockname()[1])
 
         return f"http://127.0.0.1:{asyncio.run_coroutine_threadsafe(listen(), self._loop).result(10)}"
@@ -60,10 +51,10 @@ class Loop:
         self._thread.join(5)
 
 
-async def _talk(answer: Callable[[Ask], Reply], reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+async def _talk(application: Application, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
     connection = h11.Connection(h11.SERVER, max_incomplete_event_size=_MAX_HEAD)
     try:
-        while await _exchange(connection, answer, reader, writer):
+        while await _exchange(connection, application, reader, writer):
             connection.start_next_cycle()
     except (TimeoutError, OSError, h11.LocalProtocolError):
         pass
@@ -72,10 +63,7 @@ async def _talk(answer: Callable[[Ask], Reply], reader: asyncio.StreamReader, wr
 
 
 async def _exchange(
-    connection: h11.Connection,
-    answer: Callable[[Ask], Reply],
-    reader: asyncio.StreamReader,
-    writer: asyncio.StreamWriter,
+    connection: h11.Connection, application: Application, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
 ) -> bool:
     """Read one request and send its response. Return whether the connection can be used for another request."""
     method = "GET"
@@ -84,17 +72,17 @@ async def _exchange(
         if ask is None:
             return False
         method = ask.method
-        reply = answer(ask)
+        reply = application.answer(ask.method, ask.target, ask.headers, ask.body)
     except h11.RemoteProtocolError as error:
         reply = problem(error.error_status_hint, str(error))
-        reply.fields.append(("connection", "close"))
+        reply.fields["connection"] = "close"
     except _TooLargeError as error:
         reply = problem(error.status, str(error))
-        reply.fields.append(("connection", "close"))
-    fields = [("DATE", formatdate(usegmt=True)), ("x-Robot", "baroque"), *reply.fields]
+        reply.fields["connection"] = "close"
+    fields = [("DATE", formatdate(usegmt=True)), ("x-Robot", "baroque"), *reply.fields.items()]
     if reply.media_type:
         fields.append(("CONTENT-type", reply.media_type))
-    if reply.body is None and reply.status not in _NO_BODY:
+    if not reply.body and reply.status not in _NO_BODY:
         fields.append(("content-LENGTH", "0"))
     encode = [(name.encode(), value.encode("latin-1", "replace")) for name, value in fields]
     writer.write(connection.send(h11.Response(status_code=reply.status, headers=encode)) or b"")
@@ -137,35 +125,12 @@ async def _next(connection: h11.Connection, reader: asyncio.StreamReader, writer
 
 
 def _asked(event: h11.Request) -> Ask:
-    fields: dict[str, str] = {}
+    headers = Message()
     for name, value in event.headers:
-        key = name.decode("latin-1").lower()
-        text = value.decode("latin-1")
-        fields[key] = f"{fields[key]}, {text}" if key in fields else text
+        headers.add_header(name.decode("latin-1"), value.decode("latin-1"))
     if len(event.target) > _MAX_TARGET:
         raise _TooLargeError(414, f"a target of {len(event.target)} octets")
-    if fields.get("content-length", "0").isdigit() and int(fields.get("content-length", "0")) > _MAX_BODY:
+    length = str(headers.get("Content-Length", "0"))
+    if length.isdigit() and int(length) > _MAX_BODY:
         raise _TooLargeError(413, f"a body of more than {_MAX_BODY} octets")
-    target = re.sub(r"^https?://[^/?]*", "", event.target.decode("latin-1"), flags=re.IGNORECASE)
-    path, _, query = target.partition("?")
-    return Ask(event.method.decode("latin-1"), path, query, fields)
-
-
-def problem(status: int, detail: str, *, xml: bool = False) -> Reply:
-    """Return an error response with every member that RFC 9457 defines."""
-    # Imported late: writing.py needs this module's types.
-    from conformance.packs.table1.independent_robots.baroque.writing import as_json, as_xml  # noqa: PLC0415
-
-    value = {
-        "type": f"/problems/{status}",
-        "title": "Nothing came of it",
-        "status": status,
-        "detail": detail,
-        "instance": "/robot/troubles/1",
-        "advice": "see the manual",
-    }
-    reply = Reply(status, as_json(value), "application/problem+json; charset=utf-8", [("vary", "accept")])
-    if xml:
-        reply.body = as_xml("problem", value, namespace="urn:ietf:rfc:7807")
-        reply.media_type = "application/problem+xml"
-    return reply
+    return Ask(event.method.decode("latin-1"), origin_form(event.target.decode("latin-1")), headers)

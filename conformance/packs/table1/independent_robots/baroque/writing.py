@@ -6,6 +6,8 @@ from typing import Any
 import yaml
 from lxml import etree
 
+from conformance.packs.table1.independent_robots.plain.server import Answer
+
 _ROOTS = {"Sensors": "sensor_list", "NavigationServices": "services", "Deliveries": "history"}
 
 
@@ -69,3 +71,20 @@ def as_text(value: Any) -> bytes:
     """Return YAML, in flow style where it is short, with the marker that ros2 topic echo prints after each message."""
     text: str = yaml.safe_dump(value, default_flow_style=None, sort_keys=True, width=60, allow_unicode=False)
     return f"{text}---\n".encode()
+
+
+def problem(status: int, detail: str, *, xml: bool = False) -> Answer:
+    """Return an error response with every member that RFC 9457 defines."""
+    value = {
+        "type": f"/problems/{status}",
+        "title": "Nothing came of it",
+        "status": status,
+        "detail": detail,
+        "instance": "/robot/troubles/1",
+        "advice": "see the manual",
+    }
+    if xml:
+        body, media_type = as_xml("problem", value, namespace="urn:ietf:rfc:7807"), "application/problem+xml"
+    else:
+        body, media_type = as_json(value), "application/problem+json; charset=utf-8"
+    return Answer(status, body, media_type, {"vary": "accept"})

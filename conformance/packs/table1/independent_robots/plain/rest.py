@@ -2,23 +2,34 @@
 
 import json
 import re
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
 from email.message import Message
+from types import MappingProxyType
 from typing import Any
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 import yaml
 
-from conformance.packs.table1.independent_robots.body import Body, BusyError, ConflictError, Goal, NoPlanError, stamp
+from conformance.packs.table1.independent_robots.body import (
+    Body,
+    BusyError,
+    ConflictError,
+    Goal,
+    NoPlanError,
+    pose,
+    stamp,
+    yaw_of,
+)
 from conformance.packs.table1.independent_robots.plain import reading
 from conformance.packs.table1.independent_robots.plain.reading import RefusedError
 from conformance.packs.table1.independent_robots.plain.server import Answer
-from conformance.packs.table1.independent_robots.plain.writing import as_json, choose, element, written
+from conformance.packs.table1.independent_robots.plain.writing import FORMATS, as_json, choose, element, written
 from conformance.papers_robot.files import CONTRACT_DIR
 
 _FRAMES = ("map", "odom")
-# The contract's own descriptions: what a vendor who builds contract-first serves.
-
+# So long a goal is accepted before it is executing (action_msgs/GoalStatus), s.
+_NEW_S = 0.05
 SENSORS = [
     {"name": "lidar", "topic": "/scan", "type": "sensor_msgs/msg/LaserScan"},
     {"name": "imu", "topic": "/imu", "type": "sensor_msgs/msg/Imu"},
@@ -41,12 +52,22 @@ DELIVERY = (
 
 
 class Rest:
-    """The REST interface of one body.
+    """The REST interface of one body. What another robot does in its own way, it overrides.
 
     Attributes:
         resources: by path without parameters and by method, a function of headers, body and target that returns the
             response or raises RefusedError.
+        formats: media types of responses, the usual one first.
+        charsets: what formats add to their media type.
+        allow: how the header Allow is written.
+        redirects: whether a path without its trailing slash is redirected.
+        foresees: whether a goal off the map is refused at once.
+        talks: whether each PUT is answered with a body.
     """
+
+    sensors, services, formats = SENSORS, SERVICES, FORMATS
+    charsets: Mapping[str, str] = MappingProxyType({"text/plain": "; charset=utf-8"})
+    allow, redirects, foresees, talks = "Allow", True, True, False
 
     def __init__(self, body: Body) -> None:
         self._body = body
@@ -58,8 +79,8 @@ class Rest:
                 get: self._reads("Vector3", lambda: body.velocity()["linear"]),
                 put: self._put_linear,
             },
-            "/robot/sensors/": {get: self._reads("Sensors", lambda: SENSORS)},
-            "/robot/navigation/services/": {get: self._reads("NavigationServices", lambda: SERVICES)},
+            "/robot/sensors/": {get: self._reads("Sensors", lambda: self.sensors)},
+            "/robot/navigation/services/": {get: self._reads("NavigationServices", lambda: self.services)},
             "/robot/navigation/action/goal/": {get: self._get_goal, put: self._put_goal, delete: self._delete_goal},
             "/robot/navigation/service/plan": {get: self._get_plan},
             "/openapi.json": {get: self._openapi},
@@ -71,9 +92,9 @@ class Rest:
         try:
             answer = self._answer(method, target, headers, body)
         except RefusedError as refused:
-            answer = refusal(refused, headers)
+            answer = self.refuse(refused, headers)
             if refused.status == 405:  # noqa: PLR2004 - RFC 9110 15.5.6
-                answer.fields["Allow"] = ", ".join(self._allowed(target))
+                answer.fields[self.allow] = ", ".join(self._allowed(target))
         return answer
 
     def _methods(self, path: str) -> dict[str, Handler] | None:
@@ -91,19 +112,45 @@ class Rest:
         path, _, query = target.partition("?")
         methods = self._methods(path)
         if methods is None:
-            if path + "/" in self.resources:
+            if self.redirects and path + "/" in self.resources:
                 return Answer(308, fields={"Location": path + "/" + ("?" + query if query else "")})
             raise RefusedError(404, f"there is no {path[:200]!r}")
         if method == "OPTIONS":
-            return Answer(204, fields={"Allow": ", ".join(self._allowed(target))})
+            return self.options(", ".join(self._allowed(target)))
         handler = methods.get("GET" if method == "HEAD" else method)
         if handler is None:
             raise RefusedError(405, f"there is no {method[:40]} here")
+        if method == "PUT" and self.talks:
+            self._format(headers)  # before anything is done
         return handler(headers, body, target)
+
+    def options(self, allowed: str) -> Answer:
+        """Return the response to OPTIONS of a resource with these methods."""
+        return Answer(204, fields={self.allow: allowed})
+
+    def refuse(self, refused: RefusedError, headers: Message) -> Answer:
+        """Return the response to a request that is refused."""
+        return refusal(refused, headers)
+
+    def done(self, _headers: Message, _root: str, _value: Any) -> Answer:
+        """Return the response to a PUT that was carried out, with the value that it has set."""
+        return Answer(204)
+
+    def accepted(self, goal: Goal, headers: Message, *, new: bool) -> Answer:
+        """Return the response to the PUT of a goal."""
+        return self.shown(202, goal_value(goal), "MoveBaseActionGoal", headers) if new else Answer(204)
+
+    def number(self, text: str, name: str, *, integer: bool = False) -> float | int:
+        """Return the number that a text in a target represents."""
+        return reading.number(text, name, integer=integer)
+
+    def written(self, value: Any, root: str, format_: str) -> bytes:
+        """Return a value in a format."""
+        return written(value, root, format_)
 
     def _reads(self, root: str, value: Callable[[], Any]) -> Callable[[Message, bytes, str], Answer]:
         def read(headers: Message, _body: bytes, _target: str) -> Answer:
-            return _shown(200, value(), root, headers)
+            return self.shown(200, value(), root, headers)
 
         return read
 
@@ -122,18 +169,20 @@ class Rest:
     def _put_velocity(self, headers: Message, body: bytes, _target: str) -> Answer:
         twist = self._input(headers, body, "Twist", reading.TWIST)
         for part, axis in (("linear", "y"), ("linear", "z"), ("angular", "x"), ("angular", "y")):
-            if twist[part][axis]:
+            if abs(twist[part][axis]) > self._body.further_axes:
                 raise RefusedError(422, f"{part}.{axis}: {twist[part][axis]!r} cannot be actuated, it must be 0")
-        return self._drive(twist["linear"]["x"], twist["angular"]["z"])
+        self._drive(twist["linear"]["x"], twist["angular"]["z"])
+        return self.done(headers, "Twist", twist)
 
     def _put_linear(self, headers: Message, body: bytes, _target: str) -> Answer:
         vector = self._input(headers, body, "Vector3", reading.VECTOR3)
         for axis in ("y", "z"):
-            if vector[axis]:
+            if abs(vector[axis]) > self._body.further_axes:
                 raise RefusedError(422, f"{axis}: {vector[axis]!r} cannot be actuated, it must be 0")
-        return self._drive(vector["x"], None)
+        self._drive(vector["x"], None)
+        return self.done(headers, "Vector3", vector)
 
-    def _drive(self, v: float, w: float | None) -> Answer:
+    def _drive(self, v: float, w: float | None) -> None:
         limits = self._body.build
         if abs(v) > limits.linear_m_s:
             raise RefusedError(422, f"{'x' if w is None else 'linear.x'}: {v!r} is beyond {limits.linear_m_s} m/s")
@@ -143,16 +192,15 @@ class Rest:
             self._body.drive(v, w)
         except BusyError:
             raise RefusedError(409, "a goal is active") from None
-        return Answer(204)
 
     def _get_goal(self, headers: Message, _body: bytes, _target: str) -> Answer:
         goal = self._body.current()
         if goal is None:
             raise RefusedError(404, "there is no goal")
-        return _shown(200, goal_value(goal), "MoveBaseActionGoal", headers)
+        return self.shown(200, goal_value(goal), "MoveBaseActionGoal", headers)
 
     def _put_goal(self, headers: Message, body: bytes, _target: str) -> Answer:
-        _format(headers)  # before anything is done
+        self._format(headers)  # before anything is done
         given = self._input(headers, body, "MoveBaseActionGoal", reading.GOAL)
         target = given["goal"]["target_pose"]
         where = "goal.target_pose"
@@ -162,16 +210,16 @@ class Rest:
         length = sum(part * part for part in q.values()) ** 0.5
         if not abs(length - 1) <= 1e-3:  # noqa: PLR2004 - contract, fine print
             raise RefusedError(422, f"{where}.pose.orientation: {json.dumps(q)} is {length!r} long")
-        if not self._body.knows(at["x"], at["y"]):
+        if self.foresees and not self._body.knows(at["x"], at["y"]):
             raise RefusedError(422, f"{where}.pose.position: {at['x']!r}, {at['y']!r} is not on the map")
         try:
             goal, new = self._body.send(given.get("goal_id", {}).get("id"), target["pose"], frame)
         except ConflictError:
             raise RefusedError(409, f"goal_id.id: {given['goal_id']['id']!r} has another pose") from None
-        return _shown(202, goal_value(goal), "MoveBaseActionGoal", headers) if new else Answer(204)
+        return self.accepted(goal, headers, new=new)
 
     def _delete_goal(self, _headers: Message, _body: bytes, _target: str) -> Answer:
-        if not self._body.cancel():
+        if not self._body.cancel() and self.foresees:
             raise RefusedError(404, "there is no goal")
         return Answer(204)
 
@@ -180,13 +228,13 @@ class Rest:
         for name, text in parse_qsl(target.partition("?")[2], keep_blank_values=True):
             kind = reading.PLAN.get(name) or reading.PLAN.get(name + "?")
             if kind:
-                given[name] = text if kind == "string" else reading.number(text, name)
+                given[name] = text if kind == "string" else self.number(text, name)
         for name in ("x", "y"):
             if name not in given:
                 raise RefusedError(422, f"{name}: missing in the query")
-        return _shown(200, plan_value(self._body, given), "GetPlan", headers)
+        return self.shown(200, plan_value(self._body, given), "GetPlan", headers)
 
-    def deliver(self, _headers: Message, _body: bytes, target: str) -> Answer:
+    def deliver(self, headers: Message, _body: bytes, target: str) -> Answer:
         """Accept a delivery.
 
         Raises:
@@ -197,10 +245,10 @@ class Rest:
         deliver(
             self._body,
             "rest",
-            reading.number(code, "code", integer=True),
-            [reading.number(text, name) for name, text in zip(_ORDER, texts, strict=True)],
+            self.number(code, "code", integer=True),
+            [self.number(text, name) for name, text in zip(_ORDER, texts, strict=True)],
         )
-        return Answer(204)
+        return self.done(headers, "Accepted", {"accepted": "thank you"})
 
     def _openapi(self, _headers: Message, _body: bytes, _target: str) -> Answer:
         document = yaml.safe_load((CONTRACT_DIR / "openapi.yaml").read_text(encoding="utf-8"))
@@ -212,11 +260,27 @@ class Rest:
         host = str(headers.get("Host", "")).encode()
         return Answer(200, wadl.replace(b"127.0.0.1:7003", host), "application/vnd.sun.wadl+xml")
 
+    def shown(self, status: int, value: Any, root: str, headers: Message) -> Answer:
+        """Return a response with a value in the format that the client accepts.
+
+        Raises:
+            RefusedError: the client accepts none of the formats.
+        """
+        format_ = self._format(headers)
+        media_type = format_ + self.charsets.get(format_, "")
+        return Answer(status, self.written(value, root, format_), media_type, {"Vary": "Accept"})
+
+    def _format(self, headers: Message) -> str:
+        format_ = choose(accept_of(headers), self.formats)
+        if format_ is None:
+            raise RefusedError(406, f"Accept: {headers.get('Accept')!r} has nothing of this robot's")
+        return format_
+
 
 def refusal(refused: RefusedError, headers: Message) -> Answer:
     """Return a problem, as XML if the client prefers XML."""
     document, fields = {"status": refused.status, "detail": str(refused)}, {"Vary": "Accept"}
-    if choose(_accept(headers)) == "application/xml":
+    if choose(accept_of(headers)) == "application/xml":
         document["detail"] = _printable(str(refused))
         xml = element("problem", document).replace("<problem>", '<problem xmlns="urn:ietf:rfc:7807">', 1)
         return Answer(refused.status, xml.encode(), "application/problem+xml", fields)
@@ -241,7 +305,7 @@ def goal_value(goal: Goal) -> dict[str, Any]:
         "header": header,
         "goal_id": {"stamp": since, "id": goal.id},
         "goal": {"target_pose": {"header": header, "pose": goal.pose}},
-        "status": {"code": 2, "text": ""},
+        "status": {"code": 1 if time.time() - goal.stamp < _NEW_S else 2, "text": ""},
     }
 
 
@@ -256,37 +320,27 @@ def plan_value(body: Body, given: dict[str, Any]) -> dict[str, Any]:
         raise RefusedError(422, f"frame_id: {frame!r} is no frame of this robot")
     if given.get("tolerance", 0.1) < 0:
         raise RefusedError(422, f"tolerance: {given['tolerance']!r} is negative")
-    start = None
+    start, end = None, (given["x"], given["y"], given.get("yaw", 0.0))
     if "start_x" in given or "start_y" in given:
-        now = body.odometry()["pose"]["pose"]["position"]
-        start = given.get("start_x", now["x"]), given.get("start_y", now["y"]), given.get("start_yaw", 0.0)
+        now = body.odometry()["pose"]["pose"]
+        now = (now["position"]["x"], now["position"]["y"], yaw_of(now["orientation"]))
+        now = now if frame == "odom" else body.on_map(*now)
+        start = given.get("start_x", now[0]), given.get("start_y", now[1]), given.get("start_yaw", 0.0)
+    if frame == "odom":
+        start, end = start and body.on_map(*start), body.on_map(*end)
     try:
-        poses = body.path(start, given["x"], given["y"], given.get("yaw", 0.0))
+        poses = body.path(start, *end)
     except NoPlanError as none:
         raise RefusedError(422, str(none)) from None
+    if frame == "odom":
+        there = [(one["position"]["x"], one["position"]["y"], yaw_of(one["orientation"])) for one in poses]
+        poses = [pose(*body.in_odom(*one)) for one in there]
     header = {"stamp": body.odometry()["header"]["stamp"], "frame_id": frame}
-    return {"plan": {"header": header, "poses": [{"header": header, "pose": pose} for pose in poses]}}
+    return {"plan": {"header": header, "poses": [{"header": header, "pose": one} for one in poses]}}
 
 
-def _format(headers: Message) -> str:
-    """Return the format for a response.
-
-    Raises:
-        RefusedError: the client accepts none of the formats.
-    """
-    format_ = choose(_accept(headers))
-    if format_ is None:
-        raise RefusedError(406, f"Accept: {headers.get('Accept')!r} has nothing of this robot's")
-    return format_
-
-
-def _shown(status: int, value: Any, root: str, headers: Message) -> Answer:
-    format_ = _format(headers)
-    media_type = format_ + ("; charset=utf-8" if format_ == "text/plain" else "")
-    return Answer(status, written(value, root, format_), media_type, {"Vary": "Accept"})
-
-
-def _accept(headers: Message) -> str | None:
+def accept_of(headers: Message) -> str | None:
+    """Return what the client accepts; None: it does not say."""
     fields = headers.get_all("Accept")
     return None if fields is None else ", ".join(fields)
 

@@ -9,10 +9,13 @@ _RETURN = {"\r": "&#13;"}
 FORMATS = ("application/json", "application/xml", "text/plain")
 
 
-def choose(accept: str | None) -> str | None:
-    """Return the media type to send for an Accept field (RFC 9110 12.5.1), or None if none is acceptable."""
+def choose(accept: str | None, formats: tuple[str, ...] = FORMATS) -> str | None:
+    """Return the media type to send for an Accept field (RFC 9110 12.5.1), or None if none is acceptable.
+
+    Of equally welcome formats the first one is sent.
+    """
     if accept is None or not accept.strip():
-        return FORMATS[0]
+        return formats[0]
     ranges: list[tuple[str, float]] = []
     for part in accept.split(","):
         name, *parameters = [text.strip() for text in part.split(";")]
@@ -25,7 +28,7 @@ def choose(accept: str | None) -> str | None:
                 except ValueError:
                     quality = 0.0
         ranges.append((name.lower(), quality))
-    best = max(FORMATS, key=lambda format_: _quality(format_, ranges))
+    best = max(formats, key=lambda format_: _quality(format_, ranges))
     return best if _quality(best, ranges) > 0 else None
 
 
