@@ -11,6 +11,7 @@ import locust.stats
 from locust import User, constant_throughput, events, tag, task
 from locust.exception import StopTest
 
+from conformance.documents.wsdl import WsdlError
 from conformance.papers_robot.statement import RobotStatement
 from loadtests.clients.callers import Caller, Workload
 from loadtests.clients.endpoint import EndpointError
@@ -18,7 +19,7 @@ from loadtests.clients.failures import CallError
 from loadtests.clients.library import read_document
 from loadtests.clients.payloads import CATALOGUE, VARIANTS
 from loadtests.clients.wire import now_ns
-from loadtests.clients.wsdl import WsdlError, with_addresses
+from loadtests.clients.wsdl import with_addresses
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.errors import SettingsError
 from loadtests.settings.settings import Settings

@@ -139,6 +139,12 @@ class Wsdl:
             found += [one for one in result if etree.iselement(one)] if isinstance(result, list) else []
         return found
 
+    @property
+    def soap_address(self) -> str:
+        """The first soap:address as it is written, however broken the rest is; empty without one."""
+        written = ((one.get("location") or "").strip() for one in self.all("//s:address"))
+        return next(filter(None, written), "")
+
     def find(self, path: str, reference: etree._Element, attribute: str) -> etree._Element | None:
         """Return what a QName in an attribute refers to, or None."""
         return self._reader.find(path, reference, attribute)
@@ -423,6 +429,15 @@ def describe(
         return Wsdl(collect(wsdl, location, fetch, locate), location, address, foreign)
     except ValueError as error:
         raise WsdlError(f"{location} is no WSDL, but {error}") from error
+
+
+def unread(place: str) -> bytes:
+    """Fetch nothing: for a description of which only the first document is needed.
+
+    Raises:
+        OSError: always.
+    """
+    raise OSError(f"{place} is not needed")
 
 
 def read_services(

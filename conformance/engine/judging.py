@@ -9,7 +9,6 @@ from typing import Any
 from conformance.api.device import device_of
 from conformance.api.rest.habits import Habits
 from conformance.api.rest.interface import RestInterface
-from conformance.api.soap.address import split
 from conformance.api.soap.service import SoapService
 from conformance.checkers.rest import RestCheckers
 from conformance.checkers.soap import SoapCheckers, answers_of
@@ -30,6 +29,7 @@ from conformance.transport.exchange import Attempt, Exchange, Listener
 from conformance.transport.parallel import is_busy
 from conformance.transport.passage import Heard
 from conformance.transport.raw import tell
+from conformance.transport.reach import split
 from conformance.verdict.case import Case, Checker
 from conformance.verdict.evidence import Judge
 from conformance.verdict.observers import Observers

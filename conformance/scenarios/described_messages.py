@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
-from urllib.parse import urlsplit
 
 from lxml import etree
 
@@ -25,6 +24,7 @@ from conformance.documents.xsd_lexical import INTEGERS, STRINGS
 from conformance.documents.xsd_shapes import Element
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.client import Headers
+from conformance.transport.reach import split
 from conformance.transport.username_token import UsernameToken
 
 _NONE: Final[Mapping[str, Sequence[str]]] = MappingProxyType({})
@@ -165,8 +165,7 @@ def values_in(element: etree._Element) -> dict[str, list[str]]:
 
 def target_of(port: SoapPort) -> str:
     """Return the request target of a port: a device behind a front does not know its own scheme and host."""
-    parts = urlsplit(port.url)
-    return (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
+    return split(port.url)[1]
 
 
 def fields_of(port: SoapPort, operation: SoapOperation) -> Headers:

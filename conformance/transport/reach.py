@@ -174,6 +174,13 @@ def server_of(url: str) -> str:
     return f"{parts.scheme}://{parts.netloc}"
 
 
+def split(url: str) -> tuple[str, str]:
+    """Return scheme and host without credentials, and path with query."""
+    parts = urlsplit(url)
+    query = f"?{parts.query}" if parts.query else ""
+    return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}", f"{parts.path or '/'}{query}"
+
+
 def moved(url: str, old: str, new: str) -> str:
     """Return a URL of the server ``old`` with another scheme and host: a device behind a front does not know its own.
 

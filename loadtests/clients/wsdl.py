@@ -1,11 +1,11 @@
 """The address of a service, read from its WSDL (WSDL 1.1 section 3.8, soap:address)."""
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from conformance.documents.wsdl import WsdlError, describe, name, unread
 from conformance.transport.client import Connection
 from conformance.transport.fetching import Fetcher
 from conformance.transport.reach import Folder, Trust, UnreachableError, is_same, moved, server_of
@@ -13,16 +13,6 @@ from loadtests.clients.endpoint import Endpoint, EndpointError
 from loadtests.clients.failures import CallError
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE
 from loadtests.clients.robot import Robot
-from loadtests.clients.xml_reader import XmlError, parse_xml
-
-_WSDL = "http://schemas.xmlsoap.org/wsdl/"
-_SOAP = "http://schemas.xmlsoap.org/wsdl/soap/"
-_PAGE = re.compile(rb"\s*<(!doctype html|html)", re.IGNORECASE)
-_MOST = 4 * 1024 * 1024
-
-
-class WsdlError(ValueError):
-    """A WSDL that cannot be used; the message says what is wrong with it."""
 
 
 def trust_of(robot: Robot) -> Trust:
@@ -80,33 +70,20 @@ def _declared(content: bytes, location: str, element: str) -> str:
     Raises:
         WsdlError: as address_in().
     """
-    if len(content) > _MOST:
-        raise WsdlError(f"WSDL {location!r} is longer than {_MOST} bytes")
+    found = describe(content, location, unread)
+    offered = sorted({name(operation) for operation in found.all("w:portType/w:operation")})
+    if not found.all("w:import"):  # else another document may have them
+        if element not in offered:
+            raise WsdlError(f"WSDL {location!r} has no operation {element!r} (it has {', '.join(offered) or 'none'})")
+        if found.target_namespace != NAMESPACE:
+            raise WsdlError(f"WSDL {location!r}: its target namespace is {found.target_namespace!r}, not {NAMESPACE!r}")
+    if not found.soap_address:
+        raise WsdlError(f"WSDL {location!r} has no soap:address: give the address with --…-endpoint URL")
     try:
-        root = parse_xml(content)
-    except XmlError as error:
-        page = " (an HTML page, such as a login?)" if _PAGE.match(content) else ""
-        raise WsdlError(f"WSDL {location!r} {error}{page}") from None
-    if root.tag != f"{{{_WSDL}}}definitions":
-        raise WsdlError(f"{location!r} is not a WSDL 1.1: its root element is {root.tag!r}")
-    offered = {found.get("name") for found in root.iter(f"{{{_WSDL}}}operation")}
-    imports = root.findall(f"{{{_WSDL}}}import")
-    if element not in offered and not imports:
-        raise WsdlError(
-            f"WSDL {location!r} has no operation {element!r} (it has {', '.join(sorted(map(str, offered))) or 'none'})"
-        )
-    if root.get("targetNamespace") != NAMESPACE and not imports:
-        raise WsdlError(
-            f"WSDL {location!r}: its target namespace is {root.get('targetNamespace')!r}, not {NAMESPACE!r}"
-        )
-    for address in root.iter(f"{{{_SOAP}}}address"):
-        url = address.get("location") or ""
-        try:
-            Endpoint.parse(url)
-        except EndpointError as error:
-            raise WsdlError(f"WSDL {location!r}: its soap:address cannot be used: {error}") from None
-        return url
-    raise WsdlError(f"WSDL {location!r} has no soap:address: give the address with --…-endpoint URL")
+        Endpoint.parse(found.soap_address)
+    except EndpointError as error:
+        raise WsdlError(f"WSDL {location!r}: its soap:address cannot be used: {error}") from None
+    return found.soap_address
 
 
 def with_addresses(*robots: Robot) -> tuple[tuple[Robot, ...], list[str]]:
@@ -122,9 +99,9 @@ def with_addresses(*robots: Robot) -> tuple[tuple[Robot, ...], list[str]]:
 
 def _with_addresses(robot: Robot, remarks: list[str]) -> Robot:
     found: dict[str, Any] = {}
-    for name, operation in CATALOGUE.items():
-        location = robot.wsdl(name)
-        if location is None or robot.address("soap", name) is not None or operation.service in found:
+    for call, operation in CATALOGUE.items():
+        location = robot.wsdl(call)
+        if location is None or robot.address("soap", call) is not None or operation.service in found:
             continue
         declared = _declared(fetch(location, robot), location, operation.element)
         trust = trust_of(robot)

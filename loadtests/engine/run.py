@@ -6,9 +6,10 @@ from functools import partial
 
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.started import Started
+from conformance.documents.wsdl import WsdlError
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Robot
-from loadtests.clients.wsdl import WsdlError, with_addresses
+from loadtests.clients.wsdl import with_addresses
 from loadtests.engine.deciding import until_decided
 from loadtests.engine.planning import duel_plan
 from loadtests.engine.watching import Watch, show_web_ui, tell, tell_plan

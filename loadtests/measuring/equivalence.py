@@ -8,10 +8,10 @@ from typing import Any
 
 from lxml import etree
 
+from conformance.documents.xml import parse
 from conformance.papers_robot.delivery import COORDINATES, XSD_FIELDS
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values
 from loadtests.clients.wire import Request
-from loadtests.clients.xml_reader import XmlError, parse_xml
 
 #: Leaves of nav_msgs/Odometry that both interfaces' responses must contain, equally often.
 _ODOMETRY = ("frame_id", "child_frame_id", "x", "y", "z", "w", "covariance", "sec")
@@ -27,7 +27,7 @@ def request_difference(operation: str, rest: Request, soap: Request) -> str | No
     parts = rest.octets.split(b" ", 2)[1].decode().rsplit("/robot/app/delivery/", 1)[1].split("/")
     over_rest = {field: float(parts[2 * index + 2]) for index, field in enumerate(COORDINATES)}
     over_rest["message_code"] = int(parts[0])
-    argument = parse_xml(soap.octets.split(b"\r\n\r\n", 1)[1]).find(".//arg0")
+    argument = parse(soap.octets.split(b"\r\n\r\n", 1)[1]).find(".//arg0")
     if argument is None:
         return "the SOAP request carries no arg0"
     over_soap = {child.tag: float(child.text or "nan") for child in argument}
@@ -55,9 +55,7 @@ def pose_difference(rest: bytes, soap: bytes) -> str | None:
     """
     try:
         over_rest = Counter(_json_leaves(json.loads(rest)))
-        found = parse_xml(soap).find(f".//{{{NAMESPACE}}}GetPoseResponse")
-    except XmlError as error:
-        return f"pose: a response cannot be read: it {error}"
+        found = parse(soap).find(f".//{{{NAMESPACE}}}GetPoseResponse")
     except ValueError as error:
         return f"pose: a response cannot be read: {error}"
     over_soap = Counter(_xml_leaves(found)) if found is not None else Counter()
@@ -71,8 +69,8 @@ def values_difference(rest: bytes, soap: bytes) -> str | None:
     """Return how many values two responses have if not equally many; None if they have, or if one cannot be counted."""
     try:
         over_rest = sum(1 for _ in _json_leaves(json.loads(rest)))
-        body = parse_xml(soap).find("{*}Body")
-    except (XmlError, ValueError):
+        body = parse(soap).find("{*}Body")
+    except ValueError:
         return None
     leaves = () if body is None else (each for each in body.iter() if isinstance(each.tag, str))
     over_soap = sum(len(each.attrib) + (0 if len(each) else _values_in(each.text or "")) for each in leaves)

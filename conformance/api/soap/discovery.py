@@ -2,14 +2,15 @@
 
 from pathlib import Path
 
-from conformance.api.soap.address import is_http, soap_address, split
 from conformance.api.soap.published_wsdl import PublishedWsdl, get, obtain
 from conformance.api.soap.service import KnownMessages, SoapService
 from conformance.contract.interfaces import Interface
+from conformance.documents.addressing import is_http
+from conformance.documents.wsdl import WsdlError, describe, unread
 from conformance.statement.statement import StatementError
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswerError
-from conformance.transport.reach import Trust
+from conformance.transport.reach import Trust, split
 
 # How long the address in a WSDL is given to answer before the WSDL's own is taken instead, s.
 _PROBE_S = 3.0
@@ -60,9 +61,12 @@ def open_service(
 
 def _located(published: PublishedWsdl, connection: Connection) -> str | None:
     """Return the address of a service by its WSDL; None where a file does not name one."""
-    address = soap_address(published.document) if published.document else None
+    try:
+        address = describe(published.document or b"", published.source or "", unread).soap_address
+    except WsdlError:
+        address = ""
     if published.url is None:
-        return address if address and is_http(address) else None
+        return address if is_http(address) else None
     trust = connection.trust or Trust.of(published.url)
     if address and trust.trusts(address):
         try:

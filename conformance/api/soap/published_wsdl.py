@@ -4,12 +4,11 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from conformance.api.soap.address import split
 from conformance.documents.wsdl import Wsdl, WsdlError, describe
 from conformance.statement.statement import StatementError
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError
-from conformance.transport.reach import Folder
+from conformance.transport.reach import Folder, split
 
 _OK = 200
 

@@ -9,17 +9,17 @@ import pytest
 
 from conformance.api.expectation import expect
 from conformance.api.soap import comparison
-from conformance.api.soap.address import is_http, split
 from conformance.api.soap.callable_services import SoapServices, repetitions
 from conformance.api.soap.envelope import EMPTY
 from conformance.api.soap.published_wsdl import get
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.wsdl_rules import RULES
+from conformance.documents.addressing import is_http
 from conformance.documents.wsdl import Wsdl, WsdlError, describe, name, unusable
 from conformance.documents.xml_names import WSDL_SOAP, clark
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError
-from conformance.transport.reach import Trust, is_same
+from conformance.transport.reach import Trust, is_same, split
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 

@@ -4,10 +4,10 @@ import re
 
 import pytest
 
+from conformance.documents.wsdl import WsdlError
 from conformance.papers_robot.files import CONTRACT_DIR
 from loadtests.clients import wsdl
 from loadtests.clients.robot import Robot
-from loadtests.clients.wsdl import WsdlError
 
 
 def test_the_address_is_read_from_the_wsdl():
@@ -23,9 +23,12 @@ def test_the_address_is_read_from_the_wsdl():
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"<html><body>Welcome</body></html>", "is not a WSDL 1.1: its root element is 'html'"),
-        (b"no xml", "is not XML"),
-        (b"<!DOCTYPE x [<!ENTITY a 'b'>]><x>&a;</x>", "has a document type declaration"),
+        (
+            b"<html><body>Welcome</body></html>",
+            "an HTML page, such as a login or an error: the root element html instead of wsdl:definitions",
+        ),
+        (b"no xml", "is no WSDL, but not well-formed XML"),
+        (b"<!DOCTYPE x [<!ENTITY a 'b'>]><x>&a;</x>", "the root element x instead of wsdl:definitions"),
         ((CONTRACT_DIR / "subscribers.wsdl").read_bytes(), "has no operation 'ExecuteDeliveryRequest'"),
         (
             (CONTRACT_DIR / "publishers.wsdl").read_bytes().replace(b"soap:address", b"soap:nothing"),

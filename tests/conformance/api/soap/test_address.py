@@ -2,7 +2,8 @@
 
 import pytest
 
-from conformance.api.soap.address import is_http, split
+from conformance.documents.addressing import is_http
+from conformance.transport.reach import split
 
 
 @pytest.mark.parametrize("url", ["ftp://a/b", "http:///x", "http://a:0/", "http://[/", "http://a:99999/", "a", ""])
