@@ -64,7 +64,7 @@ class Permission:
             TimeIsOverError: the time of the run is over.
         """
         self._run.limit.check()
-        if self._run.contract.described:
+        if not self._run.contract.has_own_requirements:
             # Which operation a message is for, its scenario has decided by the same rules.
             posts = method == "POST" and _place(url) in self._reading
             return "" if posts else self._refused_call(method, url)
@@ -78,7 +78,7 @@ class Permission:
         return f"{method} {urlsplit(url).path[:200]} was not sent: {NO_MOTION}"
 
     def _refused_call(self, method: str, url: str) -> str:
-        """Return why a request is not sent to an API that is judged by its own description; empty if it may be sent."""
+        """Return why a request is not sent to a device that claims no contract; empty if it may be sent."""
         base = (self._run.statement.endpoints.rest or "").rstrip("/")
         sent = _place(url).removeprefix(base)
         path = _SLASHES.sub("/", unquote(sent)) or "/"
@@ -125,8 +125,8 @@ def permitted(run: Run, client: HttpClient, methods: Iterable[str], path: str, *
         ids: the requirements that the check judges.
     """
     refusals = {method: client.refusal(method, path) for method in methods}
-    # An API that is judged by its own description is judged by what may be called.
-    reason = "" if run.contract.described else next(filter(None, refusals.values()), "")
+    # A device that claims no contract is judged by what may be called.
+    reason = next(filter(None, refusals.values()), "") if run.contract.has_own_requirements else ""
     for id_ in ids if reason else ():
         requirement = run.contract.ledger.get(id_)
         if requirement is not None and Prerequisite.MOTION in requirement.needs:

@@ -20,7 +20,7 @@ _IMF_FIXDATE = re.compile(
     r"\d{2}:\d{2}:\d{2} GMT",
     re.ASCII,
 )
-# What a web server answers by itself when it refuses a request: an API's author has no hand in these.
+# What a web server answers by itself when it refuses a request, unless the API's author declares it.
 _OF_PARSERS = frozenset({400, 413, 414, 431})
 # RFC 9110 8.8.3: entity-tag.
 _ENTITY_TAG = re.compile(r'(?:W/)?"[\x21\x23-\x7e\x80-\xff]*"')
@@ -53,8 +53,9 @@ def once(occasion: Occasion) -> Iterator[Case]:
 
 def date(occasion: Occasion) -> Iterator[Case]:
     """Judge Date, which RFC 9110 6.6.1 leaves 5xx free to omit."""
-    by_server = occasion.contract.described and occasion.response.status in _OF_PARSERS
-    if occasion.response.status < HTTPStatus.INTERNAL_SERVER_ERROR and occasion.request.raw is None and not by_server:
+    status, operation = occasion.response.status, occasion.operation
+    by_server = status in _OF_PARSERS and not (operation and str(status) in operation.responses)
+    if status < HTTPStatus.INTERNAL_SERVER_ERROR and occasion.request.raw is None and not by_server:
         said = occasion.response.header("date")
         found = "no header field Date" if said is None else f"Date: {said}"
         yield occasion.case("http/date", _is_date(said), "Date with the time of the response", found)

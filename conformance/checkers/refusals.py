@@ -13,27 +13,28 @@ _ALWAYS_ALLOWED = frozenset({"HEAD", "OPTIONS", "TRACE"})
 
 
 def allow(occasion: Occasion) -> Iterator[Case]:
-    """Judge Allow where a device refuses a method that its description does not have."""
-    method, is_refused = occasion.request.method, occasion.response.status == HTTPStatus.METHOD_NOT_ALLOWED
-    is_own = (
-        occasion.contract.described
-        and occasion.context.usual
-        and occasion.operation is None
-        and method not in _OF_SERVERS
-    )
-    if not (is_refused and is_own):
+    """Judge Allow where a device refuses a method that its description does not have, or answers OPTIONS."""
+    method, response = occasion.request.method, occasion.response
+    is_refused = response.status == HTTPStatus.METHOD_NOT_ALLOWED and occasion.operation is None
+    is_asked = method == "OPTIONS" and response.ok
+    if not (is_refused or is_asked) or not occasion.context.usual or method in _OF_SERVERS:
         return
     resource = resource_at(occasion.contract, occasion.context.target.split("?", 1)[0])
     if resource is None:
         return
-    said = occasion.response.header("allow")
-    yield occasion.case("http/allow", said is not None, "the header field Allow", "no header field Allow")
+    said = response.header("allow")
+    if is_refused:
+        yield occasion.case("http/allow", said is not None, "the header field Allow", "no header field Allow")
     if said is None:
         return
-    named, wanted = {name.strip() for name in said.split(",")}, set(resource.methods) - _ALWAYS_ALLOWED
+    named, wanted = {name.strip() for name in said.split(",")} - {""}, set(resource.methods) - _ALWAYS_ALLOWED
+    besides = f"{', '.join(sorted(named - wanted - _ALWAYS_ALLOWED))} besides"
+    declared = f"Allow: {', '.join(sorted(wanted))}, as declared"
+    yield occasion.case("description/allow", named <= wanted | _ALWAYS_ALLOWED, declared, besides, cause=besides)
+    refused = {method} - _ALWAYS_ALLOWED if is_refused else set()
     yield occasion.case(
         "http/allow-agrees",
-        wanted <= named and method not in named,
+        wanted <= named and not refused & named,
         f"Allow: {', '.join(sorted(wanted))} (others may stand beside them, but none that got 405)",
         f"Allow: {said}",
         cause="methods left out",

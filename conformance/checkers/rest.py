@@ -36,15 +36,15 @@ class RestCheckers:
     def __init__(self, contract: Contract, base_url: str, elsewhere: Iterable[str] = ()) -> None:
         self._contract, self._base_url = contract, base_url
         self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
-        # These know what the run has shown so far; the second ones judge described devices alone.
-        self._memory = Memory(contract) if contract.described else None
-        described = (Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory) if self._memory else ()
-        self._over_time = (conditional.Conditional(), *described)
+        # These know what the run has shown so far.
+        self._memory = Memory(contract)
+        self._over_time = (
+            conditional.Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
+        )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:
         """Forget what may have been changed by a request of which nobody knows what it did."""
-        if self._memory is not None:
-            self._memory.forget(deletes=deletes)
+        self._memory.forget(deletes=deletes)
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Yield the cases of one exchange; none if it went to another interface."""

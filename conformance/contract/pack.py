@@ -77,8 +77,8 @@ class Contract:
         ``openapi.yaml`` (or .yml, .json), one ``*.wadl`` and at most two ``*.wsdl`` describe the device. The WSDL with
         "subscriber" in its name describes the service that only reads, the other one the service that acts.
 
-        A pack with ``described = true``, which a run wrote, is its JSON files: a result is data, and whatever else is
-        in that folder is neither read nor executed.
+        A pack with ``described = true`` was written by a run, from an API's own description. It is its JSON files: a
+        result is data, and whatever else is in that folder is neither read nor executed.
 
         Raises:
             ContractError: there is no such pack, or it describes no interface, or one interface twice.
@@ -158,7 +158,7 @@ class Contract:
             interfaces = entry.interfaces or (known.interfaces if known else ())
             enough = known.one_is_enough if known else entry.one_is_enough
             topic = entry.topic or (known.topic if known else Topic.SERVICE)
-            beside = known is not None and known.beside and self.described
+            beside = known is not None and known.beside and not self.has_own_requirements
             found[entry.name] = ConformanceClass(
                 entry.name,
                 entry.title or known.title,  # type: ignore[union-attr] # checked above
@@ -216,10 +216,10 @@ class Contract:
             raise ContractError(f"{self.openapi_path} is no OpenAPI description: it has no 'paths'")
         return document
 
-    @property
-    def described(self) -> bool:
-        """Whether the pack is an API's own description, and nothing else is known of the device."""
-        return self.manifest is None or self.manifest.described
+    @cached_property
+    def has_own_requirements(self) -> bool:
+        """Whether the pack demands more than its descriptions say, so that devices claim it and it permits requests."""
+        return not self._is_data and (self.directory / LEDGER).is_file()
 
     @cached_property
     def original(self) -> dict[str, Any]:
@@ -242,6 +242,10 @@ class Contract:
             ContractError: a ledger cannot be read, an id occurs twice, or one of ``only`` is unknown.
         """
         return {id_: item for id_, item in self._whole_ledger.items() if not self.only or id_ in self._chosen}
+
+    def demands(self, id_: str) -> bool:
+        """Return whether the contract has a requirement, even if ``only`` leaves it out."""
+        return id_ in self._whole_ledger
 
     @cached_property
     def renamed(self) -> dict[str, str]:
@@ -269,7 +273,7 @@ class Contract:
         }
         own: dict[str, Requirement] = {}
         path = self.directory / LEDGER
-        if path.is_file() and not self._is_data:
+        if self.has_own_requirements:
             try:
                 own = load_ledger(path, self.classes)
             except LedgerError as error:

@@ -232,7 +232,7 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
         if run.aborted and not (evidence.cases or evidence.skips or evidence.errors):
             judge.stopped(requirement.id, run.aborted)
     seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, run.scored, run.beside)
-    if run.contract.described:
+    if not run.contract.has_own_requirements:
         # What the motion map declares is claimed, and so is that the operations of a WSDL answer.
         _leave_out(
             seen[id_]
@@ -247,7 +247,7 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
 
 
 def _leave_out(seen: Iterable[Evidence]) -> None:
-    """Leave out what no permitted request shows: an API that is judged by its description has claimed nothing else."""
+    """Leave out what no permitted request shows: a device that claims no contract has claimed nothing else."""
     for evidence in seen:
         evidence.parts = {part: cases for part, cases in evidence.parts.items() if cases}
         if not (evidence.cases or evidence.errors or evidence.because or evidence.unclaimed or evidence.unseen):

@@ -203,7 +203,7 @@ def look_again(run: Run, connection: Connection, rest: RestInterface | None = No
                 break
             moves |= exchange.request.method not in SAFE_METHODS
             cases = run.judge.cases(finding.requirement)
-            base_url = rest.client.base_url if rest is not None and run.contract.described else ""
+            base_url = rest.client.base_url if rest is not None else ""
             by_rule = fails_by_description(run.contract, base_url, finding.requirement, exchange)
             base_url = base_url if by_rule else ""
             came_back = sum(_fails_again(run, finding, exchange, connection, base_url) for _ in range(_TIMES))

@@ -52,7 +52,7 @@ class RobotUnderTest:
         run: the data of the run.
         connection: the settings that all clients share.
         rest: client of its REST interface, or None; ``connect`` sets it.
-        log: what was sent to each operation of an API that is judged by its own description, else None.
+        log: what was sent to each operation of a device that claims no contract, else None.
         permission: what may be sent; every request passes it.
         refusals: whether the device accepts the run's credentials.
         is_at_rest: whether the run has sent nothing that may move the device, or has stopped it since.
@@ -109,8 +109,8 @@ class RobotUnderTest:
         self._progress = progress
         self.connection.listeners.insert(0, Recorder(self.run.judge))
         self.connection.listeners.insert(0, self.refusals)
-        if self.run.contract.described:
-            # A contract names its streams; of any other API only a response shows that it does not end.
+        if not self.device.is_known:
+            # A known device has no streams, and counts what it is sent; of another one only a response shows that.
             self.connection.endless = self.connection.resends = True
             self.connection.is_away = self._is_away
         self._connect_rest()
@@ -131,7 +131,7 @@ class RobotUnderTest:
         if self.run.allow_motion or self.run.statement.calls.allow:
             self._guard = Guard(self.rest)
             self.connection.before_sending = self._guard.before_sending
-        if self.run.contract.described:
+        if not self.run.contract.has_own_requirements:
             self.permission.may_call_ports(self.rest.client.base_url)
             self.log = OperationLog(self.run.contract, self.rest.client.base_url)
             self.connection.listeners.append(self.log)
@@ -295,8 +295,8 @@ class RobotUnderTest:
     def estimate(self, *, measured: bool = True) -> str:
         """Return how many requests the run sends, and how long it takes, if the device is judged by its description."""
         run = self.run
-        if not run.contract.described:
-            return ""
+        if "description/operations" not in run.contract.ledger and SOAP not in run.contract.classes:
+            return ""  # there is no survey
         # Imported late: the survey and what it needs cost time that --help need not pay.
         from conformance.scenarios.estimate import estimate  # noqa: PLC0415
 
@@ -357,10 +357,10 @@ class RobotUnderTest:
             return self._is_of_gateway(exchange) and not self._responds(0.0)
 
     def _operation_of(self, request: Request) -> str:
-        """Return the label of the described operation that a request is for, or an empty text."""
+        """Return the label of the operation that a request is for, or an empty text."""
         from conformance.api.rest.request_context import RequestContext  # noqa: PLC0415 - as above
 
-        if self.rest is None or not self.run.contract.described:
+        if self.rest is None:
             return ""
         context = RequestContext.of(self.run.contract, self.rest.client.base_url, request)
         return context.operation.label if context and context.operation else ""

@@ -102,8 +102,8 @@ def _known(item: Requirement, contract: Contract, sets: Mapping[str, Requirement
         "classes": list(item.classes),
         "aliases": list(item.aliases),
         "sets": [name for name, one in sets.items() if not ids.isdisjoint(one.requirements)],
-        # Of a device with a description of its own, a run leaves out what no permitted request shows.
-        "decides": holds_back(item) and not contract.described,
+        # Of a device that claims no contract, a run leaves out what no permitted request shows.
+        "decides": holds_back(item) and contract.has_own_requirements,
         "beside": contract.classes[item.class_].beside,
     }
 

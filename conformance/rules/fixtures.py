@@ -78,8 +78,9 @@ def _descriptions(service: SoapService) -> Iterator[Wsdl]:
 
 @pytest.fixture(scope="session")
 def other_exchanges(run: Run, interfaces: Interfaces) -> OtherExchanges | None:
-    """Return what keeps the exchanges with a described API that no scenario records; None for any other robot."""
-    return OtherExchanges(interfaces.rest) if run.contract.described and interfaces.rest else None
+    """Return what keeps the exchanges that no scenario records; None where no rule asks for them."""
+    asked = not run.contract.ledger.keys().isdisjoint({"description/status-declared", "robustness/no-server-error"})
+    return OtherExchanges(interfaces.rest) if asked and interfaces.rest else None
 
 
 @pytest.fixture(scope="session")

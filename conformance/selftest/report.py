@@ -30,7 +30,7 @@ class Report:
         seed: seed of the sample of generated mutants.
         exist: how many generated mutants there are, of which the sample is.
         option: the option that asked for the sample: generated or adversary.
-        blamed: requirements that the unchanged described device does not pass, with the reason.
+        blamed: requirements that the unchanged device does not pass, with the reason; None: it is a good device.
     """
 
     contract: Contract
@@ -44,7 +44,7 @@ class Report:
     seed: int = 0
     exist: int = 0
     option: str = "generated"
-    blamed: dict[str, str] = field(default_factory=dict)
+    blamed: dict[str, str] | None = None
 
     @property
     def tried(self) -> list[MutantResult]:
@@ -122,7 +122,7 @@ class Report:
                 if self.generated_results
                 else {}
             ),
-            **({"false_alarms": self.blamed} if self.contract.described else {}),
+            **({} if self.blamed is None else {"false_alarms": self.blamed}),
         }
 
     def write(self, out: Path) -> Path:
@@ -139,7 +139,7 @@ class Report:
 
     def matrix(self) -> str:
         """Return Markdown tables: each mutant with the requirements that killed it; rates of generated mutants."""
-        if self.contract.described:
+        if self.blamed is not None:
             return api_report.page(self.target, self.generated_results, self.blamed, self.compared, self.notes)
         if self.generated_results:
             theirs = {seen.mutant: seen.killed for one in self.compared for seen in one.results}
@@ -199,7 +199,7 @@ class Report:
             lines.append(f"FALSE POSITIVE {one.robot}{where}, seed {one.seed}, exit code {code}: {said}")
         if self.generated_results:
             lines.append(by_rule.summary(self.exist, self.generated_results))
-        if self.contract.described:
+        if self.blamed is not None:
             alarms = "; ".join(f"{id_}: {why[:200]}" for id_, why in self.blamed.items()) or "none"
             lines.append(f"False alarms on the unchanged device: {alarms}")
             only = api_report.only_theirs(self.generated_results, self.compared)

@@ -180,7 +180,7 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         Raises:
             StatementError: it claims an unknown class or profile, or has a motion map that is invalid or has no use.
         """
-        if self.motion is not None and not contract.described:
+        if self.motion is not None and "motion" not in contract.classes:
             raise StatementError(f"{path}: [motion] is for a device that is judged by its own description: see [api]")
         moves = None if self.motion is None else fit({"motion": self.motion}, _Map, str(path), StatementError).motion
         return Statement(**self.common(contract, path), motion_map=moves)

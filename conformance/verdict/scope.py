@@ -11,8 +11,8 @@ _WORDS = {
     Overall.NOT_CONFORMANT: "not conformant to",
     Overall.INCONCLUSIVE: "inconclusive for",
 }
-# An API that is judged by its own description conforms to no contract.
-_OF_DESCRIBED = {
+# A device without requirements of a contract's own keeps its description, and conforms to no contract.
+_OF_DESCRIPTION = {
     Overall.CONFORMANT: "keeps its own description",
     Overall.NOT_CONFORMANT: "does not keep its own description",
     Overall.INCONCLUSIVE: "inconclusive",
@@ -39,8 +39,8 @@ def verdict_line(run: Run, value: Overall, verdicts: Iterable[Verdict]) -> str:
         return "inconclusive, because the device refused the credentials"
     if run.unshown and value is Overall.INCONCLUSIVE:
         return f"inconclusive, because {run.unshown}"
-    if run.contract.described:
-        said = _OF_DESCRIBED[value]
+    if not run.contract.has_own_requirements:
+        said = _OF_DESCRIPTION[value]
         said = f"{said}, as far as --minutes {run.limit.minutes:g} allowed" if run.limit.is_struck else said
         return f"{said}, {run.less}" if run.less else said
     contract = f" (contract {run.contract.label})" if run.contract.label else ""

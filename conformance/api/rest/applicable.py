@@ -11,19 +11,25 @@ from conformance.documents.json_schema import kind_of
 from conformance.documents.openapi import Operation, operations_of
 from conformance.documents.wsdl_pack import own_wsdl
 
-# As many operations of an API show how its server speaks HTTP.
-_DESCRIBED_READS = 8
+# As many operations show how a server speaks HTTP.
+_READS = 8
 NO_MOTION = "it moves the robot, and --allow-motion was not given"
 
 
 def reads(api: RestInterface) -> list[Call]:
-    """Return a valid request for each read-only operation, the optional ones last; see readable()."""
+    """Return valid requests for operations that read, the optional ones last: a few show how a server speaks HTTP.
+
+    Those that the survey found to answer 2xx come first, of these the ones that never took a second. A response that
+    does not end is none that two can share.
+    """
     found = [item for item in operations_of(api.run.contract) if item.method == "GET" and allowed(api, item)]
     if own := _wsdl_path(api):
         return [Call(Operation("the WSDL", "GET", own), {})]
-    if api.run.contract.described:
-        return _described_reads(api, found)
-    return [readable(api, item) for item in sorted(found, key=lambda item: item.optional)]
+    ranked = sorted(
+        (item for item in found if item.label not in api.streams),
+        key=lambda item: (item.optional, item.label not in api.working, item.label in api.slow, len(item.parameters)),
+    )
+    return [api.working.get(item.label) or readable(api, item) for item in ranked[:_READS]]
 
 
 def _wsdl_path(api: RestInterface) -> str:
@@ -31,19 +37,6 @@ def _wsdl_path(api: RestInterface) -> str:
     url = urlsplit(own_wsdl(api.run.contract))
     is_own = url.netloc == api.client.authority and url.path.startswith(f"{api.client.prefix}/")
     return url._replace(scheme="", netloc="").geturl().removeprefix(api.client.prefix) if is_own else ""
-
-
-def _described_reads(api: RestInterface, operations: list[Operation]) -> list[Call]:
-    """Return requests for some operations that read: how a server speaks HTTP shows in a few of them.
-
-    Those that the survey found to answer 2xx come first, of these the ones that never took a second. A response that
-    does not end is none that two can share.
-    """
-    ending = [item for item in operations if item.label not in api.streams]
-    ranked = sorted(
-        ending, key=lambda item: (item.label not in api.working, item.label in api.slow, len(item.parameters))
-    )
-    return [api.working.get(item.label) or example_call(api, item) for item in ranked[:_DESCRIBED_READS]]
 
 
 def readable(api: RestInterface, operation: Operation) -> Call:
@@ -91,9 +84,9 @@ def answered(api: RestInterface, *ids: str) -> list[Call]:
 
 def allowed(api: RestInterface, operation: Operation) -> bool:
     """Return whether the operation may be sent in this run."""
-    if api.run.contract.described:
-        return api.call_rules.decide(operation).may
-    return api.run.allow_motion or not operation.motion
+    if api.run.contract.has_own_requirements:
+        return api.run.allow_motion or not operation.motion
+    return api.call_rules.decide(operation).may
 
 
 def usable_operations(api: RestInterface, wanted: Callable[[Operation], bool]) -> list[Operation]:

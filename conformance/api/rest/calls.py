@@ -11,20 +11,15 @@ from urllib.parse import quote
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import sample
 from conformance.api.rest.validity import require_valid
-from conformance.documents.json_schema import Schema, kind_of
+from conformance.documents.json_schema import Schema
 from conformance.documents.openapi import SAFE, Operation, is_json
 from conformance.documents.parameters import Parameter
-from conformance.documents.representation import flat
 from conformance.documents.serialization import path_text, query_pairs, query_text
 from conformance.documents.writing import json_text, text_of, xml_bytes
 from conformance.transport.exchange import Exchange
 
 JSON = "application/json"
 XML = "application/xml"
-_DEPTH = 12
-# No value has more items or characters, whatever its schema demands.
-_MOST_ITEMS = 64
-_LONGEST = 1 << 16
 # What is there again in so many seconds is worth waiting for.
 _MOMENT_S = 2
 
@@ -143,10 +138,9 @@ def example_call(api: RestInterface, operation: Operation, media_type: str = JSO
 
 def _example(api: RestInterface, operation: Operation, media_type: str) -> Call:
     given: dict[str, Any] = {}
-    made = sample if api.run.contract.described else minimal
     for item in operation.parameters:
         if item.where in {"path", "query"} and (item.required or item.examples):
-            given[item.name] = item.examples[0] if item.examples else made(item.schema)
+            given[item.name] = item.examples[0] if item.examples else sample(item.schema)
     if given:
         given = _fitted(api, operation, given)
     by_name = {item.name: item for item in operation.parameters if item.where in {"path", "query"}}
@@ -155,7 +149,7 @@ def _example(api: RestInterface, operation: Operation, media_type: str) -> Call:
         return call
     body = operation.bodies.get(JSON) or next(iter(operation.bodies.values()))
     plain = [item for item in body.examples if not isinstance(item, str)]
-    value = _fitted(api, operation, plain[0] if plain else made(body.schema))
+    value = _fitted(api, operation, plain[0] if plain else sample(body.schema))
     if media_type == XML:
         octets = xml_bytes(value, root_name(operation.bodies[XML].schema) or "value")
     else:
@@ -166,31 +160,6 @@ def _example(api: RestInterface, operation: Operation, media_type: str) -> Call:
 def root_name(schema: Schema) -> str:
     """Return the name of a schema's XML element; empty without one."""
     return str(schema.get("xml", {}).get("name", ""))
-
-
-def minimal(schema: Schema, depth: int = 0) -> Any:
-    """Return a small value that a schema allows, except for patterns."""
-    schema = flat(_without_null(schema))
-    given = [schema[key] for key in ("example", "const", "default") if key in schema]
-    given += [schema[key][0] for key in ("examples", "enum") if schema.get(key)]
-    if given:
-        return given[0]
-    kind = kind_of(schema)
-    if kind == "object":
-        names = schema.get("required", ()) if depth < _DEPTH else ()
-        return {name: minimal(schema.get("properties", {}).get(name, {}), depth + 1) for name in names}
-    if kind == "array":
-        return [minimal(schema.get("items", {}), depth + 1) for _ in range(min(_MOST_ITEMS, schema.get("minItems", 0)))]
-    if kind in {"number", "integer"}:
-        least = schema.get("minimum", schema.get("exclusiveMinimum", 0) + (1 if "exclusiveMinimum" in schema else 0))
-        return max(least, min(1, schema.get("maximum", max(least, 1))))
-    return True if kind == "boolean" else "a" * min(_LONGEST, max(1, schema.get("minLength", 1)))
-
-
-def _without_null(schema: Schema) -> Schema:
-    """Return a schema without the alternatives that allow only null."""
-    unions = {key: schema[key] for key in ("anyOf", "oneOf") if key in schema}
-    return {**schema, **{key: [part for part in parts if part != {"type": "null"}] for key, parts in unions.items()}}
 
 
 def _fitted(api: RestInterface, operation: Operation, value: Any) -> Any:

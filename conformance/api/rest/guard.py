@@ -57,8 +57,8 @@ class Guard:
         if not (acts or self._is_stale) or (self._process is None and not acts):
             return
         with self._lock:
-            # A contract pack stops its device always in the same way.
-            if not self._api.run.contract.described and self._is_alive:
+            # A device that is known is always stopped in the same way.
+            if self._api.device.is_known and self._is_alive:
                 self._is_stale = False
                 return
             self._is_stale, started = True, time.monotonic()

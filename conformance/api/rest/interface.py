@@ -41,7 +41,7 @@ class RestInterface:
         looked: the exchanges by which the run has connected, before anything observed them.
         server: the Server field of the first response that had one; empty: none had.
         is_shut_out: whether the device has refused the suite for too many wrong credentials.
-        driven: by which values the run has named what it may have moved; None: the device has no own description.
+        driven: by which values the run has named what it may have moved; None: the pack knows how it stops.
         is_recorded: whether the present exchange is recorded by a scenario, whose rules judge it.
     """
 
@@ -69,7 +69,7 @@ class RestInterface:
 
     def __post_init__(self) -> None:
         self.device = device_of(self.run)
-        if self.run.contract.described:
+        if not self.device.is_known:
             self.driven = Driven(self.run.contract, self.client.base_url)
             self.client.connection.listeners.append(self.driven)
 
@@ -86,20 +86,14 @@ class RestInterface:
 
 
 def plain_path(contract: Contract, rules: CallRules) -> str:
-    """Return a path of the contract for GET without parameters, to check whether a robot responds."""
-    if contract.described:
-        return _described_path(contract, rules)
-    for path, operations in contract.openapi.get("paths", {}).items():
-        if "get" in operations and "{" not in path and not operations["get"].get("x-roaas-optional"):
-            return str(path)
-    return "/"
+    """Return a path for GET to check whether a device responds; "/" if there is none.
 
-
-def _described_path(contract: Contract, rules: CallRules) -> str:
-    """Return a path for GET without required parameters, harmless and without a stream; "/" if there is none."""
+    It has no required parameters, is harmless, is no stream, and each device has it.
+    """
     for operation in operations_of(contract):
         required = any(item.required for item in operation.parameters)
         streams = any(name.startswith(("text/event-stream", "multipart/", "video/")) for name in operation.formats)
-        if operation.method == "GET" and not required and not streams and rules.decide(operation).may:
+        named = operation.method == "GET" and not (required or streams or operation.optional)
+        if named and rules.decide(operation).may:
             return operation.template
     return "/"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from conformance.api.mutations import STRANGE_NAME, STRANGE_TEXT, Member, Mutation, broken_members
-from conformance.api.rest.calls import minimal
+from conformance.api.rest.samples import sample
 from conformance.documents.json_schema import Schema, kind_of, shape_of, types_of
 from conformance.documents.json_text import read_json
 from conformance.documents.representation import flat
@@ -101,7 +101,7 @@ def with_options(value: Any, schema: Schema) -> Iterator[tuple[Any, Place]]:
             continue
         for name, part in place.schema.get("properties", {}).items():
             if name not in place.value:
-                added = _with_known(minimal(part), known)
+                added = _with_known(sample(part), known)
                 whole = replaced(value, place.path, {**place.value, name: added})
                 yield whole, Place((*place.path, name), added, flat(part))
 

@@ -1,6 +1,5 @@
 """Methods: those that a resource has, those that it lacks, and the Allow field (RFC 9110 9, 10.2.1, 15.5.6)."""
 
-from http import HTTPStatus
 from typing import cast
 
 import pytest
@@ -24,19 +23,16 @@ _STANDARD = ("GET", "PUT", "POST", "DELETE", "PATCH", "HEAD")
 _UNKNOWN = ("PROPFIND", "FOO")
 # How often the lengths of GET and HEAD are compared: the numbers in a resource have more digits or fewer each time.
 _LENGTHS = 8
-# As many resources are named in one finding.
-_LISTED = 12
-_ALWAYS_ALLOWED = frozenset({"HEAD", "OPTIONS", "TRACE"})
 
 
 def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
     """Return each resource with a valid request for it, without optional resources that this robot lacks.
 
-    Of an API that is known by its description alone, resources with an operation that may be called.
+    Each has an operation that may be called.
     """
     found = []
     for resource in resources_of(api.run.contract):
-        if api.run.contract.described and not any(allowed(api, item) for item in resource.operations.values()):
+        if not any(allowed(api, item) for item in resource.operations.values()):
             continue
         first = _found(api, resource) or example_call(api, next(iter(resource.operations.values())))
         # Only the address is used: a request with a body, or one that moves the robot, is never sent from here.
@@ -50,7 +46,7 @@ def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
 
 
 def _found(api: RestInterface, resource: Resource) -> Call | None:
-    """Return a request for a resource of a described API with ids of something that the survey has found there."""
+    """Return a request for a resource with ids of something that the survey has found there."""
     own = (api.working[item.label] for item in resource.operations.values() if item.label in api.working)
     if call := next(own, None):
         return cast("Call", call)
@@ -65,25 +61,22 @@ def _found(api: RestInterface, resource: Resource) -> Call | None:
 
 @pytest.mark.requirement("http/method-not-allowed", "http/allow", "http/allow-agrees")
 def test_methods_that_a_resource_has_not(api: RestInterface, judge: Judge) -> None:
-    """Send to each resource each method that the contract does not define for it: the robot must respond 405."""
-    seen: list[tuple[Resource, Exchange]] = []
+    """Send to each resource each method that the contract does not define for it: the robot must respond 405.
+
+    A checker judges Allow.
+    """
+    is_refused = api.run.contract.demands("http/method-not-allowed")
     for resource, call in _resources(api):
         # A further method that the resource allows is the vendor's own, and may do anything: it is not sent.
         there = {*resource.methods, *(("HEAD",) if "GET" in resource.methods else ())}
-        if api.run.contract.described:
-            # A method that the description does not have may act all the same; a safe one does not (RFC 9110 9.2.1).
-            there |= set(_STANDARD) - SAFE
-        else:
-            there |= _named(call.send(api, method="OPTIONS"))
+        # Unless it has to be refused, such a method may act all the same; a safe one does not (RFC 9110 9.2.1).
+        there |= _named(call.send(api, method="OPTIONS")) if is_refused else set(_STANDARD) - SAFE
         lacking = [name for name in _STANDARD if name not in there]
         sendable = permitted(api.run, api.client, lacking, call.path, "http/method-not-allowed", "http/allow")
         for method in api.run.effort.subsample(sendable, 2):
             exchange = call.send(api, method=method)
             cause = f"{method} {exchange.response.status}"
-            refused = expect(judge, "http/method-not-allowed", exchange).status(405, cause=cause)
-            if refused and _judge_allow(judge, "http/allow", exchange):
-                seen.append((resource, exchange))
-    _judge_agreement(api, judge, seen)
+            expect(judge, "http/method-not-allowed", exchange).status(405, cause=cause)
 
 
 @pytest.mark.requirement("http/unknown-method", "http/unknown-method-refused")
@@ -100,25 +93,18 @@ def test_methods_that_nobody_knows(api: RestInterface, judge: Judge) -> None:
                     raise
                 attempt = none.unanswered
             expect(judge, "http/unknown-method-refused", attempt).status("4xx", 501, closed=True, cause=method)
-            # Which refusal it is, a described API need not choose: its server's parser may answer 400 first.
-            refusals = ("4xx", 501) if api.run.contract.described else (405, 501)
+            # Unless a contract demands more, the server's parser may answer 400 first.
+            refusals = (405, 501) if api.run.contract.demands(ids[1]) else ("4xx", 501)
             expect(judge, "http/unknown-method", attempt).status(*refusals, cause=method)
 
 
 @pytest.mark.requirement("http/options", "http/allow", "http/allow-agrees", "description/allow")
 def test_options(api: RestInterface, judge: Judge) -> None:
-    """Send OPTIONS to each resource and judge the Allow header."""
-    seen: list[tuple[Resource, Exchange]] = []
-    for resource, call in _resources(api):
+    """Send OPTIONS to each resource; a checker judges what Allow names."""
+    for _, call in _resources(api):
         exchange = call.send(api, method="OPTIONS")
-        if exchange.response.status == HTTPStatus.METHOD_NOT_ALLOWED and api.run.contract.described:
-            there = _judge_allow(judge, "http/allow", exchange)
-        else:
-            expected = expect(judge, "http/options", exchange).status(200, 204)
-            there = expected and _judge_allow(judge, "http/options", exchange)
-        if there:
-            seen.append((resource, exchange))
-    _judge_agreement(api, judge, seen)
+        if expect(judge, "http/options", exchange).status(200, 204):
+            expect(judge, "http/options", exchange).header("Allow")
     # What is still there now, was there when it was asked (checkers.resources).
     for call in [call for call in api.working.values() if call.operation.method == "GET"]:
         if call.operation.parameter("path") and call.operation.label not in api.streams:
@@ -128,41 +114,6 @@ def test_options(api: RestInterface, judge: Judge) -> None:
 def _named(exchange: Exchange) -> set[str]:
     """Return the methods that Allow names."""
     return {name.strip() for name in (exchange.response.header("allow") or "").split(",")} - {""}
-
-
-def _judge_allow(judge: Judge, requirement: str, exchange: Exchange) -> bool:
-    """Judge whether Allow is there."""
-    return expect(judge, requirement, exchange).header("Allow")
-
-
-def _judge_agreement(api: RestInterface, judge: Judge, seen: list[tuple[Resource, Exchange]]) -> None:
-    """Judge whether each Allow names what the contract gives its resource, and not the method that got 405.
-
-    A framework that leaves methods out does so for every resource, which is one finding.
-    """
-    described = api.run.contract.described
-    wrong: list[tuple[Resource, Exchange]] = []
-    for resource, exchange in seen:
-        named, wanted = _named(exchange), set(resource.methods) - _ALWAYS_ALLOWED
-        is_refused = exchange.response.status == HTTPStatus.METHOD_NOT_ALLOWED
-        refused = {exchange.request.method} - _ALWAYS_ALLOWED if is_refused else set()
-        besides = sorted(named - wanted - _ALWAYS_ALLOWED)
-        declared, found = f"Allow: {', '.join(sorted(wanted))}, as declared", f"{', '.join(besides)} besides"
-        expect(judge, "description/allow", exchange).that(not besides, declared, found, cause=found)
-        if wanted <= named and not refused & named:
-            expect(judge, "http/allow-agrees", exchange).that(holds=True, expected="Allow with all methods")
-        else:
-            wrong.append((resource, exchange))
-    for resource, exchange in wrong[:1] if described else wrong:
-        wanted = set(resource.methods) - _ALWAYS_ALLOWED
-        others = [other.template for other, _ in wrong[1:]] if described else []
-        more = f". The same for {len(others)} other resources: {', '.join(others[:_LISTED])}" if others else ""
-        expect(judge, "http/allow-agrees", exchange).that(
-            holds=False,
-            expected=f"Allow: {', '.join(sorted(wanted))} (others may stand beside them, but none that got 405)",
-            got=f"Allow: {exchange.response.header('allow')}{more}",
-            cause="methods left out" if described else resource.template,
-        )
 
 
 def _formats(call: Call, most: int) -> list[str]:

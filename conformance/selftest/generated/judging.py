@@ -102,15 +102,15 @@ class _Control:
         return frozenset(id_ for id_, refuted in self._known.get(effort, {}).items() if refuted)
 
     def without(
-        self, ids: tuple[str, ...], robot: Robot, proxy: Proxy, effort: str, *, described: bool = False
+        self, ids: tuple[str, ...], robot: Robot, proxy: Proxy, effort: str, *, at_once: bool = False
     ) -> tuple[str, ...]:
         """Return those of the given requirements that the unchanged device passes; each is tried on it once.
 
-        Of a ``described`` device all are tried at once.
+        With ``at_once``, all are tried in one run.
         """
         with self._lock:
             known = self._known.setdefault(effort, {})
-            if described and not known:
+            if at_once and not known:
                 # Alone, a requirement sees less than in a whole run: of what every check sends, observers see all.
                 proxy.change = unchanged
                 outcome = run_job(job_for(robot, proxy, effort, self._seed))
@@ -139,10 +139,9 @@ def _judge(
 ) -> GeneratedResult:
     result = GeneratedResult(mutant)
     tally = Tally()
-    # Any requirement ends a run on a described device: what else it does not keep is of no use.
-    musts = frozenset(
-        id_ for id_, requirement in contract.ledger.items() if contract.described or requirement.level is Level.MUST
-    )
+    # Any requirement ends a run on a device that claims no contract: what else it does not keep is of no use.
+    claims_none = not contract.has_own_requirements
+    musts = frozenset(id_ for id_, item in contract.ledger.items() if claims_none or item.level is Level.MUST)
     given_up = False
     claimed = statement_of(job_for(robot, proxy, efforts[0], seed), contract).claimed(contract)
     attempts = tuple(_attempts(contract, mutant, claimed))
@@ -161,11 +160,11 @@ def _judge(
         if proxy.broken:
             result.outcome, result.reason = BROKEN, proxy.broken[0]
             return result
-        if shown := control.without(outcome.not_passed(), robot, proxy, effort, described=contract.described):
+        if shown := control.without(outcome.not_passed(), robot, proxy, effort, at_once=claims_none):
             _note(result, outcome, shown)
             return result
         # The good device does not pass what ended the run, which is known by now: once more, to its end.
-        ended_by = frozenset(outcome.not_passed()) if contract.described else outcome.fails
+        ended_by = frozenset(outcome.not_passed()) if claims_none else outcome.fails
         if outcome.exit_code < 0 or not (ended_by & musts) - known:
             waiting.pop(0)
     result.outcome = GIVEN_UP if given_up else SURVIVED if tally.altered else NOT_REACHED
@@ -181,9 +180,9 @@ def _note(result: GeneratedResult, outcome: Outcome, by: tuple[str, ...]) -> Non
 def _attempts(contract: Contract, mutant: GeneratedMutant, claimed: tuple[str, ...]) -> Iterator[Attempt]:
     """Yield what to judge a mutant by: first the requirements that name its operation, then whole classes.
 
-    A described device's classes are judged all at once: its mutants may be noticed by any of them.
+    The classes of a device that claims no contract are judged all at once: any may notice its mutants.
     """
-    if contract.described:
+    if not contract.has_own_requirements:
         yield claimed, ()
         return
     classes = tuple(class_ for class_ in mutant.classes if class_ in claimed)

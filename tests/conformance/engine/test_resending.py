@@ -53,7 +53,7 @@ def _sent_again(monkeypatch, run, answer=_GOOD):
     stopped = []
     monkeypatch.setattr(resending, "send_again", lambda request, _: Exchange(request, answer))
     monkeypatch.setattr(resending, "stop_device", stopped.append)
-    look_again(run, Connection(), SimpleNamespace())
+    look_again(run, Connection(), SimpleNamespace(client=SimpleNamespace(base_url="http://robot")))
     return next(iter(run.judge.evidence["http/head"].findings.values())).again, bool(stopped)
 
 

@@ -1,8 +1,8 @@
 import pytest
 
-from conformance.api.rest.calls import minimal
 from conformance.api.rest.json_mutations import KINDS, is_invalid, mutations, near_misses
 from conformance.api.rest.parameters import wrong_texts
+from conformance.api.rest.samples import sample
 from conformance.api.rest.xml_mutations import xml_mutations
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import shape_of
@@ -47,9 +47,9 @@ def test_xml_mutations_are_invalid_and_the_plain_form_is_not_among_them():
 
 
 @pytest.mark.parametrize("operation", TAKING, ids=lambda item: item.id)
-def test_minimal_values_are_valid(operation):
+def test_sample_values_are_valid(operation):
     schema = operation.bodies["application/json"].schema
-    assert not shape_of(schema).problem(minimal(schema))
+    assert not shape_of(schema).problem(sample(schema))
 
 
 def test_wrong_texts_of_numbers_and_codes():
