@@ -62,7 +62,7 @@ class Winch(Device):
         self._x, self._since = self._x + self._speed * (now - self._since), now
         if self._speed and self._fault == "silent":
             self._gone.wait(60)
-        if name == "Stop" and self._speed and self._fault == "refuses":
+        if name != "GetState" and self._speed and self._fault == "refuses":
             return None
         if name == "Stop" and self._fault != "ignores":
             self._speed = 0.0

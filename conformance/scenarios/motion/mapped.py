@@ -218,6 +218,20 @@ class MappedDevice:
             return None
         return self._sent(made, {}, timeout_s=max(_STOP_S, stop.rests_within_s))
 
+    def halt(self) -> Command | None:
+        """Send the stop, and velocity 0 as well where that is refused: one that names a move is, if none goes on.
+
+        Returns:
+            The stop; None: there is none that can be sent.
+
+        Raises:
+            NoAnswerError: there is no response.
+        """
+        command = self.stop()
+        if command is not None and command.refused and self.motion.stop and self.motion.velocity:
+            self.drive({})
+        return command
+
     def watch(self, until: float, is_over: Callable[[list[Reading]], object] = lambda _: False) -> list[Reading]:
         """Read until a time, s of the clock, and once more after it, or until ``is_over``."""
         readings: list[Reading] = []
@@ -287,7 +301,7 @@ class MappedDevice:
         if self.motion.goto is None:
             self.come_to_rest()
             return
-        self.stop()
+        self.halt()
         self.go("home", {})
         if not self.is_near(self.where(), self.home):
             raise NotPossibleError("the device does not come back to the position from which the suite begins")
@@ -296,7 +310,7 @@ class MappedDevice:
         """Stop what goes on, and see that the device rests; return why it may still move, or an empty text."""
         problem = ""
         try:
-            command = self.stop()
+            command = self.halt()
             if command is None:
                 problem = "the motion map has no stop that can be sent"
             elif not command.accepted:
@@ -309,7 +323,8 @@ class MappedDevice:
             return problem
         try:
             # A stop that was not accepted is soon sent again.
-            self.come_to_rest(stop=False, within_s=0.0 if problem else None)
+            velocity = self.motion.velocity
+            self.come_to_rest(stop=False, within_s=(velocity.settle_s if velocity else 0.0) if problem else None)
         except (NotPossibleError, NotPermittedError) as error:
             return "; ".join(filter(None, (problem, str(error))))
         except NoAnswerError as none:
@@ -332,13 +347,15 @@ class MappedDevice:
             NoAnswerError: there is no response.
         """
         if stop:
-            self.stop()
+            self.halt()
         rests_s = max(_RESTS_S, self.motion.stop.rests_within_s if self.motion.stop else 0.0)
         until = self.clock.now() + (rests_s if within_s is None else within_s)
-        while self.clock.now() <= until:
+        while True:
             before = self.where()
             seen = self.watch(self.clock.now() + STAYS_S)
             stays = self.is_near(self.where(), before) if before else any(one.speeds for one in seen)
             if stays and not fastest(seen, self.motion):
                 return
+            if self.clock.now() > until:
+                break
         raise NotPossibleError(f"the device does not come to rest, as {self.motion.state.read} shows")

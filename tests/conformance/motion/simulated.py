@@ -82,7 +82,7 @@ def map_of(text):
     return msgspec.convert(tomllib.loads(text)["motion"], MotionMap)
 
 
-def played(name, mutant=None, *, noise=0.0, seed=0, takes_s=lambda: 0.002, toml=""):
+def played(name, mutant=None, *, noise=0.0, seed=0, takes_s=lambda: 0.002, toml="", effort=""):
     """Yield what a device is recorded to do: scenario, trace, and what rules may ask for; ``toml``: another map."""
     device, limits, _ = DEVICES[name]
     clock = SimulatedClock()
@@ -94,8 +94,8 @@ def played(name, mutant=None, *, noise=0.0, seed=0, takes_s=lambda: 0.002, toml=
     binding = SoapBinding(api, dome.messages_of()) if name == "dome" else None
     mapped = MappedDevice(api, motion, clock, binding)
     # Making and reading XML takes most of the time of a camera's run.
-    effort = Effort("quick" if name == "dome" else "standard")
-    given = {"mapped": mapped, "effort": effort, "run": Run(seed=seed), "motion": motion, "body": body}
+    chosen = Effort(effort or ("quick" if name == "dome" else "standard"))
+    given = {"mapped": mapped, "effort": chosen, "run": Run(seed=seed), "motion": motion, "body": body}
     for scenario in _PLAYED:
         try:
             with patch.object(several, "send_together", one_after_another):
