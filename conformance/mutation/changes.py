@@ -143,6 +143,11 @@ def instead(where: Where, response: Callable[[Request], Response]) -> Make:
     return make
 
 
+def always(change: Change) -> Make:
+    """Return a change that remembers nothing, for any run."""
+    return lambda: change
+
+
 def hanging_up(where: Where) -> Make:
     """Return a change that closes the connection instead of responding."""
 

@@ -9,11 +9,17 @@ A row ends with an operator that makes the change, or decorates the change if th
 
     @_mutant("goal-lingers", "goal-ended", "GET goes on returning a goal that has ended.")
     class _Lingering: ...
+
+Rows whose change is made of words alone are data: see read_rows().
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import ast
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeVar
 
 from conformance.mutation.changes import Make, When, Where, altered, instead, rewritten, success, values
@@ -108,3 +114,47 @@ class Row:
     def instead(self, where: Where, response: Callable[[Request], Response]) -> None:
         """Answer requests in place of the device."""
         self.made(instead(where, response))
+
+
+def read_rows(path: Path, words: Mapping[str, Mapping[str, Any]]) -> Iterator[Mutant]:
+    """Yield the mutants of a TOML file, whose rows name where, which operator, when, and which requirements notice.
+
+    ``goal-none-empty = ["goal-none", "Without a goal, GET returns 204.", "altered(GET, becomes(204), status(404))"]``
+    in the table ``[module.interface.class]``; a fourth part has further attributes of Mutant.
+
+    Args:
+        path: of the file.
+        words: what the changes may name, by module.
+
+    Raises:
+        KeyError: a change names something else.
+        ValueError: a change is made of more than words, calls and literal values.
+    """
+    for module, interfaces in tomllib.loads(path.read_text(encoding="utf-8")).items():
+        for interface, classes in interfaces.items():
+            for class_, rows in classes.items():
+                add = Table().of_class(class_, interface)
+                for name, (requirements, says, change, *more) in rows.items():
+                    named = requirements if isinstance(requirements, str) else tuple(requirements)
+                    row = add(name, named, says, **(more[0] if more else {}))
+                    row.made(_value(ast.parse(change, mode="eval").body, words[module]))
+                    yield row.mutant()
+
+
+def _value(node: ast.expr, words: Mapping[str, Any]) -> Any:
+    """Return the value of an expression of words, calls and literal values."""
+    found: Any
+    match node:
+        case ast.Name():
+            found = words[node.id]
+        case ast.Attribute(value=ast.Name(id=module)) if isinstance(words[module], ModuleType):
+            found = getattr(words[module], node.attr)
+        case ast.Call():
+            named = {one.arg: _value(one.value, words) for one in node.keywords if one.arg}
+            found = _value(node.func, words)(*(_value(one, words) for one in node.args), **named)
+        case ast.Tuple() | ast.List():
+            values = [_value(one, words) for one in node.elts]
+            found = values if isinstance(node, ast.List) else tuple(values)
+        case _:
+            found = ast.literal_eval(node)
+    return found

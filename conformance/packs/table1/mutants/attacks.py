@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
-from conformance.mutation.changes import Where, hanging_up, plain, posted
+from conformance.mutation.changes import Where, posted
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import TNS
@@ -173,15 +173,8 @@ class _Exhausted:
         return forward(request)
 
 
-_mutant("attack-doctype-fine", "doctype", "A document type declaration is ignored.").rewritten(
-    _declared, _plain_doctype
-)
-_mutant("attack-entity-expanded", "internal-entity", "Internal entities are expanded.").rewritten(_declared, _expanded)
 _mutant("attack-file-leaked", "external-entity", "The file of an external entity appears in the fault.").made(
     _quoting(lambda body: [url for _, url in _EXTERNAL.findall(body)])
-)
-_mutant("attack-dtd-fetched", "parameter-entity", "An external DTD or parameter entity is fetched.").made(
-    _calling(_doctype_urls)
 )
 _mutant("attack-expansion-fine", "expansion", "Exponentially expanding entities return a normal response.").rewritten(
     _posting(lambda body: body.count(b"<!ENTITY") > 2), _undeclared
@@ -189,9 +182,6 @@ _mutant("attack-expansion-fine", "expansion", "Exponentially expanding entities 
 _mutant(
     "attack-quadratic-fine", "quadratic", "A long entity that is used many times returns a normal response."
 ).rewritten(_posting(lambda body: 0 < body.count(b"<!ENTITY") <= 2 and body.count(b"&") > 50), _undeclared)
-_mutant("attack-depth-crash", "depth", "Deeply nested XML ends the process that reads it.").made(hanging_up(_nested))
-_mutant("attack-depth-bad-gateway", "depth", "Deeply nested XML returns 502.").instead(_nested, plain(502))
-_mutant("attack-depth-fine", "depth", "Deeply nested XML returns 200.").instead(_nested, _DONE)
 _mutant("attack-attributes-fine", "attributes", "Thousands of attributes return 200.").instead(
     _posting(lambda body: body.count(b'="') > 5000), _DONE
 )
@@ -206,7 +196,4 @@ _mutant("attack-bomb-unpacked", "compressed", "A compressed message of any size 
 )
 _mutant("attack-instruction-fine", "processing-instruction", "Processing instructions are ignored.").rewritten(
     posted, lambda request: setattr(request, "body", _INSTRUCTION.sub(b"", request.body))
-)
-_mutant("attack-rest-fine", "rest", "A document type declaration in a REST body is ignored.", interface="rest").instead(
-    _rest_xml, plain(204)
 )

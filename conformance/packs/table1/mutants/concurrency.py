@@ -18,7 +18,6 @@ _order = MUTANTS.of_class("soap-delivery", "soap")
 _resource = MUTANTS.of_class("rest-resources", "rest")
 _mutant = MUTANTS.of_class("http", "rest")
 _message = MUTANTS.of_class("equivalence", "both", observer=True)
-_state = MUTANTS.of_class("soap-subscribers", "soap")
 
 # How long an answer waits for another one to be mixed up with, s.
 _MEETS_S: Final = 0.05
@@ -188,17 +187,6 @@ _EMPTY = plain(204)
 _SOAP_DELIVERY = soap("ExecuteDeliveryRequest")
 _ACCEPTED = enveloped(f'<t:ExecuteDeliveryRequestResponse xmlns:t="{TNS}"/>')
 
-_mutant("clients-crossed", "concurrent-answers", "Two concurrent clients get each other's responses.").made(
-    _mixed(_exchanged)
-)
-_mutant(
-    "clients-crossed-seldom",
-    "concurrent-answers",
-    "In one case of fifty, two concurrent clients get each other's responses.",
-).made(_mixed(_exchanged, 50))
-_mutant("clients-one-buffer", "concurrent-answers", "Concurrent responses get the same body.").made(
-    _mixed(_repeated, 10)
-)
 _mutant(
     "http-pipelining-backwards",
     "web-server/pipelining",
@@ -212,12 +200,6 @@ _message("clients-delivery-lost-seldom", "delivery-concurrent", "Every 50th conc
     when_crowded(deliveries, lambda request, _: _EMPTY(request), 50)
 )
 _message(
-    "clients-delivery-doubled", "delivery-concurrent", "A REST delivery during another one is published twice."
-).made(when_crowded(deliveries, _twice))
-_message("clients-delivery-shared-field", "delivery-concurrent", "Concurrent deliveries share one source_y.").made(
-    when_crowded(deliveries, _with_another_source)
-)
-_message(
     "clients-soap-delivery-lost", "delivery-concurrent", "A SOAP delivery during another one succeeds and is lost."
 ).made(when_crowded(_SOAP_DELIVERY, lambda request, _: _ACCEPTED(request)))
 _resource(
@@ -226,26 +208,9 @@ _resource(
 _resource("clients-goal-conflict", "goal-concurrent", "Two clients that send the same goal concurrently get 409.").made(
     when_crowded(_PUT_GOAL, lambda request, _: problem(409, "goal_id.id: in use")(request), 2)
 )
-_resource("clients-goal-of-two", "concurrent-puts", "Two goals that are sent concurrently get the same pose.").made(
-    lambda: _Blended(_PUT_GOAL, "goal")
-)
 _resource("clients-velocity-lost", "concurrent-puts", "Concurrent velocity commands are lost.").made(
     when_crowded(_PUT_VELOCITY, lambda request, _: _EMPTY(request))
 )
-_resource(
-    "clients-velocity-of-two",
-    "concurrent-puts",
-    "Of concurrent velocity commands, the robot uses the linear part of one and the angular part of another.",
-).made(lambda: _Blended(_PUT_VELOCITY, "angular"))
-_mutant("clients-one-served", "concurrent-served", "While a read is answered, every other client gets 503.").made(
-    _OneServed
-)
-_order("clients-soap-crossed", "concurrent-answers", "Two concurrent SOAP deliveries get each other's responses.").made(
-    lambda: _Mixed(posted, _exchanged, 1)
-)
-_state(
-    "clients-soap-states-crossed", "concurrent-answers", "Two concurrent SOAP clients get each other's responses."
-).made(lambda: _Mixed(posted, _exchanged, 1))
 _order("soap-small-messages", "size", "A message over 32 KiB returns 413.").instead(
     lambda request: posted(request) and len(request.body) > _SMALL, problem(413, "too large")
 )

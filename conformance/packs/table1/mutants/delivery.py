@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable
 
-from conformance.mutation.changes import JSON, becomes, hanging_up, page, plain, problem, rest
+from conformance.mutation.changes import problem, rest
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import DELIVERIES, deliveries
@@ -76,10 +76,6 @@ class OnlyOnce:
         return forward(request)
 
 
-_mutant("delivery-only-once", "put-repeated", "Sending the same delivery again returns 409.").made(
-    lambda: OnlyOnce(problem(409, "code: this delivery was accepted before"))
-)
-_mutant("delivery-crashes", "put", "PUT of a delivery returns 500.").altered(deliveries, becomes(500))
 _mutant("delivery-coffee-unknown", "put", "PUT of a coffee (code 4) returns 404.").instead(
     lambda request: deliveries(request) and request.path.split("/")[_CODE] == "4", problem(404, "code: 4 is not known")
 )
@@ -94,33 +90,6 @@ _mutant(
     "list",
     "The entries of the list of deliveries have a state that the contract does not have.",
 ).json(_LIST, lambda entries: [{**entry, "state": "lost"} for entry in entries])
-_mutant("delivery-silent", "put", "The robot accepts a delivery and closes the connection without responding.").made(
-    hanging_up(deliveries)
-)
-_mutant("delivery-sometimes-lost", "put-range", "One delivery in 50 returns 500.").altered(
-    deliveries, becomes(500), nth=50
-)
-_mutant("delivery-talks", "put-no-content", "PUT of a delivery returns 200 with a body.").altered(
-    deliveries, page(200, b'{"accepted":true}', JSON)
-)
-_mutant("delivery-positive-only", "put-range", "The robot refuses negative coordinates.").instead(
-    _written(r"-.*"), problem(422, "depot_x: negative")
-)
-_mutant("delivery-no-exponents", "put-range", "The robot refuses numbers with an exponent.").instead(
-    _written(r"[+-]?[\d.]+[eE].*"), problem(422, "depot_x: no number")
-)
 _mutant("delivery-wants-no-body", "put-body", "The robot refuses a delivery with a request body.").instead(
     lambda request: deliveries(request) and bool(request.body), problem(415, "a body is not expected")
-)
-_mutant("delivery-text-is-zero", "refuses-text", "The robot reads letters in place of a number as 0.").rewritten(
-    deliveries, segments(lenient)
-)
-_mutant("delivery-takes-nan", "refuses-non-finite", "The robot accepts NaN and Infinity.").rewritten(
-    deliveries, segments(finite)
-)
-_mutant("delivery-takes-any-code", "refuses-code", "The robot accepts every message code.").rewritten(
-    deliveries, segments(any_code)
-)
-_mutant("delivery-swallows", "refuses-text", "The robot accepts anything in a delivery's path.").instead(
-    deliveries, plain(204)
 )

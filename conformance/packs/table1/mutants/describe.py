@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from copy import deepcopy
 from typing import Any
 
-from conformance.mutation.changes import Make, altered, plain, problem, rest, text
+from conformance.mutation.changes import Make, altered, rest
 from conformance.mutation.fields import each as both
 from conformance.mutation.fields import field, without
 from conformance.mutation.table import Table
@@ -65,9 +65,6 @@ _mutant("openapi-without-method", "openapi-operations", "/openapi.json lacks a m
 _mutant("openapi-without-parameter", "openapi-operations", "/openapi.json lacks a parameter.").json(
     _OPENAPI, field(f"paths.{PLAN}.get.parameters", lambda all_: [one for one in all_ if one.get("name") != "y"])
 )
-_mutant("openapi-promises", "openapi-behaviour", "/openapi.json describes a path that does not exist.").json(
-    _OPENAPI, field("paths./robot/arm/", {"get": {"responses": {"200": {"description": "the arm"}}}})
-)
 _mutant("openapi-other-default", "openapi-operations", "/openapi.json names another default of a parameter.").json(
     _OPENAPI,
     field(f"paths.{PLAN}.get.parameters", lambda all_: [{**one, "schema": _defaulted(one["schema"])} for one in all_]),
@@ -84,31 +81,6 @@ _mutant("openapi-other-name", "openapi-answers", "/openapi.json requires a field
 _mutant("openapi-invalid", "openapi", "/openapi.json is not a valid OpenAPI document.").json(
     _OPENAPI, both(without("info"), field("paths", list))
 )
-_mutant("openapi-gone", "openapi", "GET of /openapi.json returns 404.").instead(
-    _OPENAPI, problem(404, "no description")
-)
-_mutant("openapi-yaml", "openapi", "/openapi.json is YAML.").instead(
-    _OPENAPI, plain(200, b"openapi: 3.1.0\npaths: {}\n", "application/yaml")
-)
-_mutant("openapi-resource-lost", "openapi-behaviour", "A resource of the contract returns 404.").instead(
-    rest("", SENSORS), problem(404, "nothing is here")
-)
-_mutant("wadl-gone", "wadl", "GET of /application.wadl returns 404.").instead(_WADL, problem(404, "no description"))
-_mutant("wadl-broken", "wadl", "The last end tag of /application.wadl is missing.").altered(
-    _WADL, text(r"</[\w:]+>\s*$", "")
-)
-_mutant("wadl-promises", "wadl-behaviour", "/application.wadl describes a resource that does not exist.").xml(
-    _WADL, each("resource", _promised_twice, slice(0, 1))
-)
-_mutant("wadl-without-resource", "wadl-resources", "/application.wadl lacks a resource.").made(
-    _lost("resource", "path", "sensors/?$")
-)
 _mutant("wadl-other-default", "wadl-resources", "/application.wadl names another default of a parameter.").xml(
     _WADL, each("param", lambda node: node.set("default", "0.5") if node.get("name") == "tolerance" else None)
-)
-_mutant("wadl-without-method", "wadl-resources", "/application.wadl lacks a method.").made(
-    _lost("method", "name", "^DELETE$")
-)
-_mutant("wadl-without-parameter", "wadl-resources", "/application.wadl lacks a parameter.").made(
-    _lost("param", "name", "^(source_)?y$")
 )

@@ -4,11 +4,11 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import Make, When, altered, header, problem, rest, secretly, success, text
+from conformance.mutation.changes import Make, When, altered, problem, rest, secretly, success
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
-from conformance.mutation.xml_trees import each, named, says, tree
-from conformance.packs.table1.mutants.paths import GOAL, LINEAR, POSE, VELOCITY
+from conformance.mutation.xml_trees import named, tree
+from conformance.packs.table1.mutants.paths import GOAL, LINEAR, VELOCITY
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("rest-formats", "rest")
@@ -97,34 +97,11 @@ def _json_problem(response: Response) -> None:
         response.put("Content-Type", "application/problem+json")
 
 
-_mutant("format-xml-by-default", "json-default", "A request without Accept gets XML.").rewritten(_GET, _any_is_xml)
-_mutant("format-xml-broken", "xml", "The last end tag of XML responses is missing.").altered(
-    _GET, text(r"</\w+>\s*$", ""), _XML
-)
-_mutant("format-xml-as-html", "xml", "XML responses have the media type text/html.").altered(
-    _GET, header("Content-Type", "text/html; charset=utf-8"), _XML
-)
-_mutant("format-xml-item-missing", "same-values", "XML responses lack the last item of an array.").altered(
-    _GET, tree(_shortened), _XML
-)
 _mutant("format-xml-root", "xml-root", "The root element of XML responses is always <response>.").altered(
     _GET, tree(lambda root: setattr(root, "tag", "response")), _XML
 )
 _mutant("format-xml-stray", "xml", "In XML responses text stands between the fields.").altered(
     _GET, tree(lambda root: setattr(root, "text", "ok")), _XML
-)
-_mutant("format-text-unreadable", "text", "Plain text responses are not YAML.").altered(_GET, _as_properties, _TEXT)
-_mutant("format-text-as-octets", "text", "Plain text responses have the media type application/octet-stream.").altered(
-    _GET, header("Content-Type", "application/octet-stream"), _TEXT
-)
-_mutant("format-xml-rounded", "same-values", "XML responses round numbers to one digit.").altered(
-    _GET, tree(_rounded), _XML
-)
-_mutant("format-text-rounded", "same-values", "Plain text responses round small numbers to 0.0.").altered(
-    rest("GET", POSE), text(r"0\.0\d+", "0.0"), _TEXT
-)
-_mutant("format-text-without-frame", "same-values", "Plain text responses lack child_frame_id.").altered(
-    rest("GET", POSE), text(r"child_frame_id:[^\n]*\n", ""), _TEXT
 )
 _mutant("format-q-ignored", "q-values", "The robot ignores quality values in Accept.").rewritten(
     _GET, _accept(lambda given: re.sub(r"\s*;\s*q=0?\.[0-9]+", "", given))
@@ -132,8 +109,6 @@ _mutant("format-q-ignored", "q-values", "The robot ignores quality values in Acc
 _mutant(
     "format-wildcard-wins", "specific-range", "In Accept, a wildcard takes precedence over a specific media type."
 ).rewritten(_GET, _accept(lambda given: "*/*" if re.search(r"\*/\*(?!\s*;\s*q=0(\.0*)?\s*(,|$))", given) else given))
-_mutant("format-no-vary", "vary", "Responses have no Vary header.").altered(_GET, header("Vary", None))
-_mutant("format-vary-sometimes", "vary", "XML responses have no Vary header.").altered(_GET, header("Vary", None), _XML)
 _mutant("format-charset-wrong", "charset", "XML and text responses in UTF-8 declare charset=utf-16.").altered(
     _GET, lambda answer: answer.put("Content-Type", f"{answer.media_type}; charset=utf-16")
 )
@@ -143,23 +118,11 @@ _mutant(
 _mutant("format-large-xml", "xml-input", "XML bodies over 32 KiB return 413.").instead(
     lambda request: _xml_put(request) and len(request.body) > _SMALL, problem(413, "too large")
 )
-_mutant("format-xml-id-lost", "xml-input", "A goal that is sent as XML gets another id.").rewritten(_xml_put, _no_id)
 _mutant(
     "format-xml-velocity-unsigned",
     "rest-resources/velocity-converges",
     "A velocity that is sent as XML is obeyed without its signs.",
 ).made(secretly(lambda request: _xml_put(request) and request.path == VELOCITY, _unsigned))
-_mutant(
-    "format-text-unquoted",
-    "text-quoted",
-    "Plain text responses never quote ids, so that YAML may read them as other types.",
-).altered(_GET, text(r"(?m)^(\s*id: )['\"]([^'\"\\]*)['\"]", r"\1\2"), _TEXT)
-_mutant("format-text-null", "text-quoted", "Plain text responses do not quote the ids null and true.").altered(
-    _GET, text(r"(?m)^(\s*id: )['\"](null|true)['\"]", r"\1\2"), _TEXT
-)
-_mutant("format-xml-whole-seconds", "same-values", "In XML, the pose's stamp has nanosec 0.").xml(
-    rest("GET", POSE), each("nanosec", says("0")), _XML
-)
 _mutant(
     "format-problems-in-json", "problem-xml", "Errors of GET are JSON although the client accepts only XML."
 ).altered(_GET, _json_problem, lambda response: response.status >= 400)

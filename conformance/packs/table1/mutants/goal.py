@@ -5,23 +5,19 @@ from collections.abc import Callable
 from typing import Any
 
 from conformance.mutation.changes import (
-    JSON,
     Make,
     altered,
-    becomes,
     guarded,
     inputs,
-    page,
     parsed,
     plain,
     problem,
     rest,
     status,
     success,
-    unwanted,
     values,
 )
-from conformance.mutation.fields import field, plus, swapped, without
+from conformance.mutation.fields import field
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.goal_memory import active, identity, pose_of
@@ -127,21 +123,6 @@ def _turned(by: float) -> Callable[[Any], None]:
     return edit
 
 
-_mutant(
-    "goal-beside",
-    "goal-drives",
-    "The robot stops 80 cm beside the goal, and GET returns the goal that the client sent.",
-).made(_driven_to(field(_X, plus(0.8)), field(_X, plus(-0.8))))
-_mutant(
-    "goal-beside-a-little",
-    "goal-drives",
-    "The robot stops 29 cm beside the goal, and GET returns the goal that the client sent.",
-).made(_driven_to(field(_X, plus(0.29)), field(_X, plus(-0.29))))
-_mutant(
-    "goal-heading-off",
-    "goal-drives",
-    "The robot arrives with a heading 0.6 rad beside the goal's, and GET returns the goal that the client sent.",
-).made(_driven_to(_turned(0.6), _turned(-0.6)))
 _mutant("goal-outcome-untold", "goal-outcome", "The 404 after a goal does not say how the goal ended.").json(
     _GET, lambda told: told.pop("last_goal", None), status(404)
 )
@@ -151,30 +132,8 @@ _mutant("goal-outcome-always-success", "goal-outcome", "A cancelled goal is repo
 _mutant("goal-put-rounded", "goal-put", "The response to a goal's PUT rounds its position to 0.1 m.").json(
     _PUT, _guarded(field(_X, lambda x: round(x, 1)))
 )
-_mutant("goal-get-swapped", "goal-get", "GET returns the goal with x and y swapped.").json(_GET, swapped(_X, _Y))
-_mutant("goal-none-empty", "goal-none", "Without a goal, GET returns 200 with null.").altered(
-    _GET, page(200, b"null", JSON), status(404)
-)
-_mutant("goal-none-no-content", "goal-none", "Without a goal, GET returns 204.").altered(
-    _GET, becomes(204), status(404)
-)
-_mutant("goal-put-ok", "goal-put", "PUT of a new goal returns 200.").altered(_PUT, becomes(200), status(201, 202))
-_mutant("goal-get-frame", "goal-get", "GET returns the goal in another frame.").json(_GET, field(_FRAME, "odom_2"))
-_mutant("goal-get-other-id", "goal-get", "GET returns the goal under another id.").json(
-    _GET, field("goal_id.id", "goal-1")
-)
-_mutant("goal-without-status", "goal-status", "The active goal has no status.").json(_GET, without("status"))
-_mutant("goal-status-succeeded", "goal-status", "The active goal has status 4, succeeded.").json(
-    _GET, field("status.code", 4)
-)
 _mutant("goal-put-back-new", "goal-put-back", "PUT of the goal as GET shows it returns 201.").instead(
     lambda request: _PUT(request) and b'"status"' in request.body, plain(201)
-)
-_mutant("goal-stamp-zero", "goal-fills-in", "A goal that is sent without a header gets the stamp 0.").json(
-    _GET, field("header.stamp", {"sec": 0, "nanosec": 0})
-)
-_mutant("goal-wants-id", "goal-fills-in", "The robot refuses a goal without goal_id.").instead(
-    _without_id, problem(422, "goal_id: missing")
 )
 _mutant("goal-empty-id", "goal-fills-in", "A goal that is sent without goal_id gets an empty one.").made(
     _renamed(lambda id_: "" if len(id_) >= 32 else id_)
@@ -183,50 +142,8 @@ _mutant("goal-id-cut", "goal-id", "Goal ids are truncated to 32 characters.").ma
 _mutant("goal-id-ascii", "goal-id", "Goal ids are returned in lower case.").made(
     _renamed(lambda id_: id_.lower().encode("ascii", "replace").decode())
 )
-_mutant("goal-repeat-refused", "goal-repeat", "Sending the active goal again returns 409.").made(
-    _when_active(problem(409, "goal_id.id: there already"), same=True, other_pose=False)
-)
-_mutant("goal-repeat-created", "goal-repeat", "Sending the active goal again returns 201.").made(
-    _when_active(plain(201), same=True, other_pose=False)
-)
-_mutant(
-    "goal-unwanted-lost", "goal-get", "PUT of a goal with an unacceptable Accept header returns 202 without any effect."
-).instead(unwanted(_PUT), plain(202))
-_mutant(
-    "goal-conflict-ignored", "goal-conflict", "PUT of another pose under the active goal's id returns a success."
-).made(_when_active(plain(204), same=True, other_pose=True))
-_mutant("goal-first-wins", "goal-preempt", "While a goal is active, PUT of another goal returns 409.").made(
-    _when_active(problem(409, "a goal is active"), same=False)
-)
-_mutant("goal-delete-ignored", "goal-delete", "DELETE returns 204 and does not cancel the goal.").instead(
-    _DELETE, plain(204)
-)
 _mutant(
     "goal-delete-for-xml",
     "goal-delete",
     "DELETE by a client that accepts XML returns 204 and does not cancel the goal.",
 ).instead(lambda request: _DELETE(request) and "xml" in (request.field("Accept") or ""), plain(204))
-_mutant("goal-delete-conflict", "goal-delete", "DELETE cancels the goal and returns 409.").altered(
-    _DELETE, becomes(409), success
-)
-_mutant("goal-delete-none-fine", "goal-delete-none", "DELETE without a goal returns 204.").altered(
-    _DELETE, becomes(204), status(404)
-)
-_mutant("goal-frame-ignored", "goal-frame", "The robot ignores the goal's frame.").rewritten(
-    _PUT, inputs(_guarded(field(_FRAME, "map")))
-)
-_mutant(
-    "goal-quaternion-nearly",
-    "goal-quaternion",
-    "The robot normalises a quaternion whose length is off by less than 0.01 instead of refusing it.",
-).rewritten(_off_by(2e-3, 9.5e-3), inputs(_guarded(_unit)))
-_mutant(
-    "goal-quaternion-exact",
-    "goal-quaternion-taken",
-    "The robot refuses a quaternion whose length is off by more than a rounding error.",
-).instead(_off_by(1e-5, 1.0), problem(422, "goal.target_pose.pose.orientation: no unit quaternion"))
-_mutant(
-    "goal-quaternion-normalised",
-    "goal-quaternion",
-    "The robot normalises a quaternion of any length instead of refusing it.",
-).rewritten(_PUT, inputs(_guarded(_unit)))

@@ -4,8 +4,8 @@ import re
 import threading
 from collections.abc import Callable
 
-from conformance.mutation.changes import anything, becomes, header, plain, problem, rest, rewritten
-from conformance.mutation.messages import Change, Forward, Request, Response, unchanged
+from conformance.mutation.changes import plain, problem, rest, rewritten
+from conformance.mutation.messages import Change, Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import deliveries
 
@@ -161,56 +161,15 @@ def _length_first(request: Request, forward: Forward) -> Response:
     return response
 
 
-_mutant(
-    "http-length-and-chunks-go-on",
-    "web-server/length-and-chunks-closed",
-    "After a request with Content-Length and Transfer-Encoding, the robot keeps the connection open.",
-).rewritten(_both, _without_length)
-_mutant("http-folded-header", "web-server/header-lines", "A folded line counts as a header of its own.").altered(
-    _came(rb"(?i)\r\n[ \t]+Content-Length:"), _and_rubbish, anything
-)
-_mutant("http-bare-cr", "web-server/header-lines", "A bare CR ends a header line.").made(_acting(rb"\r(?!\n)"))
-_mutant(
-    "http-length-before-space", "web-server/header-lines", "A space before the colon of Content-Length is ignored."
-).made(_acting(rb"(?i)\r\nContent-Length[ \t]+:"))
-_mutant(
-    "http-space-before-colon", "web-server/space-before-colon", "A header with a space before its colon is ignored."
-).made(_ignoring(rb"\r\n[\w-]+[ \t]+:"))
-_mutant("http-no-chunk-extensions", "web-server/chunk-forms", "A chunk extension returns 400.").instead(
-    _came(rb"\r\n[0-9a-f]+;[^\r]*\r\n"), problem(400, "no chunk size")
-)
-_mutant("http-no-trailers", "web-server/chunk-forms", "Trailer fields return 400.").instead(
-    _came(rb"\r\n0\r\n[^\r]"), problem(400, "no end of the chunks")
-)
-_mutant("http-expectation-failed", "web-server/expect-continue", "Expect: 100-continue returns 417.").instead(
-    _came(rb"(?i)\r\nexpect: *100"), problem(417, "no")
-)
 _mutant("http-one-segment", "octet-stream", "A request head in several TCP segments returns 400.").instead(
     _having(lambda request: b"\r\n\r\n" not in request.came[0]), problem(400, "no end of the head")
 )
-_mutant(
-    "http-names-in-lower-case",
-    "web-server/field-forms",
-    "The robot ignores Accept when its name is written in another case.",
-).made(_forgetting(_came(rb"\r\n(?:accept|ACCEPT|aCCept):"), "Accept"))
-_mutant(
-    "http-one-blank", "web-server/field-forms", "The robot ignores Accept unless exactly one space follows the colon."
-).made(_forgetting(_came(rb"\r\n[aA][cC]+ept:(?! [^ ])"), "Accept"))
 _mutant(
     "http-first-line", "web-server/field-lines", "Of several Accept headers, the robot uses only the first."
 ).rewritten(_having(lambda request: request.field("Accept") is not None), _first_line)
 _mutant(
     "http-last-line", "web-server/field-lines", "Of several Accept headers, the robot uses only the last."
 ).rewritten(_having(lambda request: request.field("Accept") is not None), _last_line)
-_mutant("http-never-modified", "preconditions", "Every If-None-Match returns 304.").instead(
-    _conditional("If-None-Match"), plain(304)
-)
-_mutant("http-never-modified-since", "preconditions", "Every If-Modified-Since returns 304.").instead(
-    _conditional("If-Modified-Since"), plain(304)
-)
-_mutant("http-part-of-all", "range", "A range request returns 206 with the whole content.").altered(
-    _conditional("Range"), becomes(206)
-)
 _mutant("http-no-charset-in-accept", "accept-parameters", "A charset parameter in Accept returns 406.").instead(
     _having(lambda request: "charset" in (request.field("Accept") or "").lower()), problem(406, "not that")
 )
@@ -218,47 +177,8 @@ _mutant("http-old-client-chunks", "web-server/old-client", "A client of HTTP/1.0
     _having(lambda request: request.version == "HTTP/1.0"), _in_chunks
 )
 _mutant(
-    "http-pipelining-forgotten",
-    "web-server/pipelining",
-    "Of pipelined requests, the robot answers only the first, and keeps the connection open.",
-    forgetful=True,
-)(unchanged)
-_mutant(
     "http-head-of-what-cannot-be-read", "method-not-allowed", "HEAD of a delivery returns 200, though GET returns 405."
 ).instead(_having(lambda request: _HEAD(request) and deliveries(request.copy(method="PUT"))), plain(200))
-_mutant("http-no-chunks", "chunked", "Chunked request bodies return 400.").instead(
-    _chunked, problem(400, "a length, please")
-)
-_mutant("http-few-chunks", "chunked", "The robot reads only 1 KiB of a chunked request body.").rewritten(
-    _chunked, _shortened
-)
-_mutant("http-no-absolute", "web-server/absolute-form", "A request target in absolute form returns 400.").instead(
-    _absolute, problem(400, "")
-)
-_mutant("http-absolute-unknown", "web-server/absolute-form", "A request target in absolute form returns 404.").instead(
-    _absolute, problem(404, "")
-)
-_mutant("http-type-case", "media-type-case", "A Content-Type with a capital letter returns 415.").instead(
-    _upper("Content-Type"), problem(415, "application/json, please")
-)
-_mutant("http-accept-case", "media-type-case", "An Accept with a capital letter returns 406.").instead(
-    _upper("Accept"), problem(406, "application/json is what there is")
-)
 _mutant("http-short-targets", "web-server/target-length", "A request target over 4 KiB returns 414.").instead(
     _having(lambda request: len(request.target) > _MUCH), problem(414, "too long")
-)
-_mutant("http-head-empty", "head-length", "HEAD returns Content-Length: 0.").altered(
-    _HEAD, header("Content-Length", "0")
-)
-_mutant("http-head-length-of-error", "head-length", "HEAD always returns Content-Length: 31.").altered(
-    _HEAD, header("Content-Length", "31"), anything
-)
-_mutant("json-no-exponents", "json-numbers", "A JSON number with an exponent returns 422.").instead(
-    _written(rb"\d[eE][+-]?\d"), problem(422, "a number, please")
-)
-_mutant("json-no-negative-zero", "json-numbers", "A JSON number -0 returns 422.").instead(
-    _written(rb"-0(?![.\d])"), problem(422, "a number, please")
-)
-_mutant("json-small-integers", "json-integers", "JSON integers of ten digits return 422.").instead(
-    _written(rb"[:\s]-?214748364[78]\b"), problem(422, "sec: too large")
 )

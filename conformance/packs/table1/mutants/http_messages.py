@@ -11,13 +11,11 @@ from conformance.mutation.changes import (
     Where,
     altered,
     hanging_up,
-    header,
     instead,
     parsed,
     plain,
     problem,
     rest,
-    text,
     values,
 )
 from conformance.mutation.messages import Forward, Request, Response
@@ -158,28 +156,13 @@ def _page(response: Response) -> None:
     response.put("Content-Type", "text/html")
 
 
-_mutant("http-large-body-fine", "content-too-large", "Bodies over 10 MiB return 204.").made(
-    _big(10 * 1024 * 1024, plain(204))
-)
 _mutant(
     "http-large-body-closes",
     "content-too-large-answered",
     "Bodies over 10 MiB close the connection without a response.",
 ).made(hanging_up(lambda request: request.side == "rest" and len(request.body) > 10 * 1024 * 1024))
-_mutant("http-small-limit", "content-too-large", "Bodies over 20 KiB return 413.").made(
-    _big(20_000, problem(413, "too large"))
-)
-_mutant("http-long-target-crash", "uri-too-long", "A long request target returns 500.").instead(
-    _long_target, problem(500, "oops")
-)
-_mutant("http-long-target-fine", "declared-body", "A long request target returns 200 with an empty object.").instead(
-    _long_target, plain(200, b"{}", JSON)
-)
 _mutant("http-large-field-crash", "web-server/header-too-large", "A header of 128 KiB returns 500.").instead(
     lambda request: _ANY(request) and any(len(value) > 60_000 for _, value in request.fields), problem(500, "oops")
-)
-_mutant("http-length-too-long", "framing", "Content-Length is 7 bytes longer than the body.").altered(
-    _GET, _on_the_wire(_longer)
 )
 _mutant("http-length-too-short", "framing", "The body is longer than Content-Length.").altered(
     _GET, _on_the_wire(lambda octets: octets + b"left over")
@@ -199,12 +182,6 @@ _mutant("http-host-twice", "web-server/host-twice", "The robot accepts a request
 _mutant(
     "http-host-repeated", "web-server/host-repeated", "The robot accepts a request with the same Host header twice."
 )(_hosts(lambda hosts: len(hosts) > 1 and len(set(hosts)) == 1))
-_mutant("http-problem-as-json", "problem-type", "Problem details have the media type application/json.").altered(
-    _ANY, header("Content-Type", JSON), _errors
-)
-_mutant("http-problem-as-page", ("problem-type", "problem-type-server"), "Errors are HTML pages.").altered(
-    _ANY, _page, _errors
-)
 _mutant("http-problem-other-status", "problem-status", "The status member of problem details is wrong.").made(
     _problems(lambda value: value.update(status=400 if value["status"] != 400 else 422))
 )
@@ -222,38 +199,6 @@ _mutant(
 _mutant("http-problem-mute", "problem-detail", "Problem details have no detail.").made(
     _problems(lambda value: value.pop("detail", None) and None)
 )
-_mutant(
-    "http-problem-valueless", "problem-value", "The detail of problem details never contains the offending value."
-).made(_problems(_valueless, _INPUT))
 _mutant("http-traceback", "no-traceback", "The detail of problem details contains a traceback.").made(
     _problems(lambda value: value.update(detail=value["detail"] + "\n" + _TRACE), _INPUT)
 )
-_mutant("http-nan", "json-finite", "JSON responses contain NaN.").altered(
-    _POSE, text(r'("y"\s*:\s*)[-+.\deE]+', r"\1NaN", 1)
-)
-_mutant("http-infinity-sometimes", "json-finite", "One pose in 50 contains Infinity.").altered(
-    _POSE, text(r'("z"\s*:\s*)[-+.\deE]+', r"\1-Infinity", 1), nth=50
-)
-_mutant("http-byte-order-mark", "json-encoding", "JSON responses begin with a byte order mark.").altered(_GET, _marked)
-_mutant("http-latin", "json-encoding", "JSON responses are encoded in ISO 8859-1.").altered(_POSE, _in_latin)
-_mutant("http-name-twice", "json-unique-names", "A JSON object has the same member name twice.").altered(
-    _POSE, text(r'"child_frame_id"', '"child_frame_id": "base", "child_frame_id"', 1)
-)
-_mutant("http-writes-open", "authentication-writes", "Only reads require the token.", token=_SESAME).made(
-    _token(_unauthorized, _GET)
-)
-_mutant(
-    "http-unauthorized-acts",
-    "authentication-writes",
-    "A request without the token returns 401 and is carried out all the same.",
-    token=_SESAME,
-).made(_token(_unauthorized, acts=True))
-_mutant("http-token-forbidden", "authentication-asked", "A request without the token returns 403.", token=_SESAME).made(
-    _token(problem(403, "no token"))
-)
-_mutant(
-    "http-token-unnamed",
-    "authentication",
-    "A request without the token returns 401 without WWW-Authenticate.",
-    token=_SESAME,
-).made(_token(problem(401, "no token")))

@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Container
 from typing import Any
 
-from conformance.mutation.changes import SOAP, Make, page, parsed, posted, problem, rest, success, unwanted
+from conformance.mutation.changes import SOAP, Make, parsed, posted, problem, rest, success, unwanted
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import DELIVERIES, GOAL, LINEAR, POSE, TNS, VELOCITY, deliveries
@@ -142,9 +142,6 @@ def _other_media_type(request: Request, forward: Forward) -> Response:
 
 
 _mutant(
-    "input-goal-cancel-refused", "goal-refused", "A DELETE of the goal returns 406, and the goal is cancelled."
-).altered(unwanted(rest("DELETE", GOAL)), page(406))
-_mutant(
     "input-velocity-refused-and-driven",
     "velocity-refused",
     "An invalid velocity returns an error, and the robot drives.",
@@ -158,29 +155,6 @@ _mutant("http-406-and-goal", "http/not-acceptable-undone", "A goal returns 406, 
 _mutant(
     "input-goal-refused-and-taken", "goal-refused", "An invalid goal returns an error, and the robot has a goal."
 ).made(after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5)))
-_mutant(
-    "input-goal-refused-and-ended",
-    "goal-refused",
-    "An invalid goal returns an error, and the active goal is cancelled.",
-).made(after_refusal(rest("PUT", GOAL), _give_up))
-_mutant(
-    "input-delivery-refused-and-made",
-    "delivery-refused",
-    "An invalid delivery returns an error and is published.",
-    observer=True,
-).made(after_refusal(deliveries, _deliver))
-_mutant(
-    "input-delivery-by-get",
-    "delivery-refused",
-    "GET of a delivery's path returns 405 and publishes the delivery.",
-    observer=True,
-).made(_ordered_by("GET"))
-_mutant(
-    "input-delivery-by-options",
-    "delivery-refused",
-    "OPTIONS of a delivery's path publishes the delivery.",
-    observer=True,
-).made(_ordered_by("OPTIONS"))
 
 
 @_mutant(

@@ -7,22 +7,11 @@ from collections.abc import Callable
 from typing import Any
 from urllib.parse import parse_qsl
 
-from conformance.mutation.changes import (
-    becomes,
-    hanging_up,
-    parsed,
-    plain,
-    query,
-    refusal,
-    rest,
-    rewritten,
-    status,
-    success,
-)
+from conformance.mutation.changes import parsed, plain, query, rest, rewritten, success
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.delivery import any_code, finite, lenient, segments
-from conformance.packs.table1.mutants.paths import GOAL, LINEAR, PLAN, VELOCITY, deliveries
+from conformance.packs.table1.mutants.paths import GOAL, LINEAR, PLAN, VELOCITY
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("strict-input", "rest")
@@ -197,32 +186,6 @@ def _path(request: Request) -> None:
         segments(edit)(request)
 
 
-_mutant("input-missing-is-zero", "json-missing", "A missing JSON member counts as 0.").made(_repairing(_filled))
-_mutant("input-unknown-ignored", "json-unknown", "Unknown JSON members are ignored.").made(_repairing(_known))
-_mutant("input-last-wins", "json-duplicate", "Of a duplicate JSON member, the last one counts.").rewritten(
-    _is_json, _twice
-)
-_mutant("input-coerced", "json-type", "Strings, null and booleans count as numbers.").made(_repairing(_typed))
-_mutant("input-nan-is-zero", "json-non-finite", "NaN and numbers that overflow count as 0.").made(_repairing(_finite))
-_mutant("input-deep-crash", "json-depth", "Deeply nested JSON ends the process that reads it.").made(hanging_up(_deep))
-_mutant("input-deep-bad-gateway", "json-depth", "Deeply nested JSON returns 502.").instead(_deep, plain(502))
-_mutant("input-deep-fine", "json-depth", "Deeply nested JSON returns 204.").made(_swallowed(_deep))
 _mutant("input-empty-fine", "json-empty", "An empty body returns 204.").made(
     _swallowed(lambda request: _is_json(request) and not request.body.strip())
-)
-_mutant("input-bounds-cut", "json-bounds", "Values beyond their bounds are clamped.").made(_repairing(_bounded))
-_mutant("input-path-lenient", "path-parameter", "Invalid values in a path count as numbers.").rewritten(
-    deliveries, _path
-)
-_mutant("input-query-lenient", "query-parameter", "Invalid numbers in a query count as 0.").rewritten(
-    rest("GET", PLAN), query(_numbers)
-)
-_mutant("input-malformed-422", "status-malformed", "Malformed JSON returns 422.").altered(
-    _is_json, becomes(422), status(400)
-)
-_mutant("input-invalid-400", "status-invalid", "JSON of the wrong shape returns 400.").altered(
-    _is_json, becomes(400), status(422)
-)
-_mutant("input-crash-sometimes", "json-type", "One invalid body in 20 returns 500.").altered(
-    _is_json, becomes(500), refusal, nth=20
 )

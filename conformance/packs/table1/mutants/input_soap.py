@@ -6,12 +6,11 @@ from typing import Any
 
 from lxml import etree
 
-from conformance.mutation.changes import SOAP, Make, becomes, page, rewritten, soap
+from conformance.mutation.changes import SOAP, Make, rewritten, soap
 from conformance.mutation.messages import Request
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import named, xml
 from conformance.packs.table1.mutants.paths import TNS
-from conformance.packs.table1.mutants.soap_responses import is_fault
 from conformance.papers_robot.delivery import XSD_FIELDS
 
 MUTANTS = Table()
@@ -164,11 +163,3 @@ def _coded(_body: Any, message: Any) -> None:
         text = (child.text or "").strip()
         if child.tag == "message_code" and _INT.fullmatch(text) and int(text) not in {3, 4} and abs(int(text)) < 2**31:
             child.text = "3"
-
-
-_mutant("input-soap-fault-200", "soap-fault", "Faults for invalid input have status 200.").altered(
-    soap(), becomes(200), is_fault
-)
-_mutant("input-soap-no-fault", "soap-fault", "Invalid SOAP input returns 500 without a fault.").altered(
-    _ACT, page(500, b"refused", "text/plain"), is_fault
-)

@@ -10,7 +10,7 @@ from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.goal_memory import active, identity, pose_of
 from conformance.packs.table1.mutants.holding import Remembering
-from conformance.packs.table1.mutants.input_effects import after_refusal, sent
+from conformance.packs.table1.mutants.input_effects import sent
 from conformance.packs.table1.mutants.paths import DELIVERIES, GOAL, LINEAR, PLAN, POSE, SENSORS, VELOCITY, deliveries
 
 MUTANTS = Table()
@@ -36,23 +36,6 @@ def _order(request: Request) -> bool:
 
 def _cancel(request: Request, forward: Forward) -> None:
     sent(request, forward, "DELETE", GOAL)
-
-
-_mutant("goal-dropped-by-frame", "strict-input/goal-refused", "A goal in an unknown frame ends the active goal.").made(
-    after_refusal(_no_frame, _cancel, _REFUSED)
-)
-_mutant("goal-dropped-by-xml", "strict-input/goal-refused", "A goal in XML that is refused ends the active goal.").made(
-    after_refusal(_is_xml, _cancel, _REFUSED)
-)
-_mutant("goal-dropped-by-delivery", "goal-get", "A delivery that is refused ends the active goal.").made(
-    after_refusal(deliveries, _cancel, _REFUSED)
-)
-_mutant("goal-dropped-by-406", "goal-get", "A GET that is answered 406 ends the active goal.").made(
-    after_refusal(rest("GET", POSE, VELOCITY, SENSORS), _cancel, {406})
-)
-_mutant(
-    "goal-dropped-by-soap", "goal-get", "A SOAP order that is refused ends the active goal.", interface="both"
-).made(after_refusal(_ORDERS, _cancel, {500}))
 
 
 @_mutant("goal-replaced-by-xml", "goal-conflict", "XML with another pose under the active goal's id replaces the goal.")
@@ -106,9 +89,6 @@ def _renewed(where: Callable[[Request], bool]) -> type[Remembering]:
 _mutant("safety-renewed-by-406", "safety/hold-ends", "A request that is answered 406 renews the velocity.").made(
     _renewed(lambda request: rest("GET", POSE, SENSORS)(request) and "image" in (request.field("Accept") or ""))
 )
-_mutant(
-    "safety-renewed-by-order", "safety/hold-ends", "An order that is refused renews the velocity.", interface="both"
-).made(_renewed(_order))
 
 
 @_mutant(
@@ -244,14 +224,3 @@ class _LostAfter:
         response = forward(request)
         self._spoilt |= request.side == "soap" if self._soap else refusal(response) and request.method != "GET"
         return response
-
-
-_mutant("goal-cancel-lost", "goal-delete", "The first DELETE after a refused request cancels nothing.").made(
-    lambda: _LostAfter(_DELETE)
-)
-_mutant(
-    "velocity-lost-after-refusal", "velocity-converges", "The first velocity after a refused request is lost."
-).made(lambda: _LostAfter(_PUTS))
-_mutant(
-    "velocity-lost-after-soap", "velocity-converges", "The first velocity after SOAP is lost.", interface="both"
-).made(lambda: _LostAfter(_PUTS, soap_message=True))

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from conformance.mutation.changes import JSON, becomes, page, problem, query, rest, status
+from conformance.mutation.changes import problem, rest
 from conformance.mutation.fields import field
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import PLAN
@@ -45,14 +45,8 @@ def _frame(value: Any) -> None:
         pose["header"]["frame_id"] = "base_link"
 
 
-_mutant(
-    "plan-frame-in-name-only", ("plan-start", "plan-end"), "A plan in the odometry's frame is shifted by (1.5, -1.0) m."
-).json(_GET, _aside)
 _mutant("plan-heading-ignored", "plan-yaw", "The last pose of a plan has a heading that is 1 rad off.").json(
     _GET, field("plan.poses.-1.pose.orientation", turned(lambda yaw: yaw + 1.0))
-)
-_mutant("plan-mixed-frames", "plan-frame", "Only the first pose of a plan is in the frame of the path's header.").json(
-    _GET, _frame
 )
 _mutant("plan-without-stamps", "plan-type", "Poses of a plan have no header.").json(
     _GET, field(_POSES, lambda poses: [{"pose": one["pose"]} for one in poses])
@@ -63,29 +57,9 @@ _mutant("plan-bare", "plan-type", "The response is the path itself, without the 
 _mutant("plan-from-elsewhere", "plan-start", "A plan begins 60 cm from the robot.").json(
     _GET, field(_POSES, lambda poses: [_moved(poses[0], -0.36, 0.48), *poses])
 )
-_mutant("plan-ignores-start", "plan-given-start", "The robot ignores the start in the query.").rewritten(
-    _GET, query(_no_start)
-)
 _mutant("plan-falls-short", "plan-end", "A plan ends 50 cm before the requested pose.").json(
     _GET, field(_POSES, lambda poses: [*poses[:-1], _moved(poses[-1], 0.3, 0.4)])
 )
-_mutant("plan-jumps", "plan-continuous", "A plan contains a jump of 35 m.").json(_GET, field(_POSES, _detour))
-_mutant("plan-jumps-sometimes", "plan-continuous", "One plan in 50 contains a jump of 35 m.").json(
-    _GET, field(_POSES, _detour), nth=50
-)
-_mutant("plan-frameless", "plan-frame", "The path's header has an empty frame_id.").json(
-    _GET, field("plan.header.frame_id", "")
-)
-_mutant("plan-other-defaults", "plan-defaults", "The default yaw is a quarter turn.").rewritten(_GET, query(_quarter))
 _mutant("plan-no-exponents", "plan-numbers", "The robot refuses a query with an exponent such as e+00.").instead(
     lambda request: _GET(request) and "e%2B" in request.query, problem(422, "x: no number")
-)
-_mutant("plan-none-not-found", "plan-none", "Where no plan exists, the robot returns 404.").altered(
-    _GET, becomes(404), status(422)
-)
-_mutant("plan-none-empty", "plan-none", "Where no plan exists, the robot returns 200 with an empty plan.").altered(
-    _GET, page(200, _EMPTY, JSON), status(404, 422)
-)
-_mutant("plan-none-crash", "plan-none", "Where no plan exists, the robot returns 500.").altered(
-    _GET, becomes(500), status(404, 422)
 )

@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import JSON, parsed, plain, problem, rest, values
-from conformance.mutation.fields import each, field, plus, scaled, swapped, without
+from conformance.mutation.changes import JSON, parsed, problem, rest, values
+from conformance.mutation.fields import field
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import LINEAR, POSE, VELOCITY
@@ -119,23 +119,15 @@ class _NotYet:
         return forward(request)
 
 
-_mutant("pose-mirrored", "pose-motion", "The position's x and y are swapped.").json(_AT, swapped(_X, _Y))
 _mutant("odometry-in-degrees", "velocity-odometry", "The odometry's turning rate is in degrees per second.").json(
     _AT, field("twist.twist.angular.z", math.degrees)
 )
-_mutant(
-    "pose-nanosec-carried", "pose-type", "The stamp's sec is 1 too small and its nanosec 1,000,000,000 too large."
-).json(_AT, each(field(_SEC, plus(-1)), field(_NANOSEC, plus(10**9))))
 _mutant("pose-clock-milliseconds", "pose-clock", "The stamp's nanosec counts milliseconds.").json(
     _AT, field(_NANOSEC, lambda nanosec: nanosec // 10**6)
-)
-_mutant("pose-clock-hour-ahead", "pose-clock-offset", "The odometry stamps are an hour ahead of Date.").json(
-    _AT, field(_SEC, plus(3600))
 )
 _mutant("pose-short-covariance", "pose-type", "The pose's covariance has 35 values.").json(
     _AT, field("pose.covariance", lambda numbers: numbers[:35])
 )
-_mutant("pose-without-child-frame", "pose-type", "The pose lacks child_frame_id.").json(_AT, without("child_frame_id"))
 _mutant("pose-numbers-as-text", "pose-type", "In one pose of 50, x is a string.").json(_AT, field(_X, str), nth=50)
 _mutant("pose-quaternion-long", "pose-quaternion", "The orientation quaternion is 1 % too long.").json(
     _AT, field(_ORIENTATION, lambda q: {axis: 1.01 * part for axis, part in q.items()})
@@ -143,27 +135,6 @@ _mutant("pose-quaternion-long", "pose-quaternion", "The orientation quaternion i
 _mutant("pose-quaternion-zero", "pose-quaternion", "The orientation quaternion is four zeros.").json(
     _AT, field(_ORIENTATION, dict.fromkeys("xyzw", 0.0))
 )
-_mutant("pose-stamp-frozen", "pose-stamp", "GET of the pose always returns the header of the first response.").made(
-    lambda: _Frozen("header")
-)
-_mutant("pose-stamp-backwards", "pose-stamp", "Every fifth pose has a stamp that is 1 s too early.").json(
-    _AT, field(_SEC, plus(-1)), nth=5
-)
-_mutant("pose-stale", ("pose-motion", "pose-rotation"), "GET always returns the first pose, with a new stamp.").made(
-    lambda: _Frozen("pose", "twist")
-)
-_mutant("pose-aside-sometimes", "pose-sample", "One pose in 60 is 1 m off.").json(_AT, field(_X, plus(1.0)), nth=60)
-_mutant(
-    "velocity-off-sometimes", "velocity-odometry", "One measured velocity in 60 is 0.1 m/s higher than the odometry's."
-).json(rest("GET", VELOCITY), field("linear.x", plus(0.1)), nth=60)
-_mutant("pose-in-centimetres", "pose-motion", "The position is in centimetres.").json(
-    _AT, each(field(_X, scaled(100)), field(_Y, scaled(100)))
-)
 _mutant("pose-clockwise", "pose-rotation", "The heading has the wrong sign: it counts clockwise.").json(
     _AT, field(_ORIENTATION, turned(operator.neg))
 )
-_mutant("pose-half-turn", "pose-rotation", "The heading turns at half the rate.").json(
-    _AT, field(_ORIENTATION, turned(scaled(0.5)))
-)
-_mutant("pose-gone", "pose-type", "GET of the pose returns 404.").instead(_AT, problem(404, "there is no pose"))
-_mutant("pose-no-content", "pose-type", "GET of the pose returns 204.").instead(_AT, plain(204))

@@ -18,18 +18,6 @@ for _class in ("rest-resources", "rest-delivery", "http", "safety", "equivalence
     _says = f"REST closes every connection without responding (seen by class {_class})."
     _mutant(f"rest-silent-{_class}", f"{_class}/reachable", _says, interface="rest").made(hanging_up(rest()))
 
-_mutant(
-    "publishers-elsewhere", "soap-delivery/reachable", "Another web server is at the address of the publishers service."
-).made(_elsewhere("publisher"))
-_mutant(
-    "subscribers-elsewhere",
-    "soap-subscribers/reachable",
-    "Another web server is at the address of the subscribers service.",
-).made(_elsewhere("subscriber"))
-_mutant("soap-elsewhere", "soap-basic-profile/reachable", "Another web server is at both SOAP addresses.").made(
-    _elsewhere("")
-)
-
 
 @_mutant(
     "nothing-elsewhere",

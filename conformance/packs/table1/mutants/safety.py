@@ -4,12 +4,12 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import guarded, inputs, parsed, plain, problem, rest, success
+from conformance.mutation.changes import parsed, plain, problem, rest, success
 from conformance.mutation.messages import Forward, Request, Response, unchanged
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.goal_memory import active
 from conformance.packs.table1.mutants.in_background import later
-from conformance.packs.table1.mutants.input_effects import after_refusal, drive, goal_ahead, sent
+from conformance.packs.table1.mutants.input_effects import drive, goal_ahead, sent
 from conformance.packs.table1.mutants.paths import GOAL, LINEAR, VELOCITY
 from conformance.packs.table1.mutants.velocity import speeds
 
@@ -211,11 +211,6 @@ def _torn(side: str, _octets: bytes, forward: Forward) -> None:
         drive(Request("rest", "PUT", VELOCITY), forward, 0.2)
 
 
-_mutant("safety-relentless", "watchdog", "The robot drives on for 10 s after a velocity command.").made(
-    lambda: _GoingOn(_again, 0.15, 10.0)
-)
-
-
 class _GoingOnAfter(_GoingOn):
     """The same for some velocities only."""
 
@@ -238,9 +233,6 @@ _mutant(
 _mutant(
     "safety-relentless-when-slow", "watchdog", "The robot drives on for 10 s straight ahead or back at up to 0.1 m/s."
 ).made(lambda: _GoingOnAfter(lambda request: 0 < abs(speeds(request)[0]) <= 0.1 and not speeds(request)[1]))
-_mutant("safety-relentless-to-one-side", "watchdog", "The robot drives on for 10 s ahead and to the right.").made(
-    lambda: _GoingOnAfter(_to_the_right)
-)
 _mutant(
     "safety-relentless-when-closed", "watchdog", "The robot drives on for 10 s after a velocity with Connection: close."
 ).made(
@@ -264,29 +256,6 @@ class _RenewedByRead:
         return response
 
 
-_mutant("safety-long-winded", "hold-ends", "A velocity command holds 1.5 times as long as declared.").made(
-    lambda: _GoingOn(_again, 0.55)
-)
-_mutant("safety-short-of-breath", "hold", "A velocity command holds for only 0.15 s.").made(
-    lambda: _GoingOn(_stopped, 0.15)
-)
-_mutant("safety-clamped", "limits-refused", "A velocity beyond the limits is clamped instead of refused.").rewritten(
-    _PUTS, inputs(guarded(_clamped))
-)
-_mutant(
-    "safety-unactuated-ignored",
-    "unactuated-refused",
-    "Velocity components that the robot cannot drive are ignored instead of refused.",
-).rewritten(_PUT, inputs(guarded(_two_wheeled)))
-_mutant("safety-too-fast", "limits-hold", "The robot drives at four times its speed.").json(
-    rest("GET", VELOCITY), _too_fast
-)
-_mutant("safety-refused-stops", "refused-keeps", "A refused velocity command stops the robot.").made(
-    after_refusal(_PUTS, _stopped)
-)
 _mutant(
     "safety-torn-drives", "client-vanished", "An incomplete request moves the robot.", incomplete_request=lambda: _torn
 )(unchanged)
-_mutant("safety-one-at-a-time", "half-request", "An incomplete request blocks all other requests.", serial=True)(
-    unchanged
-)

@@ -4,10 +4,10 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import posted, problem, rest, soap, status, text
+from conformance.mutation.changes import posted, problem, rest, soap
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
-from conformance.mutation.xml_trees import each, gone, named, says
+from conformance.mutation.xml_trees import each, named, says
 from conformance.packs.table1.mutants.paths import GOAL
 
 MUTANTS = Table()
@@ -43,26 +43,6 @@ def _in_map(request: Request) -> None:
     request.body = request.body.replace(b"no_such_frame", b"map")
 
 
-_mutant("soap-pose-not-unit", "pose", "GetPose returns a quaternion with w = 3.").xml(
-    _POSE, _first_is("orientation", "w", "3.0")
-)
-_mutant("soap-goal-outcome-untold", "goal-outcome", "The fault of GetGoal has no detail.").xml(
-    soap("GetGoal"), each("detail", gone), status(500)
-)
-_mutant("soap-velocity-nan", "velocity", "GetVelocity returns NaN.").xml(_VELOCITY, _first_is("linear", "x", "NaN"))
-_mutant("soap-sensors-short-types", "sensors", "GetSensors returns types without /msg/.").altered(
-    soap("GetSensors"), text("/msg/", "/")
-)
-_mutant("soap-read-order", "response-valid", "GetPose returns y before x.").xml(_POSE, _swapped)
-_mutant("soap-read-empty", "interop", "Responses of the subscribers service contain no values.").xml(
-    soap("Get[A-Z][A-Za-z]+"), each("return", gone)
-)
-_mutant("soap-plan-reversed", "plan", "GetPlan returns the poses in reverse order.").xml(_PLAN, _reversed_path)
-_mutant("soap-plan-other-frame", "plan", "GetPlan returns a path in another frame.").xml(
-    _PLAN, each("frame_id", says("base_link"))
-)
-_mutant("soap-plan-elsewhere", "plan", "GetPlan returns a plan to another pose.").rewritten(_PLAN, _elsewhere)
-_mutant("soap-plan-any-frame", "plan-none", "GetPlan reads an unknown frame as map.").rewritten(_PLAN, _in_map)
 _mutant("soap-small-questions", "size", "A message over 32 KiB returns 413.").instead(
     lambda request: posted(request) and len(request.body) > _SMALL, problem(413, "too large")
 )

@@ -3,12 +3,12 @@
 import re
 from collections.abc import Callable
 
-from conformance.mutation.changes import SOAP, Make, altered, page, soap, success, text, wsdls
+from conformance.mutation.changes import Make, altered, soap, success, text, wsdls
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import each, gone, tree
 from conformance.packs.table1.mutants.paths import TNS
-from conformance.packs.table1.mutants.soap_responses import enveloped, fault, in_body, other_namespace, with_content
+from conformance.packs.table1.mutants.soap_responses import enveloped, fault
 
 MUTANTS = Table()
 _acting = MUTANTS.of_class("soap-delivery", "soap")
@@ -55,27 +55,6 @@ def _no_goal_page(request: Request, forward: Forward) -> Response:
 _QUALIFIED = altered(wsdls, text(r"(<(?:\w+:)?schema\b)(?=[^>]*targetNamespace)", r'\1 elementFormDefault="qualified"'))
 
 
-_acting("soap-delivery-refused", "delivery", "ExecuteDeliveryRequest always returns a fault.").instead(
-    _DELIVERY, fault("Server", "no deliveries today")
-)
-_acting(
-    "soap-delivery-cross-answer",
-    "delivery",
-    "ExecuteDeliveryRequest returns the response element of the coffee operation.",
-).altered(_DELIVERY, text("ExecuteDeliveryRequestResponse", "ExecuteCoffeeRequestResponse"))
-_acting("soap-coffee-unknown", "coffee", "ExecuteCoffeeRequest returns a fault: unknown operation.").instead(
-    _COFFEE, fault("Client", "Cannot find dispatch method")
-)
-_acting("soap-coffee-sometimes-503", "coffee", "One coffee in ten returns 503.").altered(_COFFEE, page(503), nth=10)
-_acting("soap-response-full", "response-valid", "The response wrapper contains an element.").altered(
-    _ACT, in_body(with_content)
-)
-_acting("soap-response-namespace", "response-valid", "The response wrapper is in another namespace.").altered(
-    _ACT, in_body(other_namespace)
-)
-_acting("soap-response-soap12", "response-valid", "The response is a SOAP 1.2 envelope.").altered(
-    _ACT, text(re.escape(SOAP), "http://www.w3.org/2003/05/soap-envelope")
-)
 for _name, _requirement, _says, _pattern in (
     ("soap-no-exponents", "range", "Doubles with an exponent return a fault.", rb">\s*[+-]?[\d.]+[eE][+-]?\d+\s*<"),
     ("soap-no-types", "typed-values", "A value with xsi:type returns a fault.", rb":type="),
@@ -104,36 +83,3 @@ for _name, _requirement, _says, _pattern in (
     ("soap-no-comments", "syntax", "A comment returns a fault.", rb"<!--"),
 ):
     _acting(_name, _requirement, _says).instead(_written(_pattern), fault("Client", _says))
-_acting(
-    "soap-description-misleads",
-    "interop",
-    'The WSDL declares elementFormDefault="qualified", but the service expects unqualified elements.',
-).made(_QUALIFIED)
-_acting("soap-no-addressing", "addressing", "WS-Addressing headers return a MustUnderstand fault.").instead(
-    _written(rb"www\.w3\.org/2005/08/addressing"), fault("MustUnderstand", "addressing")
-)
-_acting("soap-any-code", "refuses-code", "The robot accepts every message code over SOAP.").rewritten(_ACT, _code_three)
-_reading("soap-pose-short", "pose", "GetPose returns 35 covariance values.").made(_lacking("GetPose", "covariance"))
-_reading("soap-velocity-half", "velocity", "GetVelocity returns no angular part.").made(
-    _lacking("GetVelocity", "angular")
-)
-_reading("soap-sensors-untyped", "sensors", "GetSensors returns sensors without a type.").made(
-    _lacking("GetSensors", "type")
-)
-_reading("soap-services-fault", "services", "GetNavigationServices returns a fault.").instead(
-    soap("GetNavigationServices"), fault("Server", "not today")
-)
-_reading("soap-services-unnamed", "services", "GetNavigationServices returns a service without a name.").made(
-    _lacking("GetNavigationServices", "name")
-)
-_reading(
-    "soap-read-namespace", "response-valid", "Responses of the subscribers service are in another namespace."
-).altered(_READ, in_body(other_namespace))
-_reading(
-    "soap-read-extra", "response-valid", "Responses of the subscribers service contain an undeclared element."
-).altered(_READ, in_body(with_content))
-_reading(
-    "soap-read-description-misleads",
-    "interop",
-    'The WSDL declares elementFormDefault="qualified", but the service expects unqualified elements.',
-).made(_QUALIFIED)

@@ -6,22 +6,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import (
-    JSON,
-    Make,
-    becomes,
-    inputs,
-    page,
-    parsed,
-    plain,
-    problem,
-    rest,
-    secretly,
-    status,
-    unwanted,
-    values,
-)
-from conformance.mutation.fields import each, field, scaled, swapped, without
+from conformance.mutation.changes import Make, inputs, parsed, plain, rest, secretly, values
+from conformance.mutation.fields import each, field, scaled
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import GOAL, LINEAR, VELOCITY
@@ -163,79 +149,20 @@ def _short_of(share: float) -> Callable[[Any], None]:
     return edit
 
 
-_mutant("velocity-locked-by-goal", "velocity-goal", "PUT of a velocity returns 423 while a goal is active.").made(
-    _while_goal(problem(423, "linear.x: a goal is active"))
-)
-_mutant(
-    "velocity-linear-locked-by-goal", "velocity-goal", "PUT of a linear velocity returns 423 while a goal is active."
-).made(_while_goal(problem(423, "x: a goal is active"), _PUT_LINEAR))
-_mutant(
-    "velocity-forgotten-for-goal",
-    "velocity-goal",
-    "While a goal is active, PUT of a velocity returns 204 without any effect.",
-).made(_while_goal(plain(204)))
 _mutant(
     "velocity-one-at-once", "velocity-both", "Near both limits at once, the robot drives at half the linear velocity."
 ).made(secretly(lambda request: min(_shares(request)) >= 0.7, inputs(field("linear.x", scaled(0.5)))))
 _mutant(
-    "velocity-deadband", "velocity-range", "The robot accepts velocities below 0.05 m/s or rad/s and stands still."
-).made(secretly(_slow, inputs(each(field("linear.x", _still_if_slow), field("angular.z", _still_if_slow)))))
-_mutant("linear-lost", "linear-put", "PUT of a linear velocity returns 204 without any effect.").instead(
-    _forwards_or_back, plain(204)
-)
-_mutant("velocity-without-angular", "velocity-type", "GET of the velocity has no angular part.").json(
-    _GET, without("angular")
-)
-_mutant("velocity-null", "velocity-type", "One velocity in 50 has null for linear.y.").json(
-    _GET, field("linear.y", None), nth=50
-)
-_mutant("velocity-swapped", "velocity-converges", "GET of the velocity returns linear.x and angular.z swapped.").json(
-    _GET, swapped("linear.x", "angular.z")
-)
-_mutant(
-    "velocity-in-kilometres-per-hour", ("velocity-odometry", "velocity-converges"), "The measured velocity is in km/h."
-).json(_GET, times(3.6))
-_mutant(
     "velocity-stands-still", ("velocity-odometry", "velocity-converges"), "The measured velocity is always zero."
 ).json(_GET, lambda twist: twist.update(_STILL))
-_mutant("velocity-put-created", "velocity-put", "PUT of a velocity returns 201.").altered(_PUT, becomes(201))
-_mutant(
-    "velocity-put-other", "velocity-put", "PUT of a velocity returns 200 with a Twist that the client did not send."
-).altered(_PUT, page(200, json.dumps(_CRAWL).encode(), JSON))
 _mutant("velocity-lost", "velocity-converges", "PUT of a velocity returns a success without any effect.").made(
     _driven(lambda twist: twist.update(_STILL))
-)
-_mutant(
-    "velocity-unwanted-lost",
-    "velocity-converges",
-    "PUT of a velocity with an unacceptable Accept header returns 204 without any effect.",
-).instead(unwanted(_PUT), plain(204))
-_mutant("velocity-halved", "velocity-converges", "The robot drives at half of the commanded velocity.").made(
-    _driven(times(0.5))
 )
 _mutant("velocity-reversed", "velocity-converges", "The robot turns in the opposite direction.").made(
     _driven(field("angular.z", operator.neg))
 )
-_mutant(
-    "velocity-refused-near-limits", "velocity-range", "The robot refuses velocities above 90 % of its limits."
-).instead(_beyond(0.9), problem(422, "linear.x, angular.z: too fast"))
-_mutant("velocity-short-of-limits", "velocity-range", "The robot never drives faster than 90 % of its limits.").made(
-    secretly(_beyond(0.9), inputs(_short_of(0.9)))
-)
 _mutant("velocity-forwards-only", "velocity-range", "The robot accepts backward velocities and stands still.").made(
     secretly(_beyond(0.0), inputs(field("linear.x", lambda x: max(0.0, x))))
-)
-_mutant(
-    "velocity-integers-refused", "velocity-integers", "The robot refuses a velocity that is written with integers."
-).instead(_integral, problem(422, "linear.x: an integer is no float"))
-_mutant("linear-without-z", "linear-type", "GET of the linear velocity has no z.").json(_GET_LINEAR, without("z"))
-_mutant(
-    "linear-unwanted-lost",
-    "linear-put",
-    "PUT of a linear velocity with an unacceptable Accept header returns 204 without any effect.",
-).instead(unwanted(_PUT_LINEAR), plain(204))
-_mutant("linear-put-created", "linear-put", "PUT of a linear velocity returns 201.").altered(
-    _PUT_LINEAR, becomes(201), status(200, 204)
 )
 
 

@@ -6,12 +6,11 @@ from typing import Any
 
 from lxml import etree
 
-from conformance.mutation.changes import Make, altered, hanging_up, plain, text, wsdls
+from conformance.mutation.changes import Make, altered, plain, wsdls
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import gone, named, tree
 from conformance.packs.table1.mutants.paths import TNS
-from conformance.packs.table1.mutants.soap_responses import latin
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("describe", "soap")
@@ -151,65 +150,15 @@ _OPERATION = f"{_W}portType/{_W}operation"
 _BINDING = f"{_W}binding"
 _TRANSPORT = f"{_BINDING}/{_S}binding"
 
-_mutant("wsdl-gone", "wsdl", "GET of the WSDL returns 404.").instead(wsdls, plain(404))
-_mutant("wsdl-silent", "wsdl", "The robot closes the connection on a request for the WSDL.").made(hanging_up(wsdls))
-_mutant("wsdl-broken", "wsdl", "The last end tag of the WSDL is missing.").altered(
-    _description, text(r"</[\w:]+>\s*$", "")
-)
-_mutant("wsdl-service-name", "wsdl-names", "The service has another name.").made(
-    _all(f"{_W}service", _set("name", "TurtlebotOfficeService"))
-)
-_mutant("wsdl-port-name", "wsdl-names", "The port has another name.").made(
-    _all(f"{_W}service/{_W}port", _set("name", "Port"))
-)
-_mutant("wsdl-namespace", "wsdl-names", "The target namespace is a wrong one.").made(
-    _edited(_set("targetNamespace", "http://ros-ws.org"))
-)
-_mutant("wsdl-part-name", "wsdl-operations", "A message's part has another name.").made(
-    _all(f"{_W}message/{_W}part", _set("name", "body"))
-)
 _mutant("wsdl-order", "wsdl-types", "The schema has the elements of a sequence in another order.").made(
     _long_sequence(lambda sequence: sequence.append(sequence[0]))
 )
 _mutant("wsdl-optional", "wsdl-types", "A required element is optional in the schema.").made(
     _long_sequence(lambda sequence: sequence[0].set("minOccurs", "0"))
 )
-_mutant("wsdl-action", "wsdl-action", "wsam:Action has another value.").altered(
-    _description, text(r'(:Action=["\'])[^"\']*', r"\1urn:drive")
-)
-_mutant("wsdl-address", "wsdl-address", "The address in the WSDL is wrong.").altered(
-    _description, text(r'location="http://[^"]*"', 'location="http://127.0.0.1:9/turtlesim"')
-)
-_mutant("wsdl-no-target", "wsdl-R2105", "A schema has no targetNamespace.").xml(_description, _inline_no_target)
-_mutant("wsdl-type-part", "wsdl-R2204", "A message part has a type instead of an element.").made(
-    _first(f"{_W}message/{_W}part", _typed_part)
-)
 _mutant("wsdl-part-of-nothing", "wsdl-R2206", "A message part refers to an element that does not exist.").made(
     _first(f"{_W}message/{_W}part", lambda node: node.set("element", f"{_prefix(node)}:NothingAtAll"))
-)
-_mutant("wsdl-operation-twice", "wsdl-R2304", "A port type has an operation twice.").made(_first(_OPERATION, _twice))
-_mutant("wsdl-soap12", "wsdl-R2401", "The binding is a SOAP 1.2 binding.").altered(
-    _description, text(re.escape(_SOAP), "http://schemas.xmlsoap.org/wsdl/soap12/")
 )
 _mutant("wsdl-no-transport", "wsdl-R2701", "The binding has no transport.").made(
     _all(_TRANSPORT, lambda node: node.attrib.pop("transport", None))
 )
-_mutant("wsdl-smtp", "wsdl-R2702", "The binding's transport is SMTP.").made(
-    _all(_TRANSPORT, _set("transport", "http://schemas.xmlsoap.org/soap/smtp"))
-)
-_mutant("wsdl-mixed-styles", "wsdl-R2705", "One operation has the style rpc.").made(
-    _first(f"{_BINDING}/{_W}operation/{_S}operation", _set("style", "rpc"))
-)
-_mutant("wsdl-encoded", "wsdl-R2706", 'A soap:body has use="encoded".').made(
-    _first(f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("use", "encoded"))
-)
-_mutant("wsdl-body-namespace", "wsdl-R2716", "A soap:body has a namespace attribute.").made(
-    _first(f"{_BINDING}/{_W}operation/{_W}input/{_S}body", _set("namespace", TNS))
-)
-_mutant("wsdl-binding-short", "wsdl-R2718", "The binding lacks an operation of its port type.").made(
-    _first(f"{_BINDING}/{_W}operation", gone)
-)
-_mutant("wsdl-old-schema", "wsdl-R2801", "The types use the XML Schema namespace of 1999.").altered(
-    wsdls, text(re.escape(_XSD), "http://www.w3.org/1999/XMLSchema")
-)
-_mutant("wsdl-latin", "wsdl-R4003", "The WSDL is encoded in ISO 8859-1.").altered(_description, latin)
