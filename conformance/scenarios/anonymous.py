@@ -37,13 +37,12 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
             if operation.label in api.streams:
                 continue
             request = written(operation, usual_inputs(operation, values)[0])
-            fields = [*request.headers, *([("Content-Type", request.content_type)] if request.content_type else [])]
             for client, authorized in tried:
                 with suppress(NoAnswerError):  # the survey tells what gets no response
                     exchange = client.send(
                         request.method,
                         request.target,
-                        headers=fields,
+                        headers=request.headers,
                         body=request.body,
                         authorized=authorized,
                         fresh=True,

@@ -168,12 +168,12 @@ class Reader:
             inputs = inputs.having("query", name, value)
         # A device may answer on a new connection in another way.
         is_odd = len(query or {}) % 2 == 1
-        return written(self.listing.operation, inputs).send(self.api, fresh=is_odd)
+        return self.api.send(written(self.listing.operation, inputs), fresh=is_odd)
 
     def refused(self) -> None:
         """Send an invalid request, after which the valid ones have to be answered as before."""
         for one in islice(invalid_variations(self.listing.operation, self.usual), 1):
-            written(self.listing.operation, one.inputs).send(self.api)
+            self.api.send(written(self.listing.operation, one.inputs))
 
     def part(self, query: dict[str, Any] | None = None) -> tuple[Exchange, Page] | None:
         """Return a request as `read` sends it and the list in its response; None if there is none."""

@@ -8,7 +8,6 @@ from itertools import cycle, islice
 from typing import Final
 
 from conformance.api.rest.applicable import allowed
-from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
@@ -17,6 +16,7 @@ from conformance.documents.openapi import Operation, operations_of
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import REFUSALS, Survey, Surveyor
+from conformance.transport.exchange import Outgoing
 
 #: No content has this entity tag.
 NO_TAG: Final = '"roaas-nothing-has-this-tag"'
@@ -64,10 +64,10 @@ def neighbours(api: RestInterface, values: Values) -> Survey:
     return surveyor.trace
 
 
-def _refusals(api: RestInterface) -> list[tuple[Operation, GeneratedRequest]]:
+def _refusals(api: RestInterface) -> list[tuple[Operation, Outgoing]]:
     """Return requests that the device has refused: one of each status first, those with content before others."""
     by_label = {item.label: item for item in operations_of(api.run.contract)}
-    by_status: dict[int, list[tuple[Operation, GeneratedRequest]]] = {}
+    by_status: dict[int, list[tuple[Operation, Outgoing]]] = {}
     for (status, label), request in sorted(api.refused.items(), key=lambda one: not one[1].body):
         if label in by_label and status in REFUSALS:
             by_status.setdefault(status, []).append((by_label[label], request))
@@ -76,10 +76,7 @@ def _refusals(api: RestInterface) -> list[tuple[Operation, GeneratedRequest]]:
 
 
 def _after(
-    surveyor: Surveyor,
-    read: Operation,
-    tried: list[Inputs],
-    refusals: Iterator[tuple[Operation, GeneratedRequest] | None],
+    surveyor: Surveyor, read: Operation, tried: list[Inputs], refusals: Iterator[tuple[Operation, Outgoing] | None]
 ) -> Inputs | None:
     """Send a refused request, and read on the same connection; return what was read with, if that was answered 2xx."""
     for inputs in tried:

@@ -7,7 +7,6 @@ from contextlib import suppress
 from typing import Final
 
 from conformance.api.rest.applicable import allowed
-from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.left_behind import LeftBehind
 from conformance.api.rest.request_context import RequestContext
@@ -20,7 +19,7 @@ from conformance.documents.resources import matching
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey
-from conformance.transport.exchange import Attempt, Exchange, Listener, NoAnswer, NoAnswerError, Unanswered
+from conformance.transport.exchange import Attempt, Exchange, Listener, NoAnswer, NoAnswerError, Outgoing, Unanswered
 from conformance.verdict.time_limit import TimeIsOverError
 
 # Different responses that are kept, so that a long run needs no more memory.
@@ -90,9 +89,8 @@ class OtherExchanges(Listener):
         hidden = any(item.required for where in ("header", "cookie") for item in operation.parameter(where))
         if not context.usual or hidden or "transfer-encoding" in names or context.accept not in _ANY_FORMAT:
             return ""
-        content_type = next((value for name, value in request.headers if name.lower() == "content-type"), "")
-        said = validity(contract, request.method, context.target, content_type, request.body)
-        sent = GeneratedRequest(request.method, context.target, content_type, request.body)
+        sent = Outgoing(request.method, context.target, request.headers, request.body)
+        said = validity(contract, sent.method, sent.target, sent.content_type, sent.body)
         # Whatever a request refers to, it is no reason to fail.
         crashed = isinstance(attempt, Exchange) and attempt.response.status in CRASHES
         invents = not crashed and self._api.values is not None and self._api.values.invents(operation, sent)

@@ -9,7 +9,6 @@ from typing import Any, Final
 from urllib.parse import quote, urlsplit
 
 from conformance.api.rest.applicable import allowed
-from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.references import is_free_text
@@ -27,7 +26,7 @@ from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey, Surveyor
 from conformance.scenarios.writing import Writer, members
-from conformance.transport.exchange import NoAnswerError, NotPermittedError
+from conformance.transport.exchange import NoAnswerError, NotPermittedError, Outgoing
 from conformance.transport.reach import is_same, joined, path_of
 
 _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
@@ -132,7 +131,7 @@ class _Thing:
                 continue
             for method in ("OPTIONS", *(one for one in _STANDARD if one not in resource.methods)):
                 with suppress(NotPermittedError):
-                    GeneratedRequest(method, self.target.rstrip("/") + below, "", b"").send(self.api)
+                    self.api.send(Outgoing(method, self.target.rstrip("/") + below))
         self.get()
 
     def written(self, changes: list[Operation]) -> None:

@@ -14,7 +14,6 @@ from urllib.parse import unquote
 
 from conformance.api.rest.applicable import allowed
 from conformance.api.rest.calls import Call, value_text
-from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.invalid_variations import invalid_variations
@@ -35,7 +34,15 @@ from conformance.documents.patterns import SlowPatternError
 from conformance.documents.resources import known_path
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
-from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, NotPermittedError, Unanswered
+from conformance.transport.exchange import (
+    Attempt,
+    Exchange,
+    NoAnswer,
+    NoAnswerError,
+    NotPermittedError,
+    Outgoing,
+    Unanswered,
+)
 from conformance.verdict.effort import Effort
 from conformance.verdict.explorer import Explorer
 from conformance.verdict.time_limit import TimeIsOverError
@@ -213,12 +220,7 @@ class Surveyor:
         return Survey(tuple(self.probes), elsewhere=self.elsewhere)
 
     def send(
-        self,
-        operation: Operation,
-        variation: Variation,
-        request: GeneratedRequest | None = None,
-        *,
-        fresh: bool | None = None,
+        self, operation: Operation, variation: Variation, request: Outgoing | None = None, *, fresh: bool | None = None
     ) -> Probe:
         """Send one request and record it.
 
@@ -274,11 +276,11 @@ class Surveyor:
         succeeds = operation.method == "POST" and label in self.api.working
         if succeeds and usual is not None and label not in self.api.single:
             with suppress(NotPossibleError, TimeIsOverError, NoAnswerError):
-                again = written(operation, usual).send(self.api)
+                again = self.api.send(written(operation, usual))
                 self.api.single[label] = again.response.status in _DOUBTED
         return self.api.single.get(label, False)
 
-    def _described(self, operation: Operation, variation: Variation, request: GeneratedRequest) -> Probe:
+    def _described(self, operation: Operation, variation: Variation, request: Outgoing) -> Probe:
         """Return a probe of a request that is not sent yet."""
         said = validity(
             self.api.run.contract, request.method, request.target, request.content_type, request.body, request.headers
@@ -297,7 +299,7 @@ class Surveyor:
             invents=invents,
         )
 
-    def _recorded(self, request: GeneratedRequest, *, fresh: bool) -> Exchange:
+    def _recorded(self, request: Outgoing, *, fresh: bool) -> Exchange:
         """Send a request whose exchange becomes a probe, so that no observer judges it as well.
 
         Raises:
@@ -305,7 +307,7 @@ class Surveyor:
         """
         self.api.is_recorded = True
         try:
-            return request.send(self.api, fresh=fresh, timeout_s=_GRACE * self.api.client.connection.timeout_s)
+            return self.api.send(request, fresh=fresh, timeout_s=_GRACE * self.api.client.connection.timeout_s)
         finally:
             self.api.is_recorded = False
 
@@ -495,7 +497,7 @@ def _repeated(surveyor: Surveyor, operations: list[Operation]) -> Survey:
             if surveyor.api.run.limit.is_past(SURVEY_SHARE):
                 break
             try:
-                last = request.send(surveyor.api)
+                last = surveyor.api.send(request)
             except NoAnswerError as none:
                 losses = surveyor.api.run.losses
                 goes_on = surveyor.api.alive()

@@ -96,8 +96,8 @@ class Writer:
         request = written(operation, inputs)
         rest = "".join(request.target.partition("?")[1:])
         request = replace(request, headers=(*request.headers, *headers))
-        request = replace(request, content_type=media_type) if media_type else request
-        return (replace(request, target=path + rest) if path else request).send(self.api, fresh=fresh)
+        request = request.having_type(media_type) if media_type else request
+        return self.api.send(replace(request, target=path + rest) if path else request, fresh=fresh)
 
     def bodies(self, operation: Operation, turn: int, now: dict[str, Any] | None = None) -> list[dict[str, Any]]:
         """Return JSON objects to send with an operation: with other values in each turn, then the usual one.

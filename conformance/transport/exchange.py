@@ -1,10 +1,10 @@
 """Requests and responses as values that can be recorded, shown and sent again."""
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Self
 from urllib.parse import quote
 
 from conformance.transport.shell_command import bytes_command, shell_command
@@ -21,6 +21,45 @@ _LONG_SEGMENT = 40
 # The first element in a SOAP Body names the operation: the operations of a service share one URL.
 _SOAP_OPERATION = re.compile(rb"<(?:[\w.-]+:)?Body[^>]*>\s*<(?:[\w.-]+:)?([\w.-]+)")
 _SOAP_HEAD = 4096
+
+
+@dataclass(frozen=True)
+class Outgoing:
+    """One HTTP request that is to be sent.
+
+    Attributes:
+        method: HTTP method.
+        target: path and query below the base URL.
+        headers: (name, value) pairs, beside those of every request.
+        body: request body.
+    """
+
+    method: str
+    target: str
+    headers: tuple[tuple[str, str], ...] = ()
+    body: bytes = b""
+
+    @classmethod
+    def of(
+        cls, method: str, target: str, content_type: str, body: bytes, headers: tuple[tuple[str, str], ...] = ()
+    ) -> Self:
+        """Return a request with a Content-Type; empty: without one."""
+        return cls(method, target, (*headers, *((("Content-Type", content_type),) if content_type else ())), body)
+
+    @property
+    def content_type(self) -> str:
+        """The value of Content-Type; empty without the header."""
+        return next((value for name, value in self.headers if name.lower() == "content-type"), "")
+
+    @property
+    def media_type(self) -> str:
+        """The media type in Content-Type, without parameters, in lower case; empty without the header."""
+        return media_type_of(self.content_type)
+
+    def having_type(self, content_type: str) -> Self:
+        """Return the request with another Content-Type."""
+        others = tuple(pair for pair in self.headers if pair[0].lower() != "content-type")
+        return replace(self, headers=(*others, ("Content-Type", content_type)))
 
 
 @dataclass(frozen=True)

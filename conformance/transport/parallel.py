@@ -3,12 +3,11 @@
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Final
 
-from conformance.transport.client import Headers, HttpClient
-from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Outgoing
 from conformance.transport.passage import Heard
 
 # More than this at once is a load test, and more than a small robot has sockets for.
@@ -17,20 +16,8 @@ MOST_CLIENTS: Final = 8
 _BUSY: Final = frozenset({HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVAILABLE})
 
 
-@dataclass(frozen=True)
-class Outgoing:
-    """A request to be sent.
-
-    Attributes:
-        client: the interface to send it to.
-        method, path, headers, body: as for HttpClient.send().
-    """
-
-    client: HttpClient
-    method: str
-    path: str
-    headers: Headers = ()
-    body: bytes = b""
+#: A request with the interface to send it to.
+Addressed = tuple[HttpClient, Outgoing]
 
 
 def is_busy(attempt: Attempt) -> bool:
@@ -38,7 +25,7 @@ def is_busy(attempt: Attempt) -> bool:
     return not isinstance(attempt, Exchange) or attempt.response.status in _BUSY
 
 
-def send_together(rounds: Sequence[Sequence[Outgoing]]) -> list[list[Attempt]]:
+def send_together(rounds: Sequence[Sequence[Addressed]]) -> list[list[Attempt]]:
     """Send the requests of each round concurrently, one round after another.
 
     The nth request of every round belongs to the nth client, which keeps its connection. Listeners are called
@@ -58,21 +45,21 @@ def send_together(rounds: Sequence[Sequence[Outgoing]]) -> list[list[Attempt]]:
     try:
         with ThreadPoolExecutor(max(1, len(clients))) as pool:
             for requests in rounds:
-                for request in requests:
-                    request.client.connection.take_slot((request.method, request.client.url(request.path)))
+                for to, request in requests:
+                    to.connection.take_slot((request.method, to.url(request.target)))
                 start = threading.Barrier(len(requests))
                 try:
                     jobs = [
-                        pool.submit(client.send, request, start.wait)
-                        for client, request in zip(clients, requests, strict=False)
+                        pool.submit(client.send, *addressed, start.wait)
+                        for client, addressed in zip(clients, requests, strict=False)
                     ]
                     attempts.append([job.result() for job in jobs])
                 except BaseException:
                     # A signal came before all were begun: the others would wait, and the process, without an end.
                     start.abort()
                     raise
-                for request in requests:
-                    request.client.connection.note(request.method)
+                for to, request in requests:
+                    to.connection.note(request.method)
                 _tell(requests, attempts[-1])
     finally:
         for client in clients:
@@ -87,15 +74,14 @@ class _Client:
         # By base URL: the client whose connections are shared, and the own one.
         self._clients: dict[str, tuple[HttpClient, HttpClient]] = {}
 
-    def send(self, request: Outgoing, wait: Callable[[], object]) -> Attempt:
+    def send(self, shared: HttpClient, request: Outgoing, wait: Callable[[], object]) -> Attempt:
         """Wait for the other clients, then send."""
-        shared = request.client
         # The ceiling on the rate has been kept to before.
         settings = shared.connection.unheard(heard=Heard.UNLESS_BUSY, request_rate=None, resent=0)
         _, own = self._clients.setdefault(shared.base_url, (shared, HttpClient(shared.base_url, settings)))
         wait()
         try:
-            return own.send(request.method, request.path, headers=request.headers, body=request.body)
+            return own.send(request.method, request.target, headers=request.headers, body=request.body)
         except NoAnswerError as none:
             return none.unanswered
 
@@ -106,14 +92,14 @@ class _Client:
             shared.connection.resent += own.connection.resent
 
 
-def _tell(requests: Sequence[Outgoing], attempts: Sequence[Attempt]) -> None:
+def _tell(requests: Sequence[Addressed], attempts: Sequence[Attempt]) -> None:
     """Call the listeners with the results.
 
     Raises:
         NoAnswerError: a request got no response.
     """
-    for request, attempt in zip(requests, attempts, strict=True):
-        for listener in request.client.connection.listeners:
+    for (to, _), attempt in zip(requests, attempts, strict=True):
+        for listener in to.connection.listeners:
             if isinstance(attempt, Exchange) and not is_busy(attempt):
                 listener.answered(attempt)
             elif not isinstance(attempt, Exchange) and attempt.kind not in {NoAnswer.CLOSED, NoAnswer.REFUSED}:

@@ -12,8 +12,8 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.snapshot import steady
 from conformance.documents.json_schema import Schema
 from conformance.documents.representation import UnreadableError, flattened, read
-from conformance.transport.exchange import Exchange
-from conformance.transport.parallel import MOST_CLIENTS, Outgoing, send_together
+from conformance.transport.exchange import Exchange, Outgoing
+from conformance.transport.parallel import MOST_CLIENTS, send_together
 
 # A robot at rest jitters; a difference in so many turns in a row is no jitter.
 _TURNS = 10
@@ -64,7 +64,7 @@ def each_after(event: Callable[[], object]) -> Reader:
 def at_once(api: RestInterface, call: Call, media_types: list[str]) -> list[tuple[str, Exchange]]:
     """Read a resource in each format at the same moment, by several clients; a busy robot may leave some out."""
     names = [*media_types, *itertools.repeat(JSON, MOST_CLIENTS)][:MOST_CLIENTS]
-    round_ = [Outgoing(api.client, "GET", call.path, (("Accept", name),)) for name in names]
+    round_ = [(api.client, Outgoing("GET", call.path, (("Accept", name),))) for name in names]
     attempts = zip(media_types, send_together([round_])[0], strict=False)
     return [(name, one) for name, one in attempts if isinstance(one, Exchange)]
 

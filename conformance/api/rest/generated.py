@@ -24,11 +24,10 @@ from schemathesis.generation.drivers import CoverageGenerator, ExamplesGenerator
 from schemathesis.generation.feedback import NO_FEEDBACK
 from schemathesis.generation.overrides import Override
 
-from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.contract.pack import Contract
 from conformance.documents.pattern_python import with_python_patterns
 from conformance.documents.schema_budget import unrolls
-from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Exchange, Outgoing
 
 #: Raised where no case can be made: schemas allow everything or nothing, or Schemathesis does not know a media type.
 NOT_GENERATED = (Unsatisfiable, SerializationNotPossible)
@@ -57,14 +56,14 @@ class Target:
         """Whether its requests have parameters or a body."""
         return any(True for _ in self.operation.iter_parameters()) or bool(list(self.operation.body))
 
-    def examples(self) -> Iterator[GeneratedRequest]:
+    def examples(self) -> Iterator[Outgoing]:
         """Yield requests from the contract's examples."""
         maker = ExamplesGenerator(
             operation=self.operation, override=Override(), feedback=NO_FEEDBACK, fill_missing=False
         )
         yield from _requests(maker)
 
-    def coverage(self) -> Iterator[GeneratedRequest]:
+    def coverage(self) -> Iterator[Outgoing]:
         """Yield requests on both sides of each constraint of the schemas."""
         yield from _requests(self.covering())
 
@@ -83,7 +82,7 @@ class Target:
             feedback=NO_FEEDBACK,
         )
 
-    def fuzzing(self, *, negative: bool) -> SearchStrategy[GeneratedRequest | None]:
+    def fuzzing(self, *, negative: bool) -> SearchStrategy[Outgoing | None]:
         """Return a strategy for requests that fit the schemas, or violate them.
 
         It yields None for a request that cannot be sent.
@@ -151,7 +150,7 @@ def state_machine(document: dict[str, Any]) -> Any:
     return machine
 
 
-def _requests(cases: Any) -> Iterator[GeneratedRequest]:
+def _requests(cases: Any) -> Iterator[Outgoing]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for case in cases:
@@ -160,7 +159,7 @@ def _requests(cases: Any) -> Iterator[GeneratedRequest]:
                 yield one
 
 
-def as_request(case: Any) -> GeneratedRequest | None:
+def as_request(case: Any) -> Outgoing | None:
     """Return a Schemathesis case as a request, or None if HTTP cannot transmit it."""
     try:
         given = case.as_transport_kwargs(base_url=_BASE)
@@ -180,7 +179,7 @@ def as_request(case: Any) -> GeneratedRequest | None:
     method = str(request.method)
     if not (content_type.isprintable() and content_type.isascii() and target.isascii() and method.isascii()):
         return None
-    return GeneratedRequest(method, target, content_type, body.encode() if isinstance(body, str) else body)
+    return Outgoing.of(method, target, content_type, body.encode() if isinstance(body, str) else body)
 
 
 def own_headers(case: Any) -> tuple[tuple[str, str], ...] | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.samples import sample
 from conformance.api.rest.validity import validity_by
 from conformance.api.rest.values import Values
@@ -21,6 +20,7 @@ from conformance.documents.serialization import (
     query_text,
 )
 from conformance.documents.writing import json_text, xml_bytes
+from conformance.transport.exchange import Outgoing
 
 FORM: Final = "application/x-www-form-urlencoded"
 MULTIPART: Final = "multipart/form-data"
@@ -66,7 +66,7 @@ class Inputs:
         return replace(self, **changed)
 
 
-def written(operation: Operation, inputs: Inputs) -> GeneratedRequest:
+def written(operation: Operation, inputs: Inputs) -> Outgoing:
     """Return the request that carries the inputs (OpenAPI 3.1, 4.8.12.2: styles of parameters)."""
     path, query, headers = operation.template, [], [("Accept", inputs.accept)] if inputs.accept else []
     cookies = []
@@ -93,7 +93,7 @@ def written(operation: Operation, inputs: Inputs) -> GeneratedRequest:
         headers.append(("Cookie", "; ".join(f"{name}={text}" for name, text in cookies)))
     content_type, body = _body(operation, inputs)
     target = f"{path}?{query_text(query, reserved)}" if query else path
-    return GeneratedRequest(operation.method, target, content_type, body, tuple(headers))
+    return Outgoing.of(operation.method, target, content_type, body, tuple(headers))
 
 
 def _body(operation: Operation, inputs: Inputs) -> tuple[str, bytes]:

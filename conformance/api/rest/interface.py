@@ -12,7 +12,7 @@ from conformance.api.rest.driven import Driven
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.transport.client import HttpClient
-from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Exchange, Outgoing
 from conformance.verdict.run import Run
 
 
@@ -78,6 +78,28 @@ class RestInterface:
         """What may be called of an API of which only its description is known."""
         calls = self.run.statement.calls
         return CallRules(calls.allow, calls.never, motion=self.run.allow_motion)
+
+    def send(self, request: Outgoing, *, fresh: bool = False, timeout_s: float | None = None) -> Exchange:
+        """Send a request; PUT and DELETE on a connection of their own.
+
+        Clients send those again when a kept connection ends (RFC 9112 9.3.1), which hides a device that hangs up.
+
+        Args:
+            request: the request.
+            fresh: on a connection of its own.
+            timeout_s: deadline instead of the run's, s.
+
+        Raises:
+            NoAnswerError: no HTTP response was received.
+        """
+        return self.client.send(
+            request.method,
+            request.target,
+            headers=request.headers,
+            body=request.body,
+            fresh=fresh or request.method in {"PUT", "DELETE"},
+            timeout_s=timeout_s,
+        )
 
     @property
     def path(self) -> str:

@@ -6,12 +6,12 @@ from typing import Any
 
 from conformance.api.rest.applicable import allowed
 from conformance.api.rest.calls import JSON, example_call
-from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import INVALID, VALID, Validity, validity
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.writing import json_text
+from conformance.transport.exchange import Outgoing
 
 # How many valid requests of one moving operation are sent: each may start a mission.
 _ACCEPTED = 3
@@ -30,7 +30,7 @@ class MotionGuard:
         self._api = api
         self._valid: Counter[str] = Counter()
 
-    def admit(self, item: GeneratedRequest) -> GeneratedRequest | None:
+    def admit(self, item: Outgoing) -> Outgoing | None:
         """Return the request as it may be sent, or None if it may not."""
         said = self._validity(item)
         operation = said.operation
@@ -47,20 +47,20 @@ class MotionGuard:
         # What may be taken with whatever values are in it is not sent to a robot; what must be refused is sent slow.
         return self._slow(item) if said.verdict == INVALID else None
 
-    def count(self, item: GeneratedRequest, *, accepted: bool) -> None:
+    def count(self, item: Outgoing, *, accepted: bool) -> None:
         """Count an accepted request."""
         operation = self._validity(item).operation
         if accepted and operation is not None and operation.motion:
             self._valid[operation.id] += 1
 
-    def _validity(self, item: GeneratedRequest) -> Validity:
+    def _validity(self, item: Outgoing) -> Validity:
         return validity(self._api.run.contract, item.method, item.target, item.media_type, item.body)
 
-    def _may_reach(self, item: GeneratedRequest) -> bool:
+    def _may_reach(self, item: Outgoing) -> bool:
         """Return whether a request with a method that its resource does not support may be sent."""
         return self._api.run.allow_motion or item.method in {"GET", "HEAD", "OPTIONS", "TRACE"} or not item.body
 
-    def _fitted(self, item: GeneratedRequest, operation: Operation) -> GeneratedRequest | None:
+    def _fitted(self, item: Outgoing, operation: Operation) -> Outgoing | None:
         """Return a valid request of a moving operation with sensible values; None after a few of them."""
         if self._valid[operation.id] >= _ACCEPTED:
             return None
@@ -69,7 +69,7 @@ class MotionGuard:
         call = example_call(self._api, operation, item.media_type or JSON)
         return replace(item, target=call.path, body=call.body if operation.bodies else item.body)
 
-    def _slow(self, item: GeneratedRequest) -> GeneratedRequest:
+    def _slow(self, item: Outgoing) -> Outgoing:
         text = read_json(item.body)
         if not item.body or text.problem or item.media_type != JSON:
             return item

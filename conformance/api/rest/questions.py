@@ -17,8 +17,8 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, operations_of
 from conformance.documents.patterns import PatternError
 from conformance.documents.representation import UnreadableError, read
-from conformance.transport.exchange import Response
-from conformance.transport.parallel import Outgoing
+from conformance.transport.exchange import Outgoing, Response
+from conformance.transport.parallel import Addressed
 
 # Stands in the questions that only one client sends.
 _MARK: Final = "roaas-client-"
@@ -43,9 +43,9 @@ class Question:
     mismatch: Callable[[Response], str]
     comes_and_goes: bool = False
 
-    def outgoing(self, api: RestInterface) -> Outgoing:
+    def outgoing(self, api: RestInterface) -> Addressed:
         """Return the request as one of several clients sends it."""
-        return Outgoing(api.client, "GET", self.path, (("Accept", self.accept),))
+        return api.client, Outgoing("GET", self.path, (("Accept", self.accept),))
 
 
 def questions(api: RestInterface, more: Iterable[Question] = ()) -> list[Question]:

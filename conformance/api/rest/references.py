@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Any, Final
 from urllib.parse import parse_qsl, urlsplit
 
-from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.documents.field_reading import pairs_of
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
@@ -17,6 +16,7 @@ from conformance.documents.parameter_reading import decoded_query
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
+from conformance.transport.exchange import Outgoing
 
 # How the names of references end: what they identify, or where a list goes on.
 _ENDS: Final = ("id", "ids", "uuid", "guid", "cursor", "token", "reference", "href", "parent", "etag")
@@ -110,7 +110,7 @@ def is_free_text(schema: Schema) -> bool:
     return given["format"] not in _DEFINED if isinstance(given.get("format"), str) else "pattern" not in given
 
 
-def values_in(operation: Operation, request: GeneratedRequest) -> Iterator[tuple[str, Schema, str]]:
+def values_in(operation: Operation, request: Outgoing) -> Iterator[tuple[str, Schema, str]]:
     """Yield name, schema and text of each scalar in the query and body of a request."""
     schemas = {item.name: item.schema for item in operation.parameter("query")}
     yield from _fields(schemas, request.target.partition("?")[2])

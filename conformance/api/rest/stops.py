@@ -172,10 +172,9 @@ def _send(api: RestInterface, operation: Operation) -> str:
             break
         moved = inputs in driven
         request = written(operation, inputs)
-        fields = [*request.headers, *([("Content-Type", request.content_type)] if request.content_type else [])]
         try:
             exchange = api.client.send(
-                request.method, request.target, headers=fields, body=request.body, timeout_s=_DEADLINE_S
+                request.method, request.target, headers=request.headers, body=request.body, timeout_s=_DEADLINE_S
             )
         except NotPermittedError:
             return ""  # the user's --never

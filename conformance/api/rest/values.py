@@ -7,7 +7,6 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.references import in_link, refers, singular, thing_of, values_in
 from conformance.api.rest.samples import backwards, fits, sample
 from conformance.documents.json_schema import Schema, kinds_of
@@ -16,7 +15,7 @@ from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import Parameter, plain_name
 from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
-from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Exchange, Outgoing
 
 # As many values of one name are remembered, and as many are tried in one place.
 _REMEMBERED, _TRIED = 8, 4
@@ -82,12 +81,12 @@ class Values:
         for name, value in in_link(text):
             self._remember(self._seen[plain_name(name)], value)
 
-    def accepted(self, operation: Operation, request: GeneratedRequest) -> None:
+    def accepted(self, operation: Operation, request: Outgoing) -> None:
         """Remember what stood in a request that the device accepted."""
         for name, _, text in values_in(operation, request) if request.method == operation.method else ():
             self._accepted[plain_name(name)].add(text)
 
-    def invents(self, operation: Operation, request: GeneratedRequest) -> bool:
+    def invents(self, operation: Operation, request: Outgoing) -> bool:
         """Return whether a request refers to something that the device has not named so far."""
         return any(
             refers(name, schema, self.collections) and not self._is_known(operation, name, schema, text)

@@ -11,13 +11,13 @@ import pytest
 
 from conformance.api.expectation import expect
 from conformance.api.rest.applicable import allowed
-from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.motion_guard import MotionGuard
 from conformance.api.rest.refusals import judge_refusal
 from conformance.api.rest.validity import INVALID, VALID, validity
 from conformance.documents.openapi import operations_of
 from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Outgoing
 from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
 
@@ -87,7 +87,7 @@ def _run(api: RestInterface, judge: Judge, explore: Explorer, guard: MotionGuard
     for item in api.run.effort.subsample([*target.examples(), *coverage], 1):
         _judge_generated(api, judge, guard, item)
 
-    def fuzz(item: GeneratedRequest | None) -> None:
+    def fuzz(item: Outgoing | None) -> None:
         if item is not None:
             _judge_generated(api, judge, guard, item)
 
@@ -102,7 +102,7 @@ def _run(api: RestInterface, judge: Judge, explore: Explorer, guard: MotionGuard
             continue
 
 
-def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item: GeneratedRequest) -> None:
+def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item: Outgoing) -> None:
     """Send a generated request if it is harmless; a valid one must get a declared status, an invalid one 4xx."""
     fit = guard.admit(item)
     if fit is None:
@@ -110,9 +110,9 @@ def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item:
     said = validity(api.run.contract, fit.method, fit.target, fit.media_type, fit.body)
     if said.verdict == INVALID:
         body = said.requirement.startswith("json")
-        judge_refusal(api, lambda: fit.send(api), f"strict-input/{said.requirement}", said.why, json=body)
+        judge_refusal(api, lambda: api.send(fit), f"strict-input/{said.requirement}", said.why, json=body)
         return
-    exchange = fit.send(api)
+    exchange = api.send(fit)
     answer = exchange.response
     guard.count(fit, accepted=answer.ok)
     if said.verdict == VALID and said.operation is not None:
@@ -144,7 +144,7 @@ def test_walk_along_the_links(api: RestInterface, rest: HttpClient, judge: Judge
             if fit is None:
                 exchange = rest.send("GET", api.path)
             else:
-                exchange = fit.send(api)
+                exchange = api.send(fit)
                 guard.count(fit, accepted=exchange.response.ok)
             return as_thesis(exchange)
 

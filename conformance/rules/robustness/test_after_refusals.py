@@ -12,7 +12,6 @@ from conformance.api.expectation import expect
 from conformance.api.rest import by_hand
 from conformance.api.rest.applicable import allowed, reads
 from conformance.api.rest.calls import Call
-from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
@@ -20,7 +19,7 @@ from conformance.api.rest.variations import unknown_variations
 from conformance.contract.sizes import TAKEN_OCTETS
 from conformance.documents.openapi import Operation, operations_of
 from conformance.transport import raw
-from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, NotPermittedError
+from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, NotPermittedError, Outgoing
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("acting"), pytest.mark.needs("rest")]
@@ -58,23 +57,23 @@ def test_reads_behind_refused_content(api: RestInterface, judge: Judge, values: 
                 )
 
 
-def _refused(operation: Operation, values: Values, number: int) -> list[GeneratedRequest]:
+def _refused(operation: Operation, values: Values, number: int) -> list[Outgoing]:
     """Return requests with content that a device refuses by its media type, as unreadable, and for an unknown id."""
     usual = usual_inputs(operation, values)[0]
     valid = written(operation, usual)
     small, large = valid.body or b"{}", (valid.body or b"{}").ljust(TAKEN_OCTETS)
     # It ends in a space, so that no server takes its end for the name of a method.
     cut = b'{"roaas": '.ljust(0 if number % 2 else TAKEN_OCTETS)
-    other = replace(valid, content_type=_TEXT, body=large if number % 2 else small)
+    other = replace(valid.having_type(_TEXT), body=large if number % 2 else small)
     found = [replace(valid, body=cut), *([other] if _TEXT not in operation.bodies else [])]
     unknown = list(unknown_variations(operation, usual))[-1:]
     return found + [replace(written(operation, one.inputs), body=small if number % 2 else large) for one in unknown]
 
 
-def _behind(api: RestInterface, request: GeneratedRequest, call: Call) -> Attempt | None:
+def _behind(api: RestInterface, request: Outgoing, call: Call) -> Attempt | None:
     """Send a request and a read behind it; return what came for the read, None where nothing has to."""
     fields = [f"{name}: {value}" for name, value in request.headers]
-    fields += [f"Content-Type: {request.content_type}", f"Content-Length: {len(request.body)}"]
+    fields.append(f"Content-Length: {len(request.body)}")
     first = raw.head(api.client, request.method, request.target, *fields) + request.body
     octets = first + raw.head(api.client, "GET", call.path, "Connection: close")
     try:

@@ -144,7 +144,7 @@ class _Sender:
         made = self.mapped.request_of(self.given, values)
         whole = None if promised is None else len(made.body) + promised
         client = self.mapped.api.client
-        request = PartialRequest(client, made.method, made.path, sent=made.body, promised=whole, headers=made.headers)
+        request = PartialRequest(client, made.method, made.target, sent=made.body, promised=whole, headers=made.headers)
         self.mapped.clock.sleep(_READ_S)
         request.vanish(reset=promised is None)
         return Tried("incomplete", f"{self.what} of which some bytes were not sent", None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 from conformance.api.rest.interface import RestInterface
@@ -17,20 +16,7 @@ from conformance.documents.xml_node import Node
 from conformance.documents.xml_values import NoElementError, node_of, value_of
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
 from conformance.transport.client import Headers
-
-
-@dataclass(frozen=True)
-class Made:
-    """A request that was made of a call.
-
-    Attributes:
-        method, path, headers, body: as for HttpClient.send().
-    """
-
-    method: str
-    path: str
-    headers: Headers
-    body: bytes
+from conformance.transport.exchange import Outgoing
 
 
 class Binding(Protocol):
@@ -46,7 +32,7 @@ class Binding(Protocol):
     def has_credentials(self) -> bool:
         """Whether a request can be sent without the credentials that the device wants."""
 
-    def made(self, call: str, body: Any, *, authorized: bool = True) -> Made:
+    def made(self, call: str, body: Any, *, authorized: bool = True) -> Outgoing:
         """Return the request of a call with a body; None: it has none, or the usual one."""
 
     def content(self, octets: bytes) -> Any:
@@ -69,13 +55,13 @@ class JsonBinding:
         """Whether the connection has any."""
         return bool(self._api.client.connection.credentials.items)
 
-    def made(self, call: str, body: Any, *, authorized: bool = True) -> Made:  # noqa: ARG002 - the client leaves them out
+    def made(self, call: str, body: Any, *, authorized: bool = True) -> Outgoing:  # noqa: ARG002 - the client leaves them out
         """Return the request of a call."""
         method, _, path = call.partition(" ")
         fields: Headers = (("Accept", "application/json"),) if body is None and method == "GET" else ()
         if body is None:
-            return Made(method, path, fields, b"")
-        return Made(method, path, (("Content-Type", "application/json"),), json.dumps(body).encode())
+            return Outgoing(method, path, fields, b"")
+        return Outgoing(method, path, (("Content-Type", "application/json"),), json.dumps(body).encode())
 
     def content(self, octets: bytes) -> Any:
         """Return the JSON of a body."""
@@ -84,8 +70,7 @@ class JsonBinding:
     def forbids(self, call: str, body: Any) -> bool:
         """Return whether the OpenAPI description forbids a call."""
         one = self.made(call, body)
-        media_type = "application/json" if body is not None else ""
-        return validity(self._api.run.contract, one.method, one.path, media_type, one.body).verdict == INVALID
+        return validity(self._api.run.contract, one.method, one.target, one.media_type, one.body).verdict == INVALID
 
 
 class SoapBinding:
@@ -103,7 +88,7 @@ class SoapBinding:
         """Whether messages carry a token, or the connection has any."""
         return self._messages.token is not None or bool(self._api.client.connection.credentials.items)
 
-    def made(self, call: str, body: Any, *, authorized: bool = True) -> Made:
+    def made(self, call: str, body: Any, *, authorized: bool = True) -> Outgoing:
         """Return the message of a call, with its values in the order of the schema.
 
         Raises:
@@ -112,7 +97,7 @@ class SoapBinding:
         """
         port, operation, node = self._node(call, body)
         message = self._messages.message(port, operation, node, authorized=authorized)
-        return Made("POST", target_of(port), fields_of(port, operation), message)
+        return Outgoing("POST", target_of(port), fields_of(port, operation), message)
 
     def _node(self, call: str, body: Any) -> tuple[SoapPort, SoapOperation, Node | None]:
         port, operation = self._operations[call]

@@ -9,14 +9,14 @@ from urllib.parse import urlsplit
 
 from conformance.api.rest.interface import RestInterface
 from conformance.observe.clock import WALL_CLOCK, Clock
-from conformance.scenarios.motion.binding import Binding, JsonBinding, Made
+from conformance.scenarios.motion.binding import Binding, JsonBinding
 from conformance.scenarios.motion.room import Room
 from conformance.scenarios.motion.templates import NoValueError, at, filled, numbers_at, seconds_of
 from conformance.scenarios.motion.trace import SEVERAL, Command, Leg, Reading, fastest, middle_of
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.motion_map import Goto, MotionMap, Stop, Switch, Velocity, names_in
 from conformance.transport.client import is_drafting
-from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, NotPermittedError
+from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, NotPermittedError, Outgoing
 
 #: For so long a device that has arrived is watched, s.
 STAYS_S: Final = 0.3
@@ -131,7 +131,7 @@ class MappedDevice:
         exchange = self.send(self.binding.made(call, None))
         return exchange, self.binding.content(exchange.response.body)
 
-    def send(self, made: Made, *, authorized: bool = True, timeout_s: float | None = None) -> Exchange:
+    def send(self, made: Outgoing, *, authorized: bool = True, timeout_s: float | None = None) -> Exchange:
         """Send a request.
 
         Raises:
@@ -139,7 +139,7 @@ class MappedDevice:
         """
         sent = self.clock.now()
         exchange = self.api.client.send(
-            made.method, made.path, headers=made.headers, body=made.body, authorized=authorized, timeout_s=timeout_s
+            made.method, made.target, headers=made.headers, body=made.body, authorized=authorized, timeout_s=timeout_s
         )
         self.room.slowest_s = max(self.room.slowest_s, self.clock.now() - sent)
         return exchange
@@ -171,11 +171,11 @@ class MappedDevice:
 
     def request_of(
         self, given: Goto | Velocity | Switch | Stop, values: Mapping[str, Any], *, authorized: bool = True
-    ) -> Made:
+    ) -> Outgoing:
         """Return the request of a command; see call_of()."""
         return self.binding.made(*self.call_of(given, values), authorized=authorized)
 
-    def _sent(self, made: Made, targets: Position, timeout_s: float | None = None) -> Command:
+    def _sent(self, made: Outgoing, targets: Position, timeout_s: float | None = None) -> Command:
         sent = self.clock.now()
         exchange = self.send(made, timeout_s=timeout_s)
         return Command(sent, self.clock.now(), targets, exchange)

@@ -13,7 +13,7 @@ from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.statement.motion_map import Goto, Velocity
 from conformance.transport.exchange import Exchange
-from conformance.transport.parallel import Outgoing, send_together
+from conformance.transport.parallel import send_together
 from conformance.verdict.effort import Effort
 
 _NEEDS: Final = (Need.REST, Need.MOTION)
@@ -29,9 +29,8 @@ def _at_once(mapped: MappedDevice, given: Goto | Velocity, several: list[Positio
         NotPossibleError: none was answered.
     """
     made = [mapped.request_of(given, one) for one in several]
-    outgoing = [Outgoing(mapped.api.client, one.method, one.path, one.headers, one.body) for one in made]
     sent = mapped.clock.now()
-    attempts = send_together([outgoing])[0]
+    attempts = send_together([[(mapped.api.client, one) for one in made]])[0]
     answered = mapped.clock.now()
     pairs = zip(several, attempts, strict=True)
     found = [Command(sent, answered, one, attempt) for one, attempt in pairs if isinstance(attempt, Exchange)]

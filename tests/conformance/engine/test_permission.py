@@ -18,9 +18,9 @@ from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Calls, Statement, empty_statement
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import NotPermittedError
+from conformance.transport.exchange import NotPermittedError, Outgoing
 from conformance.transport.incomplete_request import PartialRequest
-from conformance.transport.parallel import Outgoing, send_together
+from conformance.transport.parallel import send_together
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
@@ -121,7 +121,7 @@ def send_part(client):
 
 
 def send_many(client):
-    send_together([[Outgoing(client, "DELETE", "/a"), Outgoing(client, "GET", "/a")]])
+    send_together([[(client, Outgoing("DELETE", "/a")), (client, Outgoing("GET", "/a"))]])
 
 
 @pytest.mark.parametrize("way", [send, send_raw, send_behind, send_part, send_many])

@@ -20,10 +20,10 @@ from conformance.history.writing import HISTORY_NAME, HistoryWriter
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.credentials import Credentials, bearer
-from conformance.transport.exchange import NoAnswer, NoAnswerError, Request, Response
+from conformance.transport.exchange import NoAnswer, NoAnswerError, Outgoing, Request, Response
 from conformance.transport.fetching import Fetcher
 from conformance.transport.incomplete_request import PartialRequest
-from conformance.transport.parallel import Outgoing, send_together
+from conformance.transport.parallel import send_together
 from conformance.transport.passage import EyeState, Passage
 from conformance.transport.reach import Trust
 
@@ -61,7 +61,7 @@ def test_every_client_and_socket_is_recorded(tmp_path):
             client.send("GET", "/a")
             client.send("GET", "/a")
             writer.begin("together")
-            send_together([[Outgoing(client, "GET", "/a")] * 2])
+            send_together([[(client, Outgoing("GET", "/a"))] * 2])
             writer.begin("by hand")
             raw.talk(client, raw.head(client, "GET", "/a"), answers=1)
             PartialRequest(client, "PUT", "/a", sent=b"{", promised=9).vanish()

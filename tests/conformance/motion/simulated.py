@@ -74,7 +74,7 @@ class Api:
 
 def one_after_another(rounds):
     """Send what several clients send at once: the simulated clock does not pass between them."""
-    return [[one.client.send(one.method, one.path, headers=one.headers, body=one.body) for one in rounds[0]]]
+    return [[to.send(one.method, one.target, headers=one.headers, body=one.body) for to, one in rounds[0]]]
 
 
 def map_of(text):

@@ -9,8 +9,8 @@ import pytest
 from toy_server import Handler, server_of
 
 from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import NoAnswer, NoAnswerError
-from conformance.transport.parallel import Outgoing, send_together
+from conformance.transport.exchange import NoAnswer, NoAnswerError, Outgoing
+from conformance.transport.parallel import send_together
 
 
 class _Handler(Handler):
@@ -183,6 +183,6 @@ def test_a_request_that_nobody_can_have_read_is_sent_again_whatever_its_method()
 
 def test_what_several_clients_send_again_is_counted(stale):
     server, client = stale
-    rounds = [[Outgoing(client, "GET", "/")] * 2] * 2
+    rounds = [[(client, Outgoing("GET", "/"))] * 2] * 2
     assert [attempt.response.status for attempts in send_together(rounds) for attempt in attempts] == [204] * 4
     assert (client.connection.resent, len(server.seen)) == (2, 6)

@@ -7,8 +7,8 @@ import pytest
 from toy_server import Handler, server_of
 
 from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import Exchange, Listener, NoAnswerError
-from conformance.transport.parallel import Outgoing, is_busy, send_together
+from conformance.transport.exchange import Exchange, Listener, NoAnswerError, Outgoing
+from conformance.transport.parallel import is_busy, send_together
 
 CLIENTS = 4
 
@@ -42,7 +42,7 @@ def client():
 
 
 def test_each_request_has_its_answer_and_all_are_there_at_once(client):
-    rounds = [[Outgoing(client, "GET", f"/{turn}/{number}") for number in range(CLIENTS)] for turn in range(3)]
+    rounds = [[(client, Outgoing("GET", f"/{turn}/{number}")) for number in range(CLIENTS)] for turn in range(3)]
     attempts = send_together(rounds)
     assert [[item.response.body.decode() for item in turn] for turn in attempts] == [
         [item.path for item in turn] for turn in rounds
@@ -51,9 +51,9 @@ def test_each_request_has_its_answer_and_all_are_there_at_once(client):
 
 
 def test_who_is_busy_is_not_told_of(client):
-    busy, closed, *fine = send_together([[Outgoing(client, "GET", path) for path in ("/?503", "/?0", "/one", "/two")]])[
-        0
-    ]
+    busy, closed, *fine = send_together(
+        [[(client, Outgoing("GET", path)) for path in ("/?503", "/?0", "/one", "/two")]]
+    )[0]
     assert is_busy(busy)
     assert is_busy(closed)
     assert not isinstance(closed, Exchange)
@@ -63,7 +63,7 @@ def test_who_is_busy_is_not_told_of(client):
 def test_a_robot_that_does_not_answer_is_an_error(client):
     client.connection.timeout_s = 0.2
     with pytest.raises(NoAnswerError):
-        send_together([[Outgoing(client, "GET", "/alone")]])
+        send_together([[(client, Outgoing("GET", "/alone"))]])
 
 
 class _Interrupted(list):
@@ -85,7 +85,7 @@ def test_a_signal_while_the_requests_are_begun_leaves_no_client_waiting(client):
 
     def run():
         try:
-            send_together([_Interrupted(Outgoing(client, "GET", f"/{number}") for number in range(CLIENTS))])
+            send_together([_Interrupted((client, Outgoing("GET", f"/{number}")) for number in range(CLIENTS))])
         except KeyboardInterrupt:
             raised.append(1)
 

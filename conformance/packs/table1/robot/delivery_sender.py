@@ -17,8 +17,8 @@ from conformance.packs.table1.robot.delivery_trace import Batch, Deliveries, See
 from conformance.packs.table1.robot.soap_services import delivery_outgoing, send_delivery
 from conformance.papers_robot.delivery import COFFEE
 from conformance.transport.client import HttpClient
-from conformance.transport.exchange import Exchange
-from conformance.transport.parallel import Outgoing, send_together
+from conformance.transport.exchange import Exchange, Outgoing
+from conformance.transport.parallel import Addressed, send_together
 from conformance.transport.put_off import until_taken
 
 
@@ -126,7 +126,7 @@ class DeliverySender:
             exchange = send_delivery(self.publishers, delivery, coffee=how == "coffee", style=style)
             yield Sent(how, "soap", delivery, exchange)
 
-    def _outgoing(self, how: str, delivery: Delivery) -> Outgoing:
+    def _outgoing(self, how: str, delivery: Delivery) -> Addressed:
         if how == "rest":
-            return Outgoing(self.rest, "PUT", delivery.rest_path)
+            return self.rest, Outgoing("PUT", delivery.rest_path)
         return delivery_outgoing(self.publishers, delivery, coffee=how == "coffee")

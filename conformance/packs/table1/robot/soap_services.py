@@ -19,8 +19,8 @@ from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_messages import NAMESPACE, delivery, request
 from conformance.papers_robot.delivery import COFFEE
 from conformance.scenarios.scenario import NotPossibleError
-from conformance.transport.exchange import Exchange
-from conformance.transport.parallel import Outgoing
+from conformance.transport.exchange import Exchange, Outgoing
+from conformance.transport.parallel import Addressed
 
 # Where a robot may have a plan to, seen from where it is, m.
 _NEAR = ((0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5))
@@ -43,19 +43,18 @@ def send_delivery(
     return send(publishers, message if style is None else serialize(message, style), fresh=True).exchange
 
 
-def delivery_outgoing(publishers: SoapService, values: Delivery, *, coffee: bool = False) -> Outgoing:
+def delivery_outgoing(publishers: SoapService, values: Delivery, *, coffee: bool = False) -> Addressed:
     """Return a delivery as a request to be sent at the same time as others."""
     operation = "ExecuteCoffeeRequest" if coffee else "ExecuteDeliveryRequest"
     given = values._asdict() | ({"message_code": COFFEE} if coffee else {})
     return outgoing(publishers, request(operation, **given))
 
 
-def outgoing(service: SoapService, payload: Node) -> Outgoing:
+def outgoing(service: SoapService, payload: Node) -> Addressed:
     """Return a SOAP call as a request to be sent at the same time as others."""
     headers = (("Content-Type", MEDIA_TYPE), ("SOAPAction", '""'))
-    return Outgoing(
-        service.client, "POST", service.path, headers, envelope((require_valid_message(service, payload),)).written()
-    )
+    message = envelope((require_valid_message(service, payload),)).written()
+    return service.client, Outgoing("POST", service.path, headers, message)
 
 
 def ask(subscribers: SoapService, operation: str, **parameters: float | str) -> Exchange:

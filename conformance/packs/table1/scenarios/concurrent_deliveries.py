@@ -7,8 +7,8 @@ from conformance.api.rest.validity import require_valid
 from conformance.packs.table1.robot.delivery import path_of
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
-from conformance.transport.exchange import Exchange, Unanswered
-from conformance.transport.parallel import MOST_CLIENTS, Outgoing, is_busy, send_together
+from conformance.transport.exchange import Exchange, Outgoing, Unanswered
+from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 
 _TURNS: Final = 12
 _COORDINATES: Final = ("1.5", "2.5", "3.5", "4.5", "5.5", "6.5")
@@ -30,10 +30,10 @@ def concurrent_deliveries(api: RestInterface) -> tuple[tuple[bool, Exchange], ..
     taken, refused = (api.client.send("PUT", path).response for path in paths)
     if not taken.ok or refused.ok:
         return ()
-    turn = [Outgoing(api.client, "PUT", path) for path in paths] * (MOST_CLIENTS // len(paths))
+    turn = [(api.client, Outgoing("PUT", path)) for path in paths] * (MOST_CLIENTS // len(paths))
     return tuple(
-        (request.path == paths[0], attempt)
+        (request.target == paths[0], attempt)
         for came in send_together([turn] * api.run.effort.cases(_TURNS))
-        for request, attempt in zip(turn, came, strict=True)
+        for (_, request), attempt in zip(turn, came, strict=True)
         if not isinstance(attempt, Unanswered) and not is_busy(attempt)
     )

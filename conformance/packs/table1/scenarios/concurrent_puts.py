@@ -21,8 +21,8 @@ from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, STILL, VELOCITY, Robot, Velocity
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Need
-from conformance.transport.exchange import Attempt, Exchange
-from conformance.transport.parallel import Outgoing, is_busy, send_together
+from conformance.transport.exchange import Attempt, Exchange, Outgoing
+from conformance.transport.parallel import is_busy, send_together
 from conformance.verdict.effort import Effort
 
 # How often velocities are put that ended before a read showed them, or that the robot did not reach in time.
@@ -130,4 +130,4 @@ def _put_velocities(robot: Robot, velocities: Sequence[Velocity], *, last: bool)
 
 def _put_together(robot: Robot, path: str, values: Sequence[dict[str, Any]]) -> list[Attempt]:
     """PUT each value from its own client, all at the same moment."""
-    return send_together([[Outgoing(robot.rest, "PUT", path, JSON_BODY, body_of(value)) for value in values]])[0]
+    return send_together([[(robot.rest, Outgoing("PUT", path, JSON_BODY, body_of(value))) for value in values]])[0]

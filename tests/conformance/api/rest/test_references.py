@@ -4,12 +4,11 @@ import json
 
 import pytest
 
-from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.references import collections_of, in_link, refers
 from conformance.api.rest.values import Values
 from conformance.documents.openapi import Operation, read_operations
 from conformance.documents.parameters import Parameter
-from conformance.transport.exchange import Exchange, Request, Response
+from conformance.transport.exchange import Exchange, Outgoing, Request, Response
 
 _TEXT = {"type": "string"}
 _COLLECTIONS = frozenset({"valve", "battery"})
@@ -95,7 +94,7 @@ def test_a_request_invents_what_the_device_neither_named_nor_accepted():
     operation = Operation("x", "GET", "/openings", (Parameter("valve", "query", required=True, schema=_TEXT),))
 
     def request(text):
-        return GeneratedRequest("GET", f"/openings?valve={text}", "", b"")
+        return Outgoing.of("GET", f"/openings?valve={text}", "", b"")
 
     assert [values.invents(operation, request(text)) for text in ("v-1", "given", "roaas")] == [False, False, True]
     values.accepted(operation, request("roaas"))

@@ -13,7 +13,6 @@ from conformance.api.rest.calls import example_call
 from conformance.api.rest.effects import reader_of, settles_at
 from conformance.api.rest.formats import disagreements
 from conformance.api.rest.generated import targets
-from conformance.api.rest.generated_request import GeneratedRequest
 from conformance.api.rest.guard import tell
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.motion_guard import MotionGuard
@@ -25,7 +24,7 @@ from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.packs.table1.statement import Statement
 from conformance.statement.endpoints import Endpoints
 from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import Exchange, Request, Response
+from conformance.transport.exchange import Exchange, Outgoing, Request, Response
 from conformance.verdict.run import Run
 
 
@@ -110,7 +109,7 @@ def test_what_moves_needs_permission(api):
     assert "allow-motion" in api.run.judge.evidence["http/delete-idempotent"].skips[0]
     assert applicable_operations(api, ["http/safe"], lambda item: item.method == "PATCH", "patches") == []
     assert "no operation that patches" in api.run.judge.evidence["http/safe"].unclaimed
-    wanted = GeneratedRequest("DELETE", "/books/5", "", b"")
+    wanted = Outgoing.of("DELETE", "/books/5", "", b"")
     assert MotionGuard(api).admit(wanted) is None
     assert MotionGuard(replace(api, run=replace(api.run, allow_motion=True))).admit(wanted) == wanted
 
@@ -140,11 +139,9 @@ def test_refusals(status, expected):
 
 def test_what_a_robot_might_take_of_random_requests_is_slow_or_not_sent():
     guard = MotionGuard(RestInterface(Run(allow_motion=True), HttpClient("http://127.0.0.1:1", Connection())))
-    wild = GeneratedRequest(
-        "PUT", "/robot/velocity/", "application/json", b'{"linear": {"x": 900.5, "y": -7, "z": true}}'
-    )
+    wild = Outgoing.of("PUT", "/robot/velocity/", "application/json", b'{"linear": {"x": 900.5, "y": -7, "z": true}}')
     assert guard.admit(wild).body == b'{"linear": {"x": 0.1, "y": 1, "z": true}}'
     vector = b"<Vector3><x>0.6</x><y>0</y><z>0</z></Vector3>"
-    assert guard.admit(GeneratedRequest("PUT", "/robot/velocity/linear/", "application/xml", vector)) is None
-    assert guard.admit(GeneratedRequest("PUT", "/robot/velocity/", "text/plain", wild.body)) is None
-    assert guard.admit(GeneratedRequest("GET", "/robot/pose/", "", b"")) is not None
+    assert guard.admit(Outgoing.of("PUT", "/robot/velocity/linear/", "application/xml", vector)) is None
+    assert guard.admit(Outgoing.of("PUT", "/robot/velocity/", "text/plain", wild.body)) is None
+    assert guard.admit(Outgoing.of("GET", "/robot/pose/", "", b"")) is not None

@@ -52,7 +52,7 @@ def test_the_usual_request_has_what_is_required():
     inputs = usual_inputs(_MANY, Values())[0]
     request = written(_MANY, inputs)
     assert request.target == "/a/1?id=4&many=roaas,roaas"
-    assert dict(request.headers) == {"X-H": "true", "Cookie": "c=roaas"}
+    assert dict(request.headers) == {"X-H": "true", "Cookie": "c=roaas", "Content-Type": "application/json"}
     assert json.loads(request.body) == {"x": 0}
 
 
