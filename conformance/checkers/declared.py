@@ -4,20 +4,41 @@ from collections.abc import Iterator
 from http import HTTPStatus
 
 from conformance.api.rest.accept import quality
-from conformance.api.rest.statuses import is_cut_off
+from conformance.api.rest.statuses import CRASHES, is_cut_off
 from conformance.api.rest.validity import INVALID, VALID
-from conformance.checkers.occasion import Occasion
+from conformance.checkers.occasion import METHODS, Occasion
 from conformance.documents.json_schema import Schema, shape_of
 from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.documents.patterns import PatternError
 from conformance.documents.representation import UnreadableError, read
+from conformance.documents.resources import resource_at
 from conformance.verdict.case import Case
+from conformance.verdict.finding import Showing, likeness
 
 # RFC 9110 and RFC 6585 allow these for any request: authentication and rate. Another requirement judges 5xx.
 _ANY_REQUEST = frozenset({401, 429})
 # ... and these for a request that has more in it than method, path and Accept.
 _ODD_REQUEST = frozenset({400, 408, 411, 413, 414, 415, 417, 431})
 _OK, _NO_CONTENT, _ERROR, _NOT_FOUND, _NO_METHOD, _NOT_ACCEPTABLE, _SERVER_ERROR = 200, 204, 400, 404, 405, 406, 500
+
+
+def crash(occasion: Occasion) -> Iterator[Case]:
+    """Judge that the device does not fail, whatever a request to a path of the description contains (CWE-248)."""
+    operation, request, has_crashed = occasion.operation, occasion.request, occasion.response.status in CRASHES
+    label = operation.label if operation is not None else ""
+    if has_crashed and operation is None and request.method in METHODS:
+        resource = resource_at(occasion.contract, occasion.context.target.partition("?")[0])
+        label = next(iter(resource.operations.values())).label if resource is not None else ""
+    if label:
+        yield Case(
+            holds=not has_crashed,
+            exchange=occasion.exchange,
+            expected="a status below 500",
+            cause=likeness(occasion.exchange) if has_crashed else "",
+            subject=label,
+            operations=(Showing(label, 1, request),) if has_crashed else (),
+            requirement="robustness/no-server-error",
+        )
 
 
 def server_error(occasion: Occasion) -> Iterator[Case]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final
 
 from conformance.api.rest.request_context import RequestContext
 from conformance.api.rest.validity import VALID, Validity, validity
@@ -11,6 +12,9 @@ from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.case import Case
+
+#: Methods that every server knows: a request with another one may never reach a resource.
+METHODS: Final = frozenset({"GET", "HEAD", "PUT", "POST", "DELETE", "PATCH", "OPTIONS"})
 
 
 @dataclass(frozen=True)

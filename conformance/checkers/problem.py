@@ -4,15 +4,13 @@ import re
 from collections.abc import Iterator
 
 from conformance.api.rest.problem import JSON, XML, members_of
-from conformance.checkers.occasion import Occasion
+from conformance.checkers.occasion import METHODS, Occasion
 from conformance.documents.representation import UnreadableError, parse_xml
 from conformance.documents.resources import inside_prefix, is_normal
-from conformance.documents.traceback import inside_shown
+from conformance.documents.traceback import inside_shown, path_shown
 from conformance.transport.exchange import Response
 from conformance.verdict.case import Case
 
-# Methods that every server knows; a request with another one may never reach a resource.
-_STANDARD_METHODS = frozenset({"GET", "HEAD", "PUT", "POST", "DELETE", "OPTIONS", "PATCH"})
 _NAMESPACE = "urn:ietf:rfc:7807"
 # Statuses that servers, proxies and gateways send before a resource sees the request; and 401, which has its field.
 _TRANSPORT = frozenset({401, 407, 408, 411, 413, 414, 417, 421, 426, 429, 431})
@@ -25,11 +23,13 @@ _ERROR, _NOT_ACCEPTABLE, _SERVER_ERROR, _UNAVAILABLE = 400, 406, 500, 503
 
 
 def inside(occasion: Occasion) -> Iterator[Case]:
-    """Judge that an error shows nothing of the program."""
+    """Judge that an error shows no traceback, and no path of the device's file system (CWE-209)."""
     if occasion.response.status >= _ERROR:
-        shown = inside_shown(occasion.exchange)
-        expected, found = "an error that shows nothing of the program", f"{shown!r} in the response"
-        yield occasion.case("http/no-traceback", not shown, expected, found, cause="traceback")
+        # What is shown differs from file to file, and from one request to the next.
+        inside, path = inside_shown(occasion.exchange), path_shown(occasion.exchange)
+        found, cause = f"status {occasion.response.status} with {inside or path!r}", "inside" if inside else "path"
+        expected = "an error that shows nothing of the program"
+        yield occasion.case("robustness/no-internals", not (inside or path), expected, found, cause=cause)
 
 
 def form(occasion: Occasion) -> Iterator[Case]:
@@ -77,7 +77,7 @@ def _by_server(occasion: Occasion) -> bool:
     """Return whether a server may have responded before any resource saw the request (contract, errors)."""
     path = occasion.context.target.split("?", 1)[0]
     return (
-        occasion.request.method not in _STANDARD_METHODS
+        occasion.request.method not in METHODS
         or not is_normal(path)
         or bool(_AMBIGUOUS.search(path))
         or not _TARGET.fullmatch(occasion.context.target)

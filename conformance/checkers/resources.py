@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Final, NamedTuple
 
-from conformance.checkers.occasion import Occasion
+from conformance.checkers.occasion import METHODS, Occasion
 from conformance.documents.json_schema import shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json
@@ -13,8 +13,7 @@ from conformance.documents.resources import Resource, resource_at, resources_of
 from conformance.transport.exchange import SAFE_METHODS
 from conformance.verdict.case import Case
 
-# Methods that come to the resource: others a parser may refuse by itself. Statuses that say nothing of the resource.
-_METHODS: Final = frozenset({"GET", "HEAD", "PUT", "POST", "DELETE", "PATCH", "OPTIONS"})
+# Statuses that say nothing of the resource.
 _NOT_NOW: Final = frozenset({401, 403, 429, 503})
 # By these a device says that it has no HEAD; by those, that it has no such resource.
 _NO_HEAD: Final = frozenset({404, 405, 501})
@@ -131,7 +130,7 @@ class Resources:
         if occasion.operation is not None:
             yield from self._declared(occasion, path)
             return
-        if not occasion.context.usual or method not in _METHODS or _elsewhere(occasion, resource, path):
+        if not occasion.context.usual or method not in METHODS or _elsewhere(occasion, resource, path):
             return
         is_options = method == "OPTIONS"
         if status == HTTPStatus.METHOD_NOT_ALLOWED or (is_options and occasion.response.ok):

@@ -20,7 +20,7 @@ from conformance.verdict.case import Case
 _ANY: Final = (fields.framing, fields.content_type, fields.once, fields.date, fields.formats)
 _DOCUMENTS: Final = (
     content.json, content.charset, problem.inside, problem.form, refusals.allow, refusals.challenge,
-    declared.server_error, declared.status, declared.body, declared.negotiation,
+    declared.crash, declared.server_error, declared.status, declared.body, declared.negotiation,
 )  # fmt: skip
 
 

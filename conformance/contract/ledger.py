@@ -31,6 +31,8 @@ class Requirement:
         forbids: the kinds of causes that the requirement is about; it keeps the finding that other requirements share.
         aliases: ids that it had before, and ids of requirements that were merged into it. Checks and mutants may still
             name a part of it by such an id, and baselines and old results are read by them.
+        same_as: requirements of the generic suite that ask the same: where a contract has this one and not them, what
+            judges them judges this one.
         also: further classes that it binds: it is judged when one of them is claimed, and all of them fail with it.
         topic: what it is about, for readers; None: its class's topic.
         breaks: what breaks in practice when a device does not meet it, or None.
@@ -46,6 +48,7 @@ class Requirement:
     untestable: str | None = None
     forbids: tuple[CauseKind, ...] = ()
     aliases: tuple[str, ...] = ()
+    same_as: tuple[str, ...] = ()
     also: tuple[str, ...] = ()
     topic: Topic | None = None
     breaks: str | None = None
@@ -71,6 +74,7 @@ class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     untestable: Text | None = None
     forbids: tuple[CauseKind, ...] = ()
     aliases: tuple[Text, ...] = ()
+    same_as: tuple[Text, ...] = ()
     also: tuple[Text, ...] = ()
     topic: Topic | None = None
     breaks: Text | None = None
@@ -89,6 +93,11 @@ def expanded(ids: Iterable[str], ledger: Iterable[str]) -> tuple[str, ...]:
 def renamed(ledger: Mapping[str, Requirement]) -> dict[str, str]:
     """Return the id that a requirement has now by each of its aliases."""
     return {alias: item.id for item in ledger.values() for alias in item.aliases}
+
+
+def twins(ledger: Mapping[str, Requirement]) -> dict[str, str]:
+    """Return the id of the requirement that asks the same as one that a contract does not have, by that one's id."""
+    return {other: item.id for item in ledger.values() for other in item.same_as if other not in ledger}
 
 
 def classes_of(ledger: Mapping[str, Requirement], ids: Iterable[str]) -> tuple[str, ...]:

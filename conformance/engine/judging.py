@@ -1,13 +1,11 @@
 """``roaas judge``: judge what a run left, its history and its traces, by the present rules, without the device."""
 
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from conformance.api.device import device_of
-from conformance.api.rest.habits import Habits
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.service import SoapService
 from conformance.checkers.rest import RestCheckers
@@ -19,18 +17,16 @@ from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.history.events import Began, Ended, Sent, Span, Withdrawn
 from conformance.history.reading import HistoryError, read_history
 from conformance.history.writing import HISTORY_NAME
-from conformance.scenarios.other_exchanges import others
 from conformance.scenarios.rule import Rule, record
 from conformance.scenarios.scenario import Recordings, Scenario
 from conformance.scenarios.stored import TRACES_NAME, read_traces
-from conformance.scenarios.survey import Survey
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, Listener
 from conformance.transport.parallel import is_busy
 from conformance.transport.passage import Heard
 from conformance.transport.raw import tell
 from conformance.transport.reach import split
-from conformance.verdict.case import Case, Checker
+from conformance.verdict.case import Checker
 from conformance.verdict.evidence import Judge
 from conformance.verdict.observers import Observers
 from conformance.verdict.verdicts import Verdict
@@ -70,7 +66,7 @@ def judge_stored(robot: RobotUnderTest, result: Mapping[str, Any], folder: Path)
     known = [scenario for _, scenario in rules]
     traces = read_traces(folder / TRACES_NAME, known, run.judge.fault) if known else Recordings()
     if HISTORY_NAME in there or not there:
-        requests, ended = _judge_history(robot, result, folder / HISTORY_NAME, traces)
+        requests, ended = _judge_history(robot, result, folder / HISTORY_NAME)
     _judge_traces(robot, rules, traces)
     for evidence in run.judge.evidence.values():
         # A part that takes an experiment is the run's affair.
@@ -80,9 +76,7 @@ def judge_stored(robot: RobotUnderTest, result: Mapping[str, Any], folder: Path)
     return Judged(judged, requests, ended, tuple(run.judge.faults))
 
 
-def _judge_history(
-    robot: RobotUnderTest, result: Mapping[str, Any], path: Path, traces: Recordings
-) -> tuple[int, bool]:
+def _judge_history(robot: RobotUnderTest, result: Mapping[str, Any], path: Path) -> tuple[int, bool]:
     """Judge each exchange as in the run; return how many requests there are, and whether the run ended."""
     events, judge = list(read_history(path)), robot.run.judge
     began = next((event.started for event in events if isinstance(event, Began)), "")
@@ -91,7 +85,7 @@ def _judge_history(
             f"{path} is the history of another run: it began at {began}, this one at {result['started']}"
         )
     withdrawn = {event.id for event in events if isinstance(event, Withdrawn)}
-    listeners, requests = list(_listeners(robot, result["target"], traces)), 0
+    listeners, requests = list(_listeners(robot, result["target"])), 0
     for event in events:
         if isinstance(event, Span):
             judge.begin(event.name)
@@ -118,7 +112,7 @@ def _tell(judge: Judge, listeners: list[Listener], outcome: Attempt) -> None:
             listener.unanswered(outcome)
 
 
-def _listeners(robot: RobotUnderTest, target: Mapping[str, Any], traces: Recordings) -> Iterator[Listener]:
+def _listeners(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[Listener]:
     """Yield what judges the exchanges of a run, whichever check sent them."""
     run, services = robot.run, list(_services(robot, target))
     checkers: list[Checker] = []
@@ -127,33 +121,10 @@ def _listeners(robot: RobotUnderTest, target: Mapping[str, Any], traces: Recordi
     device = api.device if api is not None else device_of(run)
     yield Observers(run.judge, device.checkers(api, services), by_rule=False)
     if api is not None:
-        checkers.append(_crashes(api, traces))
         checkers.append(RestCheckers(run.contract, api.client.base_url, [one.endpoint for one in services]))
     if services:
         checkers.append(SoapCheckers({one.endpoint: answers_of(one.contract) for one in services}))
     yield Observers(run.judge, checkers)
-
-
-def _crashes(api: RestInterface, traces: Recordings) -> Checker:
-    """Return the checker of crashes, which leaves out what a survey recorded: its rules judge that."""
-    played = (one.trace for name, one in traces.played.items() if name != others.name)
-    probes = (probe for trace in played if isinstance(trace, Survey) for probe in trace.probes)
-    recorded = Counter(_key(probe.exchange) for probe in probes if probe.exchange)
-    habits = Habits(api)
-
-    def judged(attempt: Attempt) -> Iterator[Case]:
-        if isinstance(attempt, Exchange):
-            key = _key(attempt)
-            api.is_recorded = recorded[key] > 0
-            recorded[key] -= 1
-            yield from habits(attempt)
-
-    return judged
-
-
-def _key(exchange: Exchange) -> tuple[str, str, bytes, int, bytes]:
-    request, response = exchange.request, exchange.response
-    return request.method, request.url, request.body, response.status, response.body
 
 
 def _services(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[SoapService]:

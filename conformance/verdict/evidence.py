@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from conformance.contract.classes import CauseKind
-from conformance.contract.ledger import Requirement, renamed
+from conformance.contract.ledger import Requirement, renamed, twins
 from conformance.documents.openapi import is_json
 from conformance.documents.patterns import PatternError
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Unanswered
@@ -106,7 +106,7 @@ class Judge:
         self.ended_by: Finding | None = None
         self.concerned: Callable[[Request], Iterable[str]] = lambda _: ()
         self._ledger: Mapping[str, Requirement] = known if isinstance(known, Mapping) else {}
-        self._renamed = renamed(self._ledger)
+        self._renamed, self._twins = renamed(self._ledger), twins(self._ledger)
         self._sent: deque[Sent] = deque(maxlen=MAX_SEQUENCE)
         self._findings = 0
         self._newest: Attempt | None = None
@@ -115,14 +115,19 @@ class Judge:
 
     def of(self, requirement: str) -> Evidence | None:
         """Return the evidence of a requirement by its id or an alias, or None if the contract does not have it."""
-        return self.evidence.get(self._renamed.get(requirement, requirement))
+        return self.evidence.get(self._known_as(requirement)[1])
+
+    def _known_as(self, requirement: str) -> tuple[str, str]:
+        """Return the part that an id names, and its requirement: by an alias, or one that asks the same."""
+        part = self._twins.get(requirement, requirement)
+        return part, self._renamed.get(part, part)
 
     def announce(self, ids: Iterable[str]) -> None:
         """Record the ids that a check is going to judge: a requirement passes when each of its parts was judged."""
         for id_ in ids:
             evidence = self.of(id_)
             if evidence is not None:
-                evidence.parts.setdefault(id_, 0)
+                evidence.parts.setdefault(self._known_as(id_)[0], 0)
 
     def begin(self, check_name: str) -> None:
         """Start a check: earlier requests do not belong to the sequence that led to its findings."""
@@ -182,7 +187,7 @@ class Judge:
         Returns:
             ``holds``.
         """
-        part, requirement = requirement, self._renamed.get(requirement, requirement)
+        part, requirement = self._known_as(requirement)
         evidence = self.evidence.get(requirement)
         if evidence is None:
             return holds
@@ -340,7 +345,11 @@ class Judge:
     def counts(self, ids: Iterable[str]) -> dict[str, int]:
         """Return the number of cases by id, each for the part of its requirement that the id names."""
         found = {id_: self.of(id_) for id_ in ids}
-        return {id_: evidence.parts.get(id_, 0) for id_, evidence in found.items() if evidence is not None}
+        return {
+            id_: evidence.parts.get(self._known_as(id_)[0], 0)
+            for id_, evidence in found.items()
+            if evidence is not None
+        }
 
     def cases(self, requirement: str) -> int:
         """Return the number of cases of a requirement or a part of it; 0 if the contract does not have it."""

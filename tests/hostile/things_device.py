@@ -16,10 +16,8 @@ from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.rules.description import test_lives as rules
-from conformance.rules.robustness.test_robustness import no_server_error
 from conformance.scenarios.lifecycles import lifecycles
 from conformance.scenarios.other_exchanges import OtherExchanges
-from conformance.scenarios.survey import Survey
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Calls, Statement
 from conformance.transport.client import Connection, HttpClient
@@ -369,11 +367,10 @@ def blamed(description, routes, folder):
         api = RestInterface(run, client, alive=lambda: True)
         operations = operations_of(contract)
         api.working.update(dict.fromkeys(one.label for one in operations))
-        client.connection.listeners += [others := OtherExchanges(api), kept := _Kept()]
+        client.connection.listeners += [OtherExchanges(api), kept := _Kept()]
         trace = lifecycles.play(api, Values({}, collections_of(operations)))
     cases = [(one.requirement, case) for one in RULES for case in one.judge(trace)]
     checkers = RestCheckers(contract, url)
     cases += [(case.requirement, case) for exchange in kept.exchanges for case in checkers(exchange)]
-    cases += [(no_server_error.requirement, case) for case in no_server_error.judge(Survey(tuple(others.probes)))]
     wrong = {id_: f"{case.expected}: {case.observed}" for id_, case in cases if not case.holds}
     return {id_: text for id_, text in wrong.items() if id_.startswith(("description/", "robustness/"))}

@@ -5,6 +5,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from conformance.checkers.rest import RestCheckers
+from conformance.contract.ledger import twins
 from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
 
@@ -30,7 +31,8 @@ def not_met(*attempts):
     contract = Contract.load()
     judges = RestCheckers(contract, BASE)
     broken = {case.requirement for attempt in attempts for case in judges(attempt) if not case.holds}
-    return {contract.renamed.get(id_, id_) for id_ in broken} & contract.ledger.keys()
+    names = {**contract.renamed, **twins(contract.ledger)}
+    return {names.get(id_, id_) for id_ in broken} & contract.ledger.keys()
 
 
 def test_good_answers_raise_no_alarm():
@@ -309,3 +311,27 @@ def test_garbage_is_bad_framing():
 )
 def test_no_answer_breaks_an_observer(path, status, media_type, body, date):
     seen("GET", path, status, [("Content-Type", media_type), ("Date", date)], body)
+
+
+def _sent(method, path, status, body=b"[]"):
+    answer = Response(status, (DATE, VARY, JSON, ("Allow", "GET")), b"" if method == "HEAD" else body, 1.0)
+    return Exchange(Request(method, f"{BASE}{path}", (("Host", "robot:7003"),)), answer)
+
+
+_SENSORS, _SERVICES = "/robot/sensors/", "/robot/navigation/services/"
+
+
+@pytest.mark.parametrize(
+    ("attempts", "expected"),
+    [
+        ([("GET", _SENSORS, 200), ("HEAD", _SENSORS, 200), ("GET", _SENSORS, 200)], set()),
+        ([("GET", _SENSORS, 200), ("HEAD", _SENSORS, 206), ("GET", _SENSORS, 200)], {"http/head"}),
+        ([("GET", _SENSORS, 200), ("POST", _SERVICES, 405), ("POST", _SENSORS, 404), ("GET", _SENSORS, 200)],
+         {"http/method-not-allowed"}),
+        ([("GET", _SENSORS, 200), ("POST", _SENSORS, 404), ("GET", _SENSORS, 200)], set()),
+        ([("POST", _SERVICES, 405), ("POST", _SENSORS, 404), ("GET", _SENSORS, 404)], set()),
+    ],
+)  # fmt: skip
+def test_checkers_with_memory_judge_a_robot_of_a_contract(attempts, expected):
+    found = not_met(*(_sent(*one) for one in attempts))
+    assert found & {"http/head", "http/method-not-allowed"} == expected

@@ -11,6 +11,7 @@ from conformance.contract.ledger import LedgerError, load_ledger
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
 from conformance.contract.requirement_sets import load_set
+from conformance.verdict.evidence import Judge
 
 CONTRACT = Contract.load()
 LEDGER, CLASSES = CONTRACT.ledger, CONTRACT.classes
@@ -100,3 +101,20 @@ def test_a_class_that_a_pack_does_not_name_is_within_another(tmp_path):
     }
     assert "web-server" in described.classes
     assert "web-server" not in described.profiles["full"]
+
+
+def test_a_requirement_asks_the_same_as_one_of_the_generic_suite_that_the_contract_does_not_have():
+    ledger = Contract.load().ledger
+    named = [other for item in ledger.values() for other in item.same_as]
+    assert named
+    assert set(named) <= generic_ledger().keys() - ledger.keys()
+    assert len(named) == len(set(named))
+
+
+def test_what_judges_one_that_asks_the_same_judges_the_contract_s_own():
+    judge = Judge(Contract.load().ledger)
+    judge.announce(["http/no-traceback", "robustness/no-internals"])
+    judge.check("robustness/no-internals", True, None, "")
+    evidence = judge.evidence["http/no-traceback"]
+    assert (evidence.cases, evidence.parts) == (1, {"http/no-traceback": 1})
+    assert judge.counts(["robustness/no-internals"]) == {"robustness/no-internals": 1}

@@ -1,17 +1,19 @@
-"""A described device that crashes now and then: whichever request meets it, it is a finding."""
+"""A device that crashes or shows its insides now and then: whichever request meets it, it is a finding."""
 
 import itertools
+import json
 
 import pytest
 from toy_server import serving
 
-from conformance.api.rest.habits import Habits
-from conformance.api.rest.interface import RestInterface
+from conformance.checkers.rest import RestCheckers
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Statement
 from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.evidence import Judge
 from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
@@ -32,9 +34,41 @@ def test_a_crash_that_any_check_meets_is_one_finding(tmp_path, status, path, fou
     with serving(lambda *_: (status if next(turns) % 3 == 0 else 200, {})) as url:
         run = Run(statement=Statement(endpoints=Endpoints(rest=url)), contract=contract)
         client = HttpClient(url, Connection())
-        client.connection.listeners.append(Observers(run.judge, [Habits(RestInterface(run, client))]))
+        client.connection.listeners.append(Observers(run.judge, [RestCheckers(contract, url)]))
         for _ in range(9):
             client.send("GET", path)
         client.close()
     evidence = run.judge.evidence["robustness/no-server-error"]
     assert [finding.seen for finding in evidence.findings.values()] == [3] * found
+
+
+@pytest.mark.parametrize(
+    ("details", "found"), [(["no key 1", "no key 2"], 1), (["no key", "no value"], 2), (["no key", "no key"], 1)]
+)
+def test_crashes_that_differ_in_more_than_a_number_are_findings_of_their_own(tmp_path, details, found):
+    judge = _judged(tmp_path, [(500, {"detail": detail}) for detail in details])
+    assert len(judge.evidence["robustness/no-server-error"].findings) == found
+
+
+@pytest.mark.parametrize(
+    ("status", "body", "found"),
+    [
+        (404, {"detail": "/usr/lib/python3/robot.py"}, 1),
+        (500, "Traceback (most recent call last)", 1),
+        (200, "/usr/lib/python3/robot.py", 0),
+        (404, {"detail": "no door"}, 0),
+    ],
+)
+def test_an_error_that_shows_insides_is_a_finding(tmp_path, status, body, found):
+    assert len(_judged(tmp_path, [(status, body)]).evidence["robustness/no-internals"].findings) == found
+
+
+def _judged(folder, answers):
+    """Return a judge of responses to GET /door."""
+    contract = Contract.load(write_described_pack(folder, _DOCUMENT, _DOCUMENT))
+    judge, checkers = Judge(contract.ledger), RestCheckers(contract, "http://door")
+    for status, body in answers:
+        response = Response(status, (("Content-Type", "application/json"),), json.dumps(body).encode(), 1.0)
+        for case in checkers(Exchange(Request("GET", "http://door/door"), response)):
+            judge.record(case)
+    return judge
