@@ -1,13 +1,14 @@
 """Whether the description declares a response for its operation: status, media type, schema, Vary."""
 
 from collections.abc import Iterator
+from functools import lru_cache
 from http import HTTPStatus
 
 from conformance.api.rest.accept import quality
 from conformance.api.rest.statuses import CRASHES, is_cut_off
 from conformance.api.rest.validity import INVALID, VALID
 from conformance.checkers.occasion import METHODS, Occasion
-from conformance.documents.json_schema import Schema, shape_of
+from conformance.documents.json_schema import Schema, Shape, shape_of
 from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.documents.patterns import PatternError
 from conformance.documents.representation import UnreadableError, read
@@ -19,6 +20,8 @@ from conformance.verdict.finding import Showing, likeness
 _ANY_REQUEST = frozenset({401, 429})
 # ... and these for a request that has more in it than method, path and Accept.
 _ODD_REQUEST = frozenset({400, 408, 411, 413, 414, 415, 417, 431})
+# Larger bodies are not kept to be known again, octets.
+_LARGE = 1 << 14
 _OK, _NO_CONTENT, _ERROR, _NOT_FOUND, _NO_METHOD, _NOT_ACCEPTABLE, _SERVER_ERROR = 200, 204, 400, 404, 405, 406, 500
 
 
@@ -126,15 +129,24 @@ def _shape(occasion: Occasion, operation: Operation, schema: Schema) -> Iterator
         id_, kind, schema = "rest-formats/text", "YAML", operation.shape
     else:
         return
+    body = occasion.response.body
+    judge = _fault if len(body) < _LARGE else _fault.__wrapped__
     try:
-        problem = shape_of(schema).problem(read(media_type, occasion.response.body, schema))
-        fault = f"a body in which {problem}" if problem else ""
+        fault = judge(shape_of(schema), media_type, body)
     except PatternError:
         return  # other checks tell that the schema cannot be judged
-    except UnreadableError as error:
-        fault = str(error)
     cause = f"{operation.id} {kind} {fault.split(':', 1)[0]}"
     yield occasion.case(id_, not fault, f"{kind} that is valid by the schema of {operation.id}", fault, cause=cause)
+
+
+@lru_cache(maxsize=256)
+def _fault(shape: Shape, media_type: str, body: bytes) -> str:
+    """Return what is wrong with a body; once, because a device answers most requests as it did before."""
+    try:
+        problem = shape.problem(read(media_type, body, shape.schema))
+    except UnreadableError as error:
+        return str(error)
+    return f"a body in which {problem}" if problem else ""
 
 
 def negotiation(occasion: Occasion) -> Iterator[Case]:

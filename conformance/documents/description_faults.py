@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
+from importlib.util import find_spec
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed, resolved, shape_of
@@ -16,16 +19,14 @@ from conformance.documents.schema_words import foreign_words, without_foreign_wo
 
 # So many violations are looked at for the reason why a part cannot be read.
 _MOST_FAULTS = 1_000
+_SCHEMAS = "openapi/definitions.py"
 
 
 def invalid(original: Schema) -> list[str]:
-    """Return where a description is no valid document of its version; empty if it is.
-
-    The schemas of the OpenAPI Initiative come from Schemathesis, which is a dependency anyway.
-    """
+    """Return where a description is no valid document of its version; empty if it is."""
     version = str(original.get("openapi") or original.get("swagger") or "")[:3]
     foreign, faults = foreign_words(original), []
-    for error in _validator(version).iter_errors(without_foreign_words(original)):
+    for error in validator(version).iter_errors(without_foreign_words(original)):
         where = "/".join(str(part) for part in error.instance_path)
         faults.append(f"/{where}: {error.message[:160]}")
     return [*foreign, *sorted(set(faults), key=len)[:20], *_path_parameters(original), *_schemas(original)]
@@ -34,7 +35,7 @@ def invalid(original: Schema) -> list[str]:
 def misplaced(original: Schema) -> list[tuple[str, str]]:
     """Return the members of a description that are of another type than its version says: their places, and how."""
     version = str(original.get("openapi") or original.get("swagger") or "")[:3]
-    errors = map(_deepest, islice(_validator(version).iter_errors(without_foreign_words(original)), _MOST_FAULTS))
+    errors = map(_deepest, islice(validator(version).iter_errors(without_foreign_words(original)), _MOST_FAULTS))
     return [(f"{_pointer(error.instance_path)}/", error.message[:160]) for error in errors]
 
 
@@ -66,14 +67,24 @@ def reason(error: Exception, faults: list[tuple[str, str]], *places: Iterable[ob
 
 
 @lru_cache(maxsize=4)
-def _validator(version: str) -> Any:
-    import jsonschema_rs  # noqa: PLC0415 - with the import below, only where a description is judged
-    from schemathesis.specs.openapi import definitions  # noqa: PLC0415 - costs a fifth of a second
+def validator(version: str) -> Any:
+    """Return what judges a description by the schema of its version, such as "3.1".
 
-    schemas = {"2.0": definitions.SWAGGER_20, "3.0": definitions.OPENAPI_30, "3.2": definitions.OPENAPI_32}
-    return jsonschema_rs.validator_for(
-        schemas.get(version, definitions.OPENAPI_31), offline=True, formats={"regex": lambda _: True}
-    )
+    The schemas of the OpenAPI Initiative come from Schemathesis, which is a dependency anyway. They are read from its
+    source, because importing it takes a fifth of a second.
+    """
+    import jsonschema_rs  # noqa: PLC0415 - only where a description is judged
+
+    schemathesis = find_spec("schemathesis")
+    source = Path(schemathesis.origin if schemathesis and schemathesis.origin else "").with_name("specs") / _SCHEMAS
+    name = f"{'SWAGGER' if version == '2.0' else 'OPENAPI'}_{version.replace('.', '')}"
+    schemas = {
+        ast.unparse(one.targets[0]): one.value
+        for one in ast.parse(source.read_bytes()).body
+        if isinstance(one, ast.Assign)
+    }
+    schema = ast.literal_eval(schemas.get(name) or schemas["OPENAPI_31"])
+    return jsonschema_rs.validator_for(schema, offline=True, formats={"regex": lambda _: True})
 
 
 def _operations(document: Schema) -> Iterator[tuple[str, str, Schema, list[Any]]]:

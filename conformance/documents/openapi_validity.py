@@ -2,25 +2,22 @@
 
 import re
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any
 
+from conformance.documents.description_faults import validator
 from conformance.documents.json_schema import UnresolvedError
 from conformance.documents.openapi import Operation, read_operations
 from conformance.documents.resources import PARAMETER
 
 
 def openapi_fault(document: Any) -> str:
-    """Return why a document is not a valid OpenAPI 3 description; empty if it is.
-
-    The schemas of the OpenAPI Initiative come from Schemathesis, which is a dependency anyway.
-    """
+    """Return why a document is not a valid OpenAPI 3 description; empty if it is."""
     if not isinstance(document, dict):
         return "it is no object"
     version = document.get("openapi")
     if not isinstance(version, str) or not re.fullmatch(r"3\.[0-2]\.\d+", version):
         return f"a description of version {version!r}"
-    error = next(iter(_validator(version[:3]).iter_errors(document)), None)
+    error = next(iter(validator(version[:3]).iter_errors(document)), None)
     if error is not None:
         where = ".".join(str(part) for part in error.instance_path)
         return f"a fault at {where or 'the root'}: {error.message[:200]}"
@@ -31,15 +28,6 @@ def openapi_fault(document: Any) -> str:
     except (AttributeError, TypeError, KeyError, RecursionError) as broken:
         return f"no description: {broken!r}"
     return _path_fault(operations)
-
-
-@lru_cache(maxsize=4)
-def _validator(version: str) -> Any:
-    import jsonschema_rs  # noqa: PLC0415 - with the import below, only where a description is judged
-    from schemathesis.specs.openapi import definitions  # noqa: PLC0415 - costs a fifth of a second
-
-    schema = definitions.OPENAPI_30 if version == "3.0" else definitions.OPENAPI_31
-    return jsonschema_rs.validator_for(schema, offline=True, formats={"regex": lambda _: True})
 
 
 def _path_fault(operations: Sequence[Operation]) -> str:

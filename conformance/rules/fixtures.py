@@ -32,8 +32,8 @@ from conformance.verdict.run import Run
 
 # So long the modules that later checks need are awaited, s.
 _PREPARES_S: Final = 30.0
-# What is imported late because few commands need it, and is needed later in a run.
-_NEEDED_LATER: Final = ("schemathesis.specs.openapi", "jsonschema")
+# What is imported late because few commands need it, and is needed later in a run; the second one in longer runs.
+_NEEDED_LATER: Final = ("jsonschema", "schemathesis.specs.openapi")
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -132,7 +132,7 @@ def _prepare(services: Iterable[SoapService], run: Run) -> None:
         for service in services:
             _ = service.described.types, service.contract.types
             importlib.import_module("conformance.api.soap.zeep_client")
-        for module in _NEEDED_LATER:
+        for module in _NEEDED_LATER[: 1 if run.effort.name == "quick" else None]:
             importlib.import_module(module)
         if run.prepare is not None:
             run.prepare()

@@ -17,6 +17,8 @@ from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswer
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
+# What a method may have set going has the settling checks' time to show: nobody has to wait for it.
+_BEFORE = pytest.mark.phase("motion")
 # Methods that a robot might take by mistake; where GET is not allowed, HEAD is not.
 _STANDARD = ("GET", "PUT", "POST", "DELETE", "PATCH", "HEAD")
 # A method of WebDAV, and one that does not exist: a server may refuse them before any resource sees them.
@@ -59,6 +61,7 @@ def _found(api: RestInterface, resource: Resource) -> Call | None:
     return None
 
 
+@_BEFORE
 @pytest.mark.requirement("http/method-not-allowed", "http/allow", "http/allow-agrees")
 def test_methods_that_a_resource_has_not(api: RestInterface, judge: Judge) -> None:
     """Send to each resource each method that the contract does not define for it: the robot must respond 405.
@@ -79,6 +82,7 @@ def test_methods_that_a_resource_has_not(api: RestInterface, judge: Judge) -> No
             expect(judge, "http/method-not-allowed", exchange).status(405, cause=cause)
 
 
+@_BEFORE
 @pytest.mark.requirement("http/unknown-method", "http/unknown-method-refused")
 def test_methods_that_nobody_knows(api: RestInterface, judge: Judge) -> None:
     """Send unknown methods, which a server may reject before it looks at the resource."""

@@ -7,8 +7,9 @@ whichever check has sent them.
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final
 from urllib.parse import unquote
 
@@ -22,7 +23,7 @@ from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
 from conformance.packs.table1.robot.probe import ARRIVES_S
 from conformance.packs.table1.robot.robot import DELIVERIES
 from conformance.papers_robot.delivery import COFFEE, COORDINATES, MESSAGE_FIELDS, PATH_NAMES
-from conformance.transport.exchange import Attempt, Exchange, Request, Response
+from conformance.transport.exchange import Attempt, Exchange, Request
 from conformance.verdict.case import Case, case
 
 # So many deliveries may wait to be looked for, and the oldest of them for so long, s.
@@ -75,7 +76,7 @@ class Deliveries:
         self._new: Counter[tuple[Delivery, str]] = Counter()
         self.has_list = True
         # The lists that were read last, with the time of the response, s: what a later one shows has to have these.
-        self._lists: list[tuple[float, list[str]]] = []
+        self._lists: list[tuple[float, Sequence[str]]] = []
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Take one exchange of the run: a delivery, or the list of them."""
@@ -113,13 +114,11 @@ class Deliveries:
 
     def _look(self, exchange: Exchange) -> Iterator[Case]:
         """Judge a list in any format by the one before, and by JSON the deliveries that were accepted before it."""
-        value = _listed(exchange.response)
+        response = exchange.response
+        value, shown = _listed(response.media_type, response.body) if response.ok else (None, ())
         if value is None:
             return
-        shown = [
-            json.dumps([entry["request"], entry["accepted"], entry["interface"]], sort_keys=True) for entry in value
-        ]
-        is_default = is_json(exchange.response.media_type)
+        is_default = is_json(response.media_type)
         yield self._judge_kept(exchange, shown, "rest-delivery/list" if is_default else "rest-formats/same-values")
         if not is_default:
             return
@@ -147,11 +146,11 @@ class Deliveries:
             elif whole:
                 yield from self._judge(one, there=False)
 
-    def _judge_kept(self, exchange: Exchange, entries: list[str], requirement: str) -> Case:
+    def _judge_kept(self, exchange: Exchange, entries: Sequence[str], requirement: str) -> Case:
         """Judge whether a list has each entry of the one before, unchanged; a full one may lack the oldest."""
         received_s = exchange.response.received_s
         asked_s = received_s - exchange.response.elapsed_ms / 1000
-        before = next((one for at, one in reversed(self._lists) if at < asked_s), [])
+        before = next((one for at, one in reversed(self._lists) if at < asked_s), ())
         left = Counter(entries)
         kept: list[bool] = []
         for entry in before:
@@ -187,17 +186,19 @@ class Deliveries:
             )
 
 
-def _listed(response: Response) -> Any:
-    """Return the list in a response, numbers as doubles; None where it has none, which others judge."""
-    if not response.ok:
-        return None
+@lru_cache(maxsize=8)
+def _listed(media_type: str, body: bytes) -> tuple[Any, tuple[str, ...]]:
+    """Return a list, numbers as doubles, and its entries as text; None where it is none, which others judge."""
     try:
-        value = read(response.media_type, response.body, LIST.schema)
+        value = read(media_type, body, LIST.schema)
     except UnreadableError:
-        return None
+        return None, ()
     if LIST.problem(value):
-        return None
-    return [{**entry, **{name: flattened(entry[name]) for name in ("request", "accepted")}} for entry in value]
+        return None, ()
+    listed = [{**entry, **{name: flattened(entry[name]) for name in ("request", "accepted")}} for entry in value]
+    return listed, tuple(
+        json.dumps([entry["request"], entry["accepted"], entry["interface"]], sort_keys=True) for entry in listed
+    )
 
 
 def _is_repeatable(request: Request) -> bool:

@@ -98,11 +98,12 @@ class Beats:
             return
         self._count += 1
         if effort.name != "quick" or self._count % _EVERY == 0:
-            beat = next(self._beats, ())
+            beat, acted = next(self._beats, ()), connection.acted_at
             self._read(beat)
             if any(one.suspects for one in self._doubting):
                 WALL_CLOCK.sleep(_AGAIN_S)
                 self._read((*beat, VELOCITY))
+            connection.acted_at = acted  # a beat only reads, over SOAP too: nobody has to wait for an effect of it
         self._sent = connection.sent
 
     def _read(self, beat: tuple[str, ...]) -> None:

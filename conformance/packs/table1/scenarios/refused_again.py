@@ -1,6 +1,7 @@
 """Requests that the robot has refused in the run, sent again at rest, between deliveries and while a goal is active."""
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from http import HTTPStatus
@@ -11,7 +12,7 @@ from conformance.api.rest.validity import INVALID, VALID, validity
 from conformance.api.soap.callable_services import SoapServices
 from conformance.documents.json_text import read_json
 from conformance.observe.polling import poll_for
-from conformance.packs.table1.robot.deliveries_seen import NoObserverError, observer_of
+from conformance.packs.table1.robot.deliveries_seen import DeliveryObserver, NoObserverError, observer_of
 from conformance.packs.table1.robot.delivery import Delivery, put_delivery
 from conformance.packs.table1.robot.delivery_sender import DeliverySender
 from conformance.packs.table1.robot.delivery_trace import key_of
@@ -111,12 +112,14 @@ def refused_again(
     player = _Player(api, robot, soap, refused)
     try:
         send_known(robot, soap, refused)
+        observer = player.observer(probe, senders)
         player.rest()
-        try:
-            player.order(probe, senders)
-        except (NoObserverError, ProbeError) as error:
-            player.trace = replace(player.trace, unseen=str(error))
-        player.drive()
+        # What arrives is read after the drive: it needs a while, and no order may come of what is sent meanwhile.
+        if observer is None:
+            player.drive()
+        else:
+            with player.ordering(observer):
+                player.drive()
     except NoOccasionError:
         return player.trace
     except Exception as error:
@@ -184,32 +187,54 @@ class _Player:
                 if seen.found and (is_refused(exchange) or self._is_wrong(one)):
                     yield replace(seen, exchange=exchange, cause=one.what)
 
-    def order(self, probe: RosProbe, senders: list[DeliverySender]) -> None:
+    def observer(self, probe: RosProbe, senders: list[DeliverySender]) -> DeliveryObserver | None:
+        """Return what shows deliveries from now on, or None."""
+        try:
+            for sender in senders:
+                sender.watch(0.0)  # what arrived so far is the batches' own
+            observer = senders[0].observer if senders else observer_of(self.api, probe)
+            observer.mark()
+        except (NoObserverError, ProbeError) as error:
+            self.trace = replace(self.trace, unseen=str(error))
+            return None
+        return observer
+
+    @contextmanager
+    def ordering(self, observer: DeliveryObserver) -> Iterator[None]:
         """Send the requests, and a valid delivery over each interface directly after; again if more have arrived."""
-        for sender in senders:
-            sender.watch(0.0)  # what arrived so far is the batches' own
-        observer = senders[0].observer if senders else observer_of(self.api, probe)
         for turn in range(_TWICE):
             chosen = [one for one in self._chosen() if one.acts]
-            if not chosen:
+            last = [self._send(one) for one in chosen][-1:]
+            orders = list(self._orders(10_000 * (turn + 1), chosen)) if chosen else []
+            try:
+                if turn == 0:
+                    yield
+            finally:
+                found = self._arrived(observer, orders, last[0]) if orders else ()
+            if not found:
                 return
-            observer.mark()
-            last = [self._send(one) for one in chosen][-1]
-            orders = list(self._orders(10_000 * (turn + 1), chosen))
-            accepted = tuple((delivery, exchange) for delivery, exchange in orders if exchange.response.ok)
+
+    def _arrived(
+        self, observer: DeliveryObserver, orders: list[tuple[Delivery, Exchange]], last: Exchange
+    ) -> tuple[Delivery, ...]:
+        """Record what has arrived after the last refused request; return what nobody ordered."""
+        accepted = tuple((delivery, exchange) for delivery, exchange in orders if exchange.response.ok)
+        try:
             seen = tuple(one.delivery for one in observer.collect(len(accepted)))
-            left = [key_of(delivery, exact=observer.exact) for delivery, _ in accepted]
-            unknown = []
-            for delivery in seen:
-                key = key_of(delivery, exact=observer.exact)
-                if key in left:
-                    left.remove(key)
-                else:
-                    unknown.append(delivery)
-            ordered = Ordered(accepted, seen, tuple(unknown), last, observer.exact)
-            self.trace = replace(self.trace, ordered=(*self.trace.ordered, ordered))
-            if not unknown:
-                return
+        except (NoObserverError, ProbeError) as error:
+            self.trace = replace(self.trace, unseen=str(error))
+            return ()
+        left = [key_of(delivery, exact=observer.exact) for delivery, _ in accepted]
+        unknown = []
+        for delivery in seen:
+            key = key_of(delivery, exact=observer.exact)
+            if key in left:
+                left.remove(key)
+            else:
+                unknown.append(delivery)
+        ordered = Ordered(accepted, seen, tuple(unknown), last, observer.exact)
+        self.trace = replace(self.trace, ordered=(*self.trace.ordered, ordered))
+        return ordered.unknown
 
     def _orders(self, first: int, chosen: list[Refused]) -> Iterator[tuple[Delivery, Exchange]]:
         """Send deliveries over each interface, each directly after a refused request on it and on the other one."""
