@@ -4,6 +4,7 @@ The rooms are the packages conformance, loadtests, reference_robot, reports and 
 its command is used, so that ``roaas certify`` needs neither ROS nor Locust.
 """
 
+import gc
 import os
 import sys
 
@@ -44,6 +45,7 @@ _COMMANDS = {
     "contract": ("conformance.cli.contract", "Show the requirements, export the contract's files."),
     "explain": ("conformance.cli.explain", "Explain a requirement: why, by which source, how judged, how to fix it."),
 }
+_MEASURING = {"robot", "load"}  # commands whose time for single requests counts
 _EXTRAS = {"load"}  # commands that need the optional dependencies of the same name
 _USAGE, _INCONCLUSIVE, _INTERRUPTED = 2, 4, 130
 _INSTALLED = Path(__file__).with_name("roaas_rooms")
@@ -76,6 +78,10 @@ class _Rooms(click.Group):
         if cmd_name not in _COMMANDS:
             return None
         open_rooms()
+        if cmd_name not in _MEASURING:
+            # Imports and a run make many objects that live for a moment, and few that are garbage in circles: looking
+            # for those after 200,000 new objects instead of 700 saves a tenth of the processor time.
+            gc.set_threshold(200_000, 50)
         if lack := import_module("conformance.commandline.guard").lacks_addresses(cmd_name):
             click.echo(f"error: {lack}", err=True)
             ctx.exit(_INCONCLUSIVE)

@@ -223,9 +223,6 @@ def _certify(
     door: FrontDoor | None, chosen: Statement, options: dict[str, Any], contract: Contract, statement: Path | None
 ) -> Certification:
     # Imported here: Schemathesis and its like cost a second that --help and wrong usage need not pay.
-    # Imports and a run make many objects that live for a moment, and few that are garbage in circles: looking for
-    # those after 50,000 new objects instead of 700 saves a tenth of the processor time.
-    gc.set_threshold(50_000, 50)
     from conformance.engine.certification import certify as judge  # noqa: PLC0415
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
     from conformance.engine.suite import file_digest  # noqa: PLC0415
