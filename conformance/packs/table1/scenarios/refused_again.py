@@ -1,5 +1,6 @@
 """Requests that the robot has refused in the run, sent again at rest, between deliveries and while a goal is active."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -224,14 +225,12 @@ class _Player:
         except (NoObserverError, ProbeError) as error:
             self.trace = replace(self.trace, unseen=str(error))
             return ()
-        left = [key_of(delivery, exact=observer.exact) for delivery, _ in accepted]
+        left = Counter(key_of(delivery, exact=observer.exact) for delivery, _ in accepted)
         unknown = []
         for delivery in seen:
             key = key_of(delivery, exact=observer.exact)
-            if key in left:
-                left.remove(key)
-            else:
-                unknown.append(delivery)
+            unknown += [] if left[key] else [delivery]
+            left[key] -= left[key] > 0
         ordered = Ordered(accepted, seen, tuple(unknown), last, observer.exact)
         self.trace = replace(self.trace, ordered=(*self.trace.ordered, ordered))
         return ordered.unknown
