@@ -1,4 +1,4 @@
-"""The header fields of every response: framing, Content-Type, Date, ETag, and fields that may stand there once."""
+"""The header fields and the content of every response: framing, types, dates, Allow, charset, JSON text."""
 
 import re
 from collections.abc import Iterator
@@ -8,6 +8,10 @@ from http import HTTPStatus
 from typing import Final
 
 from conformance.checkers.occasion import Occasion
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import is_json, is_xml
+from conformance.documents.resources import resource_at
+from conformance.transport.exchange import Response
 from conformance.verdict.case import Case
 
 WELL_FRAMED: Final = "well-framed HTTP"
@@ -80,3 +84,90 @@ def _is_date(value: str | None) -> bool:
         return value is not None and parsedate_to_datetime(value) is not None
     except (ValueError, TypeError, IndexError):
         return False
+
+
+# Methods that a server in front may refuse itself, without a word of the resource.
+_OF_SERVERS = frozenset({"TRACE", "CONNECT"})
+_ALWAYS_ALLOWED = frozenset({"HEAD", "OPTIONS", "TRACE"})
+
+
+def allow(occasion: Occasion) -> Iterator[Case]:
+    """Judge Allow where a device refuses a method that its description does not have, or answers OPTIONS."""
+    method, response = occasion.request.method, occasion.response
+    is_refused = response.status == HTTPStatus.METHOD_NOT_ALLOWED and occasion.operation is None
+    is_asked = method == "OPTIONS" and response.ok
+    if not (is_refused or is_asked) or not occasion.context.usual or method in _OF_SERVERS:
+        return
+    resource = resource_at(occasion.contract, occasion.context.target.split("?", 1)[0])
+    if resource is None:
+        return
+    said = response.header("allow")
+    if is_refused:
+        yield occasion.case("http/allow", said is not None, "the header field Allow", "no header field Allow")
+    if said is None:
+        return
+    named, wanted = {name.strip() for name in said.split(",")} - {""}, set(resource.methods) - _ALWAYS_ALLOWED
+    besides = f"{', '.join(sorted(named - wanted - _ALWAYS_ALLOWED))} besides"
+    declared = f"Allow: {', '.join(sorted(wanted))}, as declared"
+    yield occasion.case("description/allow", named <= wanted | _ALWAYS_ALLOWED, declared, besides, cause=besides)
+    refused = {method} - _ALWAYS_ALLOWED if is_refused else set()
+    yield occasion.case(
+        "http/allow-agrees",
+        wanted <= named and not refused & named,
+        f"Allow: {', '.join(sorted(wanted))} (others may stand beside them, but none that got 405)",
+        f"Allow: {said}",
+        cause="methods left out",
+    )
+
+
+def challenge(occasion: Occasion) -> Iterator[Case]:
+    """Judge that 401 names the credentials that are wanted (RFC 9110 15.5.2)."""
+    if occasion.response.status == HTTPStatus.UNAUTHORIZED:
+        there = occasion.response.header("www-authenticate") is not None
+        name = "WWW-Authenticate"
+        yield occasion.case("http/authentication", there, f"the header field {name}", f"no header field {name}")
+
+
+_CHARSET = re.compile(r"""charset\s*=\s*["']?([^\s;"']+)""", re.IGNORECASE)
+
+
+def json(occasion: Occasion) -> Iterator[Case]:
+    """Judge the text of a JSON document."""
+    answer = occasion.response
+    if not answer.body or occasion.context.is_head or not is_json(answer.media_type):
+        return
+    text = read_json(answer.body)
+    expected, found = "JSON with finite numbers", f"the number {text.non_finite}"
+    yield occasion.case("http/json-finite", not text.non_finite, expected, found, cause="non-finite")
+    yield occasion.case("http/json-encoding", not text.encoding, "UTF-8 without a BOM", text.encoding)
+    found = f"the name {text.twice!r} twice in one object"
+    yield occasion.case("http/json-unique-names", not text.twice, "each name once in an object", found)
+
+
+def charset(occasion: Occasion) -> Iterator[Case]:
+    """Judge whether XML and plain text are in the charset that Content-Type names."""
+    answer = occasion.response
+    if answer.body and (is_xml(answer.media_type) or answer.media_type == "text/plain"):
+        wrong = _other_charset(answer)
+        yield occasion.case("rest-formats/charset", not wrong, "content in the charset that Content-Type names", wrong)
+
+
+def _other_charset(answer: Response) -> str:
+    """Return why the body is not in the charset of Content-Type; empty if it is.
+
+    Without charset, XML declares its encoding itself, and plain text is UTF-8, unless it is a server's own error. A
+    byte order mark is ignored.
+    """
+    named = _CHARSET.search(answer.header("content-type") or "")
+    if named is None and (is_xml(answer.media_type) or not answer.ok):
+        return ""
+    charset = named[1] if named else "utf-8"
+    found = f"Content-Type {answer.header('content-type')!r} with bytes that are not {charset}"
+    try:
+        text = answer.body.decode(charset).lstrip("\ufeff")
+    except (UnicodeError, LookupError):
+        return found
+    try:
+        return "" if text == answer.body.decode().lstrip("\ufeff") else found
+    except UnicodeDecodeError:
+        return ""

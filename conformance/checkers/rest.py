@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from conformance.api.rest.request_context import RequestContext
-from conformance.checkers import conditional, content, declared, fields, problem, refusals
+from conformance.checkers import conditional, declared, fields, problem
 from conformance.checkers.entity_tags import EntityTags
 from conformance.checkers.identities import Identities
 from conformance.checkers.lists import Lists
@@ -19,7 +19,7 @@ from conformance.verdict.case import Case
 # Those that judge any response; those that judge what the description may say of it.
 _ANY: Final = (fields.framing, fields.content_type, fields.once, fields.date, fields.formats)
 _DOCUMENTS: Final = (
-    content.json, content.charset, problem.inside, problem.form, refusals.allow, refusals.challenge,
+    fields.json, fields.charset, problem.inside, problem.form, fields.allow, fields.challenge,
     declared.crash, declared.server_error, declared.status, declared.body, declared.negotiation,
 )  # fmt: skip
 

@@ -18,8 +18,7 @@ def chosen_mutants(contract: Contract, options: dict[str, Any]) -> tuple[list[Ge
         click.UsageError: no mutant has such a name.
     """
     from conformance.selftest.generated.adversary import composed, kinds_in_requests  # noqa: PLC0415 - see selftest.py
-    from conformance.selftest.generated.catalogue import generated_mutants  # noqa: PLC0415 - see selftest.py
-    from conformance.selftest.generated.open_places import open_place  # noqa: PLC0415 - see selftest.py
+    from conformance.selftest.generated.catalogue import generated_mutants, open_place  # noqa: PLC0415 - as above
     from conformance.selftest.generated.sampling import sample  # noqa: PLC0415 - see selftest.py
 
     patterns = options["patterns"] or ("*",)

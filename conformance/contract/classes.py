@@ -3,6 +3,7 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Final
 
 from conformance.contract.interfaces import EVERY, Interface
 
@@ -95,3 +96,9 @@ class ConformanceClass:
     def missing(self, there: Collection[Interface], described: Collection[Interface] = EVERY) -> tuple[Interface, ...]:
         """Return the interfaces that the class needs and the contract describes, but that have no address."""
         return tuple(name for name in self.interfaces if name in described and name not in there)
+
+
+#: Octets of request content that every service accepts, over REST and over SOAP.
+TAKEN_OCTETS: Final = 64 * 1024
+#: Octets of request content over which no service need read on: it may close the connection.
+LIMIT_OCTETS: Final = 10 * 1024 * 1024

@@ -8,12 +8,14 @@ that apply to any web API.
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -25,7 +27,6 @@ from conformance.contract.generic import LEDGER, ClassEntry, generic_classes, ge
 from conformance.contract.interfaces import Interface
 from conformance.contract.ledger import LedgerError, Requirement, load_ledger, renamed
 from conformance.contract.locating import GENERIC_RULES, MANIFEST, ContractError, folder_of, module_of
-from conformance.contract.sections import TEXT_NAME, Section, cited_in, sections_of
 from conformance.contract.toml_file import Text, read_toml
 
 #: The pack that is used where none is named.
@@ -353,3 +354,35 @@ class Contract:
     def _is_data(self) -> bool:
         """Whether a run wrote the pack into its result, from which nothing is executed."""
         return self.manifest is not None and self.manifest.described
+
+
+TEXT_NAME = "contract.md"
+_HEADING = re.compile(r"^#{1,6} +(?P<title>.+?) *$", re.MULTILINE)
+_CITED = re.compile(rf"(?:^|; ){re.escape(TEXT_NAME)}#(?P<anchor>[\w-]+)")
+
+
+class Section(NamedTuple):
+    """A heading, and the Markdown text up to the next heading."""
+
+    title: str
+    text: str
+
+
+def anchor_of(title: str) -> str:
+    """Return the anchor that GitHub gives a heading: lower case, no punctuation, hyphens for spaces."""
+    return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
+
+
+def sections_of(text: str) -> dict[str, Section]:
+    """Return all sections of a Markdown text by anchor."""
+    headings = list(_HEADING.finditer(text))
+    ends = [heading.start() for heading in headings[1:]] + [len(text)]
+    return {
+        anchor_of(heading["title"]): Section(heading["title"], text[heading.end() : end].strip())
+        for heading, end in zip(headings, ends, strict=True)
+    }
+
+
+def cited_in(sources: Iterable[str]) -> set[str]:
+    """Return the anchors of the contract's text in requirements' sources."""
+    return {anchor for source in sources for anchor in _CITED.findall(source)}

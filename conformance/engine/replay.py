@@ -21,11 +21,10 @@ from conformance.commandline.endings import undisturbed
 from conformance.contract.described import MOTION
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
-from conformance.engine.by_description import SECURITY, fails_by_description
 from conformance.engine.certification import certify
 from conformance.engine.permission import moves, strangers
 from conformance.engine.refused import is_refused
-from conformance.engine.resending import read_sequence, send_again
+from conformance.engine.resending import SECURITY, fails_by_description, read_sequence, send_again
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Calls, Statement, empty_statement

@@ -8,14 +8,19 @@ from collections.abc import Iterable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from http import HTTPStatus
-from typing import Any
+from typing import Any, Final
 from urllib.parse import urlsplit
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.stops import stop_device
+from conformance.api.rest.variations import Kind
 from conformance.commandline.secrecy import SECRETS
+from conformance.contract.pack import Contract
 from conformance.documents.readable import unreadable
-from conformance.engine.by_description import fails_by_description
+from conformance.documents.resources import matching
+from conformance.scenarios.rule import Rule
+from conformance.scenarios.survey import Probe, Survey
+from conformance.statement.statement import empty_statement
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.credentials import Credentials, is_shown
@@ -29,6 +34,7 @@ from conformance.transport.exchange import (
     Response,
     Unanswered,
 )
+from conformance.verdict.case import Case
 from conformance.verdict.evidence import Judge
 from conformance.verdict.finding import Again, Finding, Sent
 from conformance.verdict.run import Run
@@ -263,3 +269,22 @@ def _unpacked(text: str | None) -> bytes | None:
     if not opened.eof:
         raise ValueError(f"a request that is cut short, or has more than {_MOST_SENT:,} octets")
     return octets
+
+
+SECURITY: Final = "description/security"
+
+
+def fails_by_description(contract: Contract, base_url: str, requirement: str, exchange: Exchange) -> bool:
+    """Return whether one exchange fails a rule that compares single responses with the description."""
+    # Imported late: the rules of described devices take a tenth of a second.
+    from conformance.rules.description import test_answers  # noqa: PLC0415
+
+    found = vars(test_answers).values()
+    rule = next((one for one in found if isinstance(one, Rule) and one.requirement == requirement), None)
+    path = exchange.request.url.removeprefix(base_url.rstrip("/")).partition("?")[0]
+    operation = matching(contract, exchange.request.method, path) if rule else None
+    if rule is None or operation is None:
+        return False
+    trace = (exchange,) if requirement == SECURITY else Survey((Probe(operation.label, Kind.USUAL, exchange=exchange),))
+    run = Run(empty_statement(contract), contract)
+    return any(isinstance(one, Case) and not one.holds for one in rule.outcomes(trace, {"run": run}.__getitem__))

@@ -20,8 +20,7 @@ from conformance.transport.exchange import Attempt, Unanswered
 from conformance.verdict.causes import Cause
 from conformance.verdict.finding import Finding
 from conformance.verdict.run import Run
-from conformance.verdict.scope import verdict_line
-from conformance.verdict.verdicts import ClassValue, Verdict, overall, views
+from conformance.verdict.verdicts import ClassValue, Verdict, overall, verdict_line, views
 
 RESULT_FORMAT = "roaas-result/1"
 RESULT_NAME = "result.json"

@@ -13,12 +13,12 @@ from lxml import etree
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.messages import ordinary, simple_leaves, unknown_in, with_text
-from conformance.api.soap.username_token import block_of
 from conformance.commandline.device_options import advice
 from conformance.documents.addressing import addressing_blocks
 from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl
 from conformance.documents.wsdl_pack import services_of
 from conformance.documents.xml import parse
+from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_lexical import INTEGERS, STRINGS
 from conformance.documents.xsd_shapes import Element
@@ -174,3 +174,25 @@ def fields_of(port: SoapPort, operation: SoapOperation) -> Headers:
         action = f'; action="{operation.action}"' if operation.action else ""
         return (("Content-Type", f"application/soap+xml; charset=utf-8{action}"),)
     return (("Content-Type", "text/xml; charset=utf-8"), ("SOAPAction", f'"{operation.action}"'))
+
+
+_WSS: Final = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-"
+_SECURITY: Final = f"{_WSS}wssecurity-secext-1.0.xsd"
+_UTILITY: Final = f"{_WSS}wssecurity-utility-1.0.xsd"
+_DIGEST: Final = f"{_WSS}username-token-profile-1.0#PasswordDigest"
+_BASE64: Final = f"{_WSS}soap-message-security-1.0#Base64Binary"
+
+
+def block_of(user: UsernameToken, envelope: str) -> Node:
+    """Return a header block with a fresh nonce, for an Envelope of that namespace."""
+    digest, nonce, created = user.fresh()
+    token = Node(
+        clark(_SECURITY, "UsernameToken"),
+        children=(
+            Node(clark(_SECURITY, "Username"), user.user),
+            Node(clark(_SECURITY, "Password"), digest, (), (("Type", _DIGEST),)),
+            Node(clark(_SECURITY, "Nonce"), nonce, (), (("EncodingType", _BASE64),)),
+            Node(clark(_UTILITY, "Created"), created),
+        ),
+    )
+    return Node(clark(_SECURITY, "Security"), "", (token,), ((clark(envelope, "mustUnderstand"), "1"),))

@@ -11,14 +11,18 @@ from dataclasses import dataclass
 from typing import Final
 
 from conformance.api.rest.inputs import usual_inputs
+from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
 from conformance.contract.described import SOAP
 from conformance.documents.openapi import Operation
+from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.soap_survey import requests_of
+from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import COVERAGE, FEWEST_REPEATS, FUZZED, REPEATS, TIMED, drawn
-from conformance.scenarios.timed_again import TIMED_AGAIN
+from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
+from conformance.verdict.time_limit import TimeIsOverError
 
 # Of the cases that Schemathesis is asked for, it makes about this share: some are alike, some cannot be sent. It covers
 # an operation by about so many cases for each parameter or member of the body, and one without any by so many.
@@ -134,3 +138,42 @@ def _http(operations: Iterable[Operation], effort: Effort) -> tuple[int, int]:
 def _rounded(value: float) -> str:
     """Return a number with two digits that count."""
     return f"{float(f'{value:.2g}'):,.0f}" if value >= 1 else f"{value:.1g}"
+
+
+# Each is sent so often: the quickest of them waited for nobody else.
+TIMED_AGAIN: Final = 5
+
+
+@dataclass(frozen=True)
+class TimedAgain:
+    """One operation that reads.
+
+    Attributes:
+        operation: method and path template.
+        first: the usual exchange at the beginning of the run.
+        times: response times at its end, ms.
+        last: the last of these exchanges.
+    """
+
+    operation: str
+    first: Exchange
+    times: tuple[float, ...]
+    last: Exchange
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)
+def timed_again(api: RestInterface) -> tuple[TimedAgain, ...]:
+    """Send the usual requests that read once more, a few times each."""
+    found = []
+    for label, call in api.working.items():
+        if not label.startswith("GET ") or label in api.streams:
+            continue
+        try:
+            exchanges = [call.send(api) for _ in range(TIMED_AGAIN)]
+        except (NoAnswerError, TimeIsOverError):
+            continue  # what does not respond, other rules tell
+        times = tuple(one.response.elapsed_ms for one in exchanges)
+        found.append(TimedAgain(label, api.first[label], times, exchanges[-1]))
+    if not found:
+        raise NotPossibleError("no operation that only reads was answered 2xx")
+    return tuple(found)

@@ -16,9 +16,8 @@ from urllib.parse import urlsplit
 import h11
 
 from conformance.commandline.secret_file import IN_URL, names_user
-from conformance.transport.connections import ClosedError, Connections, HttpConnection, NoConnectionError
+from conformance.transport.connections import ClosedError, Connections, Deadline, HttpConnection, NoConnectionError
 from conformance.transport.credentials import Credential, Credentials, bearer
-from conformance.transport.deadline import Deadline
 from conformance.transport.exchange import (
     OF_GATEWAY,
     SAFE_METHODS,

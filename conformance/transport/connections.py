@@ -4,6 +4,8 @@ They send target, headers and their order exactly as given. h11 parses responses
 framing. Why no common HTTP client is used: docs/design.md.
 """
 
+from __future__ import annotations
+
 import math
 import select
 import socket
@@ -14,8 +16,8 @@ from typing import Final
 
 import h11
 
-from conformance.transport.deadline import Deadline
 from conformance.transport.exchange import IDEMPOTENT_METHODS, Response
+from conformance.transport.pace import time_for, time_to_arrive
 
 # An answer longer than this is no answer to any request of the contract, octets; nor is a longer header section.
 _MAX_ANSWER: Final = 32 * 1024 * 1024
@@ -291,3 +293,45 @@ class Connections:
         """Close the idle connections."""
         while self._idle:
             self._idle.pop().close()
+
+
+class Deadline:
+    """The deadline of a request that starts now.
+
+    Args:
+        seconds: time until the last byte of the response, s; each received byte extends it slightly.
+        octets: size of the request body, bytes: the deadline is extended while the server still accepts it. A server
+            that accepts no byte for ``seconds`` misses the deadline.
+    """
+
+    def __init__(self, seconds: float, octets: int = 0) -> None:
+        self._seconds = seconds
+        self._octets = octets
+        self._at = time.monotonic() + seconds + time_for(octets)
+
+    def left_s(self) -> float:
+        """Return how long to wait for the response, s.
+
+        Raises:
+            TimeoutError: the deadline has passed.
+        """
+        left = self._at - time.monotonic()
+        if left <= 0:
+            raise TimeoutError("the deadline has passed")
+        return left
+
+    def to_send_s(self) -> float:
+        """Return how long the server may accept no byte of the request, s.
+
+        Raises:
+            TimeoutError: the deadline has passed.
+        """
+        return min(self.left_s(), self._seconds)
+
+    def sent(self) -> None:
+        """Note that the whole request has been handed to the network."""
+        self._at = min(self._at, time.monotonic() + self._seconds + time_to_arrive(self._octets))
+
+    def came(self, octets: int) -> None:
+        """Note that a number of bytes of the response was received."""
+        self._at += time_for(octets)

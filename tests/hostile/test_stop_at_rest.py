@@ -16,8 +16,7 @@ from conformance.target.describing import described_contract
 from conformance.transport.client import Connection
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.run import Run
-from conformance.verdict.scope import verdict_line
-from conformance.verdict.verdicts import ClassValue, Overall, overall
+from conformance.verdict.verdicts import ClassValue, Overall, overall, verdict_line
 
 _RESPONSES = {"200": answers({"type": "object"}), "4XX": REFUSED, "5XX": REFUSED}
 _DESCRIPTION = described(

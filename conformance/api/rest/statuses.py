@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection
 from http import HTTPStatus
 from typing import Final
 
-from conformance.contract.sizes import LIMIT_OCTETS
+from conformance.contract.classes import LIMIT_OCTETS
 from conformance.documents.json_schema import Schema
 from conformance.documents.openapi import Operation
 from conformance.documents.representation import flat

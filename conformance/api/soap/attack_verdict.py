@@ -7,7 +7,7 @@ from typing import Final
 
 from conformance.api.soap.attacks import LEAKS, MARK, Attack
 from conformance.api.soap.calls import read_exchange
-from conformance.contract.sizes import LIMIT_OCTETS
+from conformance.contract.classes import LIMIT_OCTETS
 from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
 
 _LEAK: Final = re.compile(LEAKS)

@@ -15,12 +15,14 @@ from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.documents.patterns import SlowPatternError
 from conformance.documents.value_formats import wrong_formats
 from conformance.rules.told_once import Fault, held_back, told_once, without_numbers
+from conformance.scenarios.anonymous import anonymous_requests
 from conformance.scenarios.neighbours import neighbours
 from conformance.scenarios.other_exchanges import others
 from conformance.scenarios.own_things import own_things
 from conformance.scenarios.rule import NotSeen, Outcome, rule
 from conformance.scenarios.survey import Probe, Survey, generated_requests, survey
-from conformance.transport.exchange import Response
+from conformance.transport.exchange import Exchange, Response
+from conformance.verdict.case import Case
 from conformance.verdict.run import Run
 
 # Such responses have no content (RFC 9110 15.3.5, 15.3.6, 15.4.5).
@@ -259,3 +261,11 @@ def _wrong_header(schema: Schema, value: str) -> str:
         return f"the value is no {' or '.join(sorted(kinds))}"
     problems = [shape_of(schema).problem(one) for one in readings]
     return "" if "" in problems else problems[0]
+
+
+@rule("description/security", on=(anonymous_requests,))
+def security(trace: tuple[Exchange, ...]) -> Iterable[Outcome]:
+    """Judge whether what requires credentials is refused without them, and with wrong ones."""
+    for exchange in trace:
+        expected = "a refusal, because the description requires credentials"
+        yield Case(not exchange.response.ok, exchange, expected, cause="served")

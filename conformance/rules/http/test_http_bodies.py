@@ -1,6 +1,7 @@
 """Request bodies: media types, charset, sizes, chunks and JSON numbers (RFC 9110 8.3, 15.5.14, 15.5.16)."""
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 
@@ -9,10 +10,11 @@ from conformance.api.rest import by_hand
 from conformance.api.rest.applicable import answered, applicable_operations
 from conformance.api.rest.calls import JSON, Call, example_call
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.number_forms import at_integer_ends, with_numbers
+from conformance.api.rest.json_mutations import places, replaced, with_options
 from conformance.api.rest.statuses import is_cut_off, is_taken
-from conformance.contract.sizes import LIMIT_OCTETS, TAKEN_OCTETS
-from conformance.documents.writing import json_text
+from conformance.contract.classes import LIMIT_OCTETS, TAKEN_OCTETS
+from conformance.documents.json_schema import Schema
+from conformance.documents.writing import Token, json_text
 from conformance.transport import raw
 from conformance.transport.client import Headers
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError
@@ -205,3 +207,27 @@ def test_numbers_in_json(api: RestInterface, judge: Judge) -> None:
             expect(judge, "http/json-integers", exchange).taken("an int32 is at an end of its range")
     if not tried:
         judge.unclaimed("http/json-integers", "the contract has no operation that takes an int32")
+
+
+_INT32_ENDS = (-(2**31), 2**31 - 1)
+
+
+def with_numbers(value: Any, write: Callable[[float], str]) -> bytes:
+    """Return JSON with floats written by ``write``; integers and texts stay unchanged."""
+
+    def written(item: Any) -> Any:
+        if isinstance(item, dict):
+            return {name: written(part) for name, part in item.items()}
+        if isinstance(item, list):
+            return [written(part) for part in item]
+        return Token(write(item)) if isinstance(item, float) else item
+
+    return json_text(written(value)).encode()
+
+
+def at_integer_ends(value: Any, schema: Schema) -> Iterator[Any]:
+    """Yield the value with each int32 of its optional members at the minimum and maximum."""
+    for whole, part in with_options(value, schema):
+        for place in places(part.value, part.schema, part.path):
+            if (place.schema.get("minimum"), place.schema.get("maximum")) == _INT32_ENDS:
+                yield from (replaced(whole, place.path, end) for end in _INT32_ENDS)

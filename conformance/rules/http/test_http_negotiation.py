@@ -1,4 +1,4 @@
-"""The robot must not send a format that the client excludes (RFC 9110 12.4.2, 12.5.1, 15.5.7)."""
+"""Formats that the client excludes (RFC 9110 12.4.2, 12.5.1, 15.5.7), and conditions; checkers judge the latter."""
 
 import pytest
 
@@ -50,3 +50,28 @@ def test_charset_in_accept(api: RestInterface, judge: Judge) -> None:
         taken = exchange.response.ok and exchange.response.media_type == media_type
         expected = f"status 200 with {media_type} when Accept is {media_type}; charset=utf-8"
         expect(judge, "http/accept-parameters", exchange).that(taken, expected)
+
+
+_PRECONDITIONS = "http/preconditions"
+_RANGE = "http/range"
+# No response has this entity tag, and every response is newer than HTTP.
+_NO_TAG = '"roaas-nothing-has-this-tag"'
+_LONG_AGO = "Sat, 29 Oct 1994 19:43:31 GMT"
+# Reads at standard effort.
+_STANDARD = 10
+
+
+@pytest.mark.requirement(_PRECONDITIONS)
+def test_what_a_cache_asks(api: RestInterface) -> None:
+    """Send conditions of a client without a current copy."""
+    for call in api.run.effort.draw(answered(api, _PRECONDITIONS), _STANDARD, f"{api.run.seed}/preconditions"):
+        exchange = call.send(api, ("If-None-Match", _NO_TAG))
+        if exchange.response.header("last-modified") is None:
+            call.send(api, ("If-Modified-Since", _LONG_AGO))
+
+
+@pytest.mark.requirement(_RANGE)
+def test_a_part(api: RestInterface) -> None:
+    """Send a range request to each resource."""
+    for call in api.run.effort.draw(answered(api, _RANGE), _STANDARD, f"{api.run.seed}/range")[:_STANDARD]:
+        call.send(api, ("Range", "bytes=0-3"))

@@ -14,7 +14,7 @@ from conformance.api.rest.effects import reader_of, settles_at
 from conformance.api.rest.formats import judge_same_values
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.statuses import is_taken
-from conformance.contract.sizes import TAKEN_OCTETS
+from conformance.contract.classes import TAKEN_OCTETS
 from conformance.documents.representation import UnreadableError, flattened, local_name, parse_xml, read
 from conformance.documents.writing import xml_bytes
 from conformance.transport.exchange import Exchange

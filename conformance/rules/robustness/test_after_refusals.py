@@ -16,7 +16,7 @@ from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import unknown_variations
-from conformance.contract.sizes import TAKEN_OCTETS
+from conformance.contract.classes import TAKEN_OCTETS
 from conformance.documents.openapi import Operation, operations_of
 from conformance.transport import raw
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, NotPermittedError, Outgoing

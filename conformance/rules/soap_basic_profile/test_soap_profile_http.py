@@ -12,7 +12,7 @@ from conformance.api.soap.envelope import envelope
 from conformance.api.soap.messages import padded
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import candidates, quiet_example, require_valid_document
-from conformance.contract.sizes import TAKEN_OCTETS
+from conformance.contract.classes import TAKEN_OCTETS
 from conformance.documents.xml import NotXmlError, parse
 from conformance.documents.xml_names import WSDL, XSD, clark
 from conformance.documents.xml_node import Node

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from functools import cache
 
 from conformance.contract.pack import Contract
+from conformance.mutation.self_test import OpenPlace, self_test_of
 from conformance.selftest.generated import bodies, heads, lenience
 from conformance.selftest.generated.described import described_mutants
 from conformance.selftest.generated.mutant import MODES, GeneratedMutant, classes_of_answers, of_answer, of_request
-from conformance.selftest.generated.open_places import open_place
 from conformance.selftest.generated.operators import NUMERIC, OPERATORS, Operator
 from conformance.selftest.generated.places import Exchange, Place, exchanges, places
 
@@ -97,3 +97,43 @@ def _whole(exchange: Exchange, what: str, mode: str, when: str, make: bodies.Who
         classes_of_answers(exchange),
         make(exchange, mode),
     )
+
+
+_UNSAFE = ("PUT", "POST", "PATCH", "DELETE")
+#: What norms leave open, whatever the contract.
+BY_NORM = (
+    OpenPlace(
+        r"body-bom:[^:]+:body:xml",
+        "A document of XML may begin with a byte order mark (XML 1.0 4.3.3), and every receiver has to take it "
+        "(BP R4001); what forbids one is RFC 8259 8.1, of JSON.",
+    ),
+    OpenPlace(
+        r"body-bom:[^:]+:body:text",
+        "A stream of YAML may begin with a byte order mark, which is no part of its content (YAML 1.2.2 5.2); what "
+        "forbids one is RFC 8259 8.1, of JSON.",
+    ),
+    OpenPlace(
+        r"header-(drop|change):[^:]+:Vary",
+        "Vary tells caches which clients a response is fit for: a response that may be cached needs it "
+        "(RFC 9110 12.5.5), and the response to an unsafe method may not (9.2.3).",
+        side="rest",
+        methods=_UNSAFE,
+    ),
+    OpenPlace(
+        r"header-more:[^:]+:Allow",
+        "A method that Allow names in every response is the vendor's own (RFC 9110 10.2.1). The suite does not send "
+        "it, as it may do anything.",
+    ),
+)
+
+
+def open_places(contract: Contract) -> tuple[OpenPlace, ...]:
+    """Return the patterns of changes that break no clause of the norms or of the pack's contract."""
+    return (*self_test_of(contract).open_places, *BY_NORM)
+
+
+def open_place(contract: Contract, change: GeneratedMutant) -> OpenPlace | None:
+    """Return the pattern that says why a change breaks no clause; None for a change that breaks one."""
+    exchange = change.exchange
+    covering = (one for one in open_places(contract) if one.covers(change.name, exchange.side, exchange.method))
+    return next(covering, None)

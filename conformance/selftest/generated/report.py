@@ -5,9 +5,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from conformance.contract.pack import Contract
-from conformance.selftest.generated.catalogue import every_change, generated_mutants
+from conformance.selftest.generated.catalogue import every_change, generated_mutants, open_place, open_places
 from conformance.selftest.generated.judging import BROKEN, GIVEN_UP, KILLED, NOT_REACHED, SURVIVED, GeneratedResult
-from conformance.selftest.generated.open_places import open_place, open_places
 from conformance.selftest.generated.sampling import Rate, rate_of, rates_by
 
 # The result file's word for a mutant that was killed, as roaas-selftest/1 has it.

@@ -7,7 +7,7 @@ import pytest
 from small_device import answers, described
 
 from conformance.api.rest.listing import listed
-from conformance.checkers.ordering import is_before
+from conformance.checkers.lists import is_before
 from conformance.checkers.rest import RestCheckers
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract

@@ -8,8 +8,7 @@ import pytest
 
 from conformance.contract.classes import Level, Origin
 from conformance.contract.generic import generic_ledger
-from conformance.contract.pack import Contract
-from conformance.contract.sections import anchor_of, cited_in, sections_of
+from conformance.contract.pack import Contract, anchor_of, cited_in, sections_of
 from conformance.packs.table1.limits import DeclaredLimits
 from conformance.papers_robot.files import CONTRACT_DIR
 

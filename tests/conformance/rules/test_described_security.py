@@ -8,7 +8,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
-from conformance.rules.description.test_security import security
+from conformance.rules.description.test_answers import security
 from conformance.scenarios.anonymous import anonymous_requests
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Calls, Statement

@@ -15,10 +15,9 @@ from conformance.selftest.certifying import Outcome
 from conformance.selftest.comparison import Comparison, ToolResult
 from conformance.selftest.generated import judging
 from conformance.selftest.generated.adversary import composed, kinds_in_requests
-from conformance.selftest.generated.catalogue import every_change, generated_mutants
+from conformance.selftest.generated.catalogue import every_change, generated_mutants, open_places
 from conformance.selftest.generated.judging import GIVEN_UP, KILLED, NOT_REACHED, GeneratedResult, judge
 from conformance.selftest.generated.mutant import Tally
-from conformance.selftest.generated.open_places import open_places
 from conformance.selftest.generated.operators import OPERATORS
 from conformance.selftest.generated.report import document, summary
 from conformance.selftest.generated.sampling import Rate, rate_of, rates_by, sample

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from conformance.mutation.wire import IncompleteMessageError
-from conformance.packs.table1.mutants.in_background import later
+from conformance.packs.table1.mutants.crowd import later
 
 
 def test_it_is_done_with_its_arguments():

@@ -5,8 +5,7 @@ import pytest
 from conformance.contract.pack import Contract
 from conformance.verdict.effort import Effort, Tally
 from conformance.verdict.run import Run
-from conformance.verdict.scope import verdict_line
-from conformance.verdict.verdicts import ClassValue, Overall, overall
+from conformance.verdict.verdicts import ClassValue, Overall, overall, verdict_line
 
 _ALL = tuple(Contract.load().classes)
 _VERSION = Contract.load().version

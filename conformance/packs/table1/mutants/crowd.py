@@ -4,10 +4,11 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import Final
+from typing import Any, Final
 
 from conformance.mutation.changes import Make, Where
 from conformance.mutation.messages import Change, Forward, Request, Response
+from conformance.mutation.wire import IncompleteMessageError
 
 # How long a request waits for company, s: as it would in a robot that takes its time.
 COMPANY_S: Final = 0.003
@@ -60,3 +61,17 @@ def when_crowded(where: Where, act: Callable[[Request, Forward], Response], nth:
         return change
 
     return make
+
+
+def later(delay_s: float, act: Callable[..., object], *arguments: Any) -> None:
+    """Call ``act`` in a thread after a delay, s; ignore errors, because the robot may have stopped by then."""
+
+    def quietly() -> None:
+        try:
+            act(*arguments)
+        except (OSError, IncompleteMessageError):
+            return
+
+    timer = threading.Timer(delay_s, quietly)
+    timer.daemon = True
+    timer.start()

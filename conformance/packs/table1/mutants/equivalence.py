@@ -9,7 +9,7 @@ from conformance.mutation.changes import Make, Where, becomes, rest, soap, succe
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import named
-from conformance.packs.table1.mutants.in_background import later
+from conformance.packs.table1.mutants.crowd import later
 from conformance.packs.table1.mutants.paths import DELIVERIES, SENSORS, TNS, deliveries
 from conformance.packs.table1.mutants.soap_responses import enveloped
 from conformance.papers_robot.delivery import COFFEE, COORDINATES, PATH_NAMES

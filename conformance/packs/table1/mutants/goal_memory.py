@@ -7,7 +7,7 @@ from typing import Any
 from conformance.mutation.changes import parsed, plain, problem, rest, success
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
-from conformance.packs.table1.mutants.in_background import later
+from conformance.packs.table1.mutants.crowd import later
 from conformance.packs.table1.mutants.paths import GOAL, LINEAR, VELOCITY
 
 MUTANTS = Table()

@@ -8,7 +8,7 @@ from conformance.mutation.changes import parsed, plain, rest, success
 from conformance.mutation.fields import found
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
-from conformance.packs.table1.mutants.in_background import later
+from conformance.packs.table1.mutants.crowd import later
 from conformance.packs.table1.mutants.input_effects import sent
 from conformance.packs.table1.mutants.paths import GOAL, LINEAR, VELOCITY
 

@@ -7,8 +7,8 @@ from typing import Any
 from conformance.mutation.changes import parsed, plain, problem, rest, success
 from conformance.mutation.messages import Forward, Request, Response, unchanged
 from conformance.mutation.table import Table
+from conformance.packs.table1.mutants.crowd import later
 from conformance.packs.table1.mutants.goal_memory import active
-from conformance.packs.table1.mutants.in_background import later
 from conformance.packs.table1.mutants.input_effects import drive, goal_ahead, sent
 from conformance.packs.table1.mutants.paths import GOAL, LINEAR, VELOCITY
 from conformance.packs.table1.mutants.velocity import speeds

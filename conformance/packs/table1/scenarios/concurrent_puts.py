@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from http import HTTPStatus
 from typing import Any, Final
 
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.validity import require_valid
 from conformance.observe.polling import poll, poll_for
 from conformance.packs.table1.robot.concurrent_puts import (
     Accepted,
@@ -15,14 +17,15 @@ from conformance.packs.table1.robot.concurrent_puts import (
     GoalRead,
     VelocityRead,
 )
+from conformance.packs.table1.robot.delivery import path_of
 from conformance.packs.table1.robot.goal import arrived, await_goal, await_none, difference, goal_body
 from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, STILL, VELOCITY, Robot, Velocity
 from conformance.scenarios.scenario import scenario
-from conformance.scenarios.stage import Need
-from conformance.transport.exchange import Attempt, Exchange, Outgoing
-from conformance.transport.parallel import is_busy, send_together
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.transport.exchange import Attempt, Exchange, Outgoing, Unanswered
+from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 from conformance.verdict.effort import Effort
 
 # How often velocities are put that ended before a read showed them, or that the robot did not reach in time.
@@ -131,3 +134,32 @@ def _put_velocities(robot: Robot, velocities: Sequence[Velocity], *, last: bool)
 def _put_together(robot: Robot, path: str, values: Sequence[dict[str, Any]]) -> list[Attempt]:
     """PUT each value from its own client, all at the same moment."""
     return send_together([[(robot.rest, Outgoing("PUT", path, JSON_BODY, body_of(value))) for value in values]])[0]
+
+
+_TURNS: Final = 12
+_COORDINATES: Final = ("1.5", "2.5", "3.5", "4.5", "5.5", "6.5")
+_NO_CODE: Final = "none"
+
+
+@scenario(needs={Need.REST, Need.MOTION}, leaves=Leaves.UNTOUCHED, stage=Stage.ACTING)
+def concurrent_deliveries(api: RestInterface) -> tuple[tuple[bool, Exchange], ...]:
+    """Send valid and invalid deliveries at once; record whether each was valid, and its exchange.
+
+    Empty where the robot rejects a valid delivery alone, or accepts an invalid one; and at quick, where no mutant was
+    told apart by it that other requests at once did not tell apart as well.
+    """
+    if api.run.effort.name == "quick":
+        return ()
+    paths = [path_of(code, *_COORDINATES) for code in ("3", _NO_CODE)]
+    require_valid(api.run.contract, "PUT", paths[0])
+    # What is done with each alone is for others to judge.
+    taken, refused = (api.client.send("PUT", path).response for path in paths)
+    if not taken.ok or refused.ok:
+        return ()
+    turn = [(api.client, Outgoing("PUT", path)) for path in paths] * (MOST_CLIENTS // len(paths))
+    return tuple(
+        (request.target == paths[0], attempt)
+        for came in send_together([turn] * api.run.effort.cases(_TURNS))
+        for (_, request), attempt in zip(turn, came, strict=True)
+        if not isinstance(attempt, Unanswered) and not is_busy(attempt)
+    )

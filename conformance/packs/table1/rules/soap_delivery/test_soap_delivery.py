@@ -11,7 +11,7 @@ from conformance.api.soap.messages import padded, variants, with_text
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import call_valid, require_valid_document, typed
 from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes, xml_styles
-from conformance.contract.sizes import TAKEN_OCTETS
+from conformance.contract.classes import TAKEN_OCTETS
 from conformance.documents.xml import elements, text_of
 from conformance.documents.xml_names import ADDRESSING, clark, local
 from conformance.documents.xml_node import Node

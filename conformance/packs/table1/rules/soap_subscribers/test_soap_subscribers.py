@@ -9,7 +9,7 @@ from conformance.api.soap.envelope import envelope
 from conformance.api.soap.messages import padded
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import call_valid, require_valid_document
-from conformance.contract.sizes import TAKEN_OCTETS
+from conformance.contract.classes import TAKEN_OCTETS
 from conformance.documents.xml import text_of
 from conformance.documents.xml_names import clark, local
 from conformance.documents.xml_node import Node
