@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
 from conformance.api.call_rules import CallRules, told
 from conformance.cli.certify_init import init, init_described
+from conformance.cli.certify_options import CertifyOptions
 from conformance.cli.summary import print_summary
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
@@ -26,7 +26,7 @@ from conformance.contract.requirement_sets import RequirementSetError, judged_by
 from conformance.documents.description import DescriptionError
 from conformance.documents.openapi import operations_of
 from conformance.statement.statement import Statement, StatementError
-from conformance.target.naming import hold_folder, told_apart, what_is_judged
+from conformance.target.naming import Judged, hold_folder, told_apart, what_is_judged
 from conformance.transport.reach import UnreachableError
 from conformance.verdict.effort import DEEP_MINUTES, EFFORTS, Effort
 
@@ -117,7 +117,7 @@ _FILE = click.Path(exists=True, dir_okay=False)
 @click.option("--json", "as_json", is_flag=True, help="Print result.json to stdout in place of the summary.")
 @click.option("--force", is_flag=True, help="With --init: overwrite STATEMENT.")
 @click.pass_obj
-def certify(door: FrontDoor, /, targets: tuple[str, ...], **options: Any) -> CommandResult:
+def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> CommandResult:
     """Test a robot against its contract, and judge each requirement.
 
     STATEMENT is the robot's implementation conformance statement (TOML); options override it. --fleet takes several
@@ -132,20 +132,20 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **options: Any) -> Com
     # However it ends, a run stops the robot and writes what it has.
     end_like_ctrl_c()
     end_with_parent()
-    if options["as_json"] and (options["plan"] or options["init"]):
+    options = CertifyOptions.of(given)
+    if options.as_json and (options.plan or options.init):
         raise click.UsageError("--json prints the result of a run, and --plan and --init have none: give one of them")
-    if options["fleet"]:
+    if options.fleet:
         from conformance.cli.certify_fleet import certify_fleet  # noqa: PLC0415 - one robot needs nothing of it
 
         # What each run would refuse is told once, before the first.
-        if options["nonce"] is not None:
-            _check_nonce(options["nonce"])
-        if options["key"]:
-            door.notary(Path(options["key"]))
-        return certify_fleet(Path(options["fleet"]), options)
-    if options["parallel"] is not None:
+        options.check_nonce()
+        if options.key:
+            door.notary(Path(options.key))
+        return certify_fleet(Path(options.fleet), options)
+    if options.parallel is not None:
         raise click.UsageError("--parallel says how many robots of a --fleet are judged at once: give --fleet")
-    source, statement = told_apart(targets, options["openapi"] or options["wsdl"])
+    source, statement = told_apart(targets, options.openapi or options.wsdl)
     try:
         done = _judge(door, source, statement, options)
     except UnreachableError as unreachable:
@@ -161,7 +161,7 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **options: Any) -> Com
     return done
 
 
-def _judge(door: FrontDoor, source: str | None, statement: Path | None, options: dict[str, Any]) -> CommandResult:
+def _judge(door: FrontDoor, source: str | None, statement: Path | None, options: CertifyOptions) -> CommandResult:
     """Do what the options ask for one robot: write a first statement, print the plan, or certify.
 
     Args:
@@ -174,35 +174,35 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
         StatementError, ContractError, DescriptionError: one of the files cannot be used.
         UnreachableError: the server of the description does not respond.
     """
-    if options["init"] and source is not None:
-        return init_described(statement, source, options)
-    if not (options["plan"] or options["init"]):
-        hold_folder(options["out"])
-    chosen, contract = what_is_judged(source, statement if not options["init"] else None, options)
-    if options["init"]:
-        return init(statement, chosen, contract, force=options["force"])
-    if options["nonce"] is not None:
-        _check_nonce(options["nonce"])
+    if options.init and source is not None:
+        return init_described(statement, source, options, force=options.force)
+    if not (options.plan or options.init):
+        hold_folder(options.out)
+    judged = what_is_judged(source, statement if not options.init else None, options)
+    chosen, contract, _ = judged
+    if options.init:
+        return init(statement, chosen, contract, force=options.force)
+    options.check_nonce()
     # Before the run: what cannot be signed by this key is told at once.
-    notary = door.notary(Path(options["key"]), str(contract.directory)) if options["key"] else None
-    if options["plan"]:
+    notary = door.notary(Path(options.key), str(contract.directory)) if options.key else None
+    if options.plan:
         return _plan(chosen, options, contract)
-    outcome = _certify(door, chosen, options, contract, statement)
+    outcome = _certify(door, judged, options, statement)
     if outcome.unwritten:
         print_summary(outcome)
-        kept = "What is printed is all that is kept" if outcome.path.parent == options["out"] else f"See {outcome.path}"
-        where = inert(str(options["out"]))
+        kept = "What is printed is all that is kept" if outcome.path.parent == options.out else f"See {outcome.path}"
+        where = inert(str(options.out))
         click.echo(f"error: the result could not be written to {where}: {inert(outcome.unwritten)}. {kept}", err=True)
         return CommandResult(outcome.exit_code)
-    if options["as_json"]:
+    if options.as_json:
         click.echo(outcome.path.read_text(encoding="utf-8"), nl=False)
     else:
         print_summary(outcome)
         click.echo(f"result: {outcome.path}")
-    return CommandResult(outcome.exit_code, outcome.path, notary, tell=not options["as_json"])
+    return CommandResult(outcome.exit_code, outcome.path, notary, tell=not options.as_json)
 
 
-def _plan(chosen: Statement, options: dict[str, Any], contract: Contract) -> CommandResult:
+def _plan(chosen: Statement, options: CertifyOptions, contract: Contract) -> CommandResult:
     """Print the plan of the run."""
     from conformance.engine.planning import plan_of  # noqa: PLC0415 - only --plan needs it
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415 - as above
@@ -212,16 +212,8 @@ def _plan(chosen: Statement, options: dict[str, Any], contract: Contract) -> Com
     return CommandResult(ExitCode.PASSED)
 
 
-def _check_nonce(nonce: str) -> None:
-    if not nonce.strip() or not nonce.isprintable():
-        raise click.UsageError(f"--nonce {nonce!r} must be printable text")
-    if click.get_current_context().get_parameter_source("seed") is ParameterSource.COMMANDLINE:
-        raise click.UsageError("--seed follows from --nonce: give one of the two")
-
-
-def _certify(
-    door: FrontDoor | None, chosen: Statement, options: dict[str, Any], contract: Contract, statement: Path | None
-) -> Certification:
+def _certify(door: FrontDoor | None, judged: Judged, options: CertifyOptions, statement: Path | None) -> Certification:
+    chosen, contract, remarks = judged
     # Imported here: Schemathesis and its like cost a second that --help and wrong usage need not pay.
     from conformance.engine.certification import certify as judge  # noqa: PLC0415
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
@@ -234,33 +226,33 @@ def _certify(
         connection = connection_of(chosen.endpoints)
         if chosen.endpoints.ca_file:
             connection.tls()
-        requirements = judged_by(contract, options["requirements"])
-        baseline = load_baseline(options["baseline"], contract.ledger, contract.renamed) if options["baseline"] else ()
+        requirements = judged_by(contract, options.requirements)
+        baseline = load_baseline(options.baseline, contract.ledger, contract.renamed) if options.baseline else ()
         given = Given(
             statement=file_digest(statement) if statement else None,
-            baseline=file_digest(options["baseline"]) if options["baseline"] else None,
-            nonce=options["nonce"],
+            baseline=file_digest(options.baseline) if options.baseline else None,
+            nonce=options.nonce,
             places=places(contract, statement),
         )
     except (OSError, BaselineError, RequirementSetError) as error:
         raise StatementError(str(error)) from error
     run = _run(chosen, options, contract)
     run.requirement_set, run.given = requirements, given
-    run.restart_command, run.wait_s = options["restart_command"], options["wait_s"]
+    run.restart_command, run.wait_s = options.restart_command, options.wait_s
     run.prepare = door.prepare if door else None  # there is none where the command runs without roaas.py
-    notes = (*options.get("remarks", ()), *_notes(run))
+    notes = (*remarks, *_notes(run))
     command = command_without_folders(sys.argv[1:], ("--call", "--never"))
     moves = run.statement.motion_map.calls if run.allow_motion and run.statement.motion_map else ()
     robot, calls = (
         RobotUnderTest(run, connection),
         () if contract.has_own_requirements else tuple(told(*_rules(run), moves)),
     )
-    progress, bar = None if options["progress"] == "none" else sys.stderr, options["progress"] == "auto"
+    progress, bar = None if options.progress == "none" else sys.stderr, options.progress == "auto"
     said: dict[str, Any] = {"progress": progress, "bar": bar, "notes": notes, "announced": calls}
-    return judge(robot, options["out"], command=command, baseline=baseline, **said)
+    return judge(robot, options.out, command=command, baseline=baseline, **said)
 
 
-def _run(chosen: Statement, options: dict[str, Any], contract: Contract) -> Run:
+def _run(chosen: Statement, options: CertifyOptions, contract: Contract) -> Run:
     """Return the run that the options describe."""
     from conformance.verdict.run import Run, seed_of_nonce  # noqa: PLC0415 - see _certify
     from conformance.verdict.time_limit import TimeLimit  # noqa: PLC0415 - as above
@@ -270,10 +262,10 @@ def _run(chosen: Statement, options: dict[str, Any], contract: Contract) -> Run:
         statement=chosen,
         contract=contract,
         claims=tuple(name for name in chosen.claimed(contract) if name in known),
-        allow_motion=options["allow_motion"],
-        seed=options["seed"] if options["nonce"] is None else seed_of_nonce(options["nonce"]),
-        effort=Effort(options["effort"], minutes=options["minutes"] or DEEP_MINUTES),
-        limit=TimeLimit(options["minutes"]),
+        allow_motion=options.allow_motion,
+        seed=options.seed if options.nonce is None else seed_of_nonce(options.nonce),
+        effort=Effort(options.effort, minutes=options.minutes or DEEP_MINUTES),
+        limit=TimeLimit(options.minutes),
     )
 
 

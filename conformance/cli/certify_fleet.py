@@ -4,11 +4,11 @@ import asyncio
 import contextlib
 import sys
 from pathlib import Path
-from typing import Any
 
 import click
 from click.core import ParameterSource
 
+from conformance.cli.certify_options import CertifyOptions
 from conformance.cli.summary import warning
 from conformance.commandline.result_command import CommandResult
 from conformance.commandline.started import Started
@@ -30,7 +30,7 @@ _FOR_ALL = (
 _OWN = ("fleet", "parallel", "out", "allow_motion", "progress", "as_json")
 
 
-def certify_fleet(path: Path, options: dict[str, Any]) -> CommandResult:
+def certify_fleet(path: Path, options: CertifyOptions) -> CommandResult:
     """Certify the robots of a fleet file.
 
     Raises:
@@ -42,51 +42,51 @@ def certify_fleet(path: Path, options: dict[str, Any]) -> CommandResult:
 
     shared = _shared()
     try:
-        members = load_fleet(path, Contract.load(options["pack"]))
-        if options["key"]:
+        members = load_fleet(path, Contract.load(options.pack))
+        if options.key:
             refuse_same_identity(path, members)
     except (FleetError, ContractError) as error:
         raise click.UsageError(str(error)) from error
-    hold_folder(options["out"])
-    deep_s = 60 * DEEP_MINUTES if options["effort"] == "deep" else 0
-    limit_s = TIME_LIMIT_S + (60 * options["minutes"] if options["minutes"] else deep_s)
+    hold_folder(options.out)
+    deep_s = 60 * DEEP_MINUTES if options.effort == "deep" else 0
+    limit_s = TIME_LIMIT_S + (60 * options.minutes if options.minutes else deep_s)
     runs = [
         MemberRun(
             member,
-            options["out"] / ROBOTS_FOLDER / member.name,
-            [*shared, *(["--allow-motion"] if options["allow_motion"] and member.movable else [])],
+            options.out / ROBOTS_FOLDER / member.name,
+            [*shared, *(["--allow-motion"] if options.allow_motion and member.movable else [])],
             member.time_limit_s or limit_s,
         )
         for member in members
     ]
     started = Started()
-    parallel = options["parallel"] or PARALLEL
+    parallel = options.parallel or PARALLEL
 
     def write(results: list[MemberResult], *, interrupted: bool) -> Path:
         document = fleet_document(
             results, started=started.at, finished=started.ended, parallel=parallel, interrupted=interrupted
         )
-        return write_fleet(document, options["out"])
+        return write_fleet(document, options.out)
 
     def keep(results: list[MemberResult]) -> None:
         with contextlib.suppress(OSError):  # told in the end: no robot is to wait for a full disk
             write(results, interrupted=True)
 
     async def judge() -> tuple[list[MemberResult], bool]:
-        fleet = FleetRun(runs, parallel, None if options["progress"] == "none" else sys.stderr, keep)
+        fleet = FleetRun(runs, parallel, None if options.progress == "none" else sys.stderr, keep)
         return await fleet.judge(), fleet.interrupted
 
     results, interrupted = asyncio.run(judge())
     try:
         written = write(results, interrupted=interrupted)
     except OSError as error:
-        raise click.UsageError(f"--out {options['out']}: {error}") from error
-    if options["as_json"]:
+        raise click.UsageError(f"--out {options.out}: {error}") from error
+    if options.as_json:
         click.echo(written.read_text(encoding="utf-8"), nl=False)
     else:
         _print_summary(results)
         click.echo(f"result: {written}")
-    return CommandResult(exit_code(results, interrupted=interrupted), written, tell=not options["as_json"])
+    return CommandResult(exit_code(results, interrupted=interrupted), written, tell=not options.as_json)
 
 
 def _shared() -> list[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -15,6 +14,7 @@ from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Api, Calls, Statement, StatementError
 from conformance.target.connecting import connection_of
 from conformance.target.describing import fetch_description, is_wsdl
+from conformance.target.naming import DeviceOptions
 
 
 def init(path: Path | None, chosen: Statement, contract: Contract, *, force: bool) -> CommandResult:
@@ -47,7 +47,7 @@ def _new_file(path: Path | None, *, force: bool) -> Path:
     return path
 
 
-def init_described(path: Path | None, source: str, options: dict[str, Any]) -> CommandResult:
+def init_described(path: Path | None, source: str, options: DeviceOptions, *, force: bool) -> CommandResult:
     """Write a statement for a device with a description.
 
     Raises:
@@ -57,16 +57,16 @@ def init_described(path: Path | None, source: str, options: dict[str, Any]) -> C
     """
     from conformance.engine.first_described import write_described_statement  # noqa: PLC0415 - only --init needs it
 
-    if is_wsdl(source) or source == options["wsdl"]:
+    if is_wsdl(source) or source == options.wsdl:
         raise click.UsageError(f'--init reads OpenAPI descriptions: for {source}, write [api] and wsdl = "{source}"')
-    path = _new_file(path, force=options["force"])
-    given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) not in {None, ()}}
-    api = Api(overlays=tuple(options["overlays"]), base_url=options["base_url"] or options["rest"])
+    path = _new_file(path, force=force)
+    where = options.applied(Endpoints())
+    api = Api(overlays=options.overlays, base_url=options.base_url or where.rest)
     try:
         found = fetch_description(
-            source, api.overlays, connection_of(Endpoints(**given)), api.base_url, allow_files=options["allow_files"]
+            source, api.overlays, connection_of(where), api.base_url, allow_files=options.allow_files
         )
-        write_described_statement(path, found, api, Calls(tuple(options["allow"]), tuple(options["never"])))
+        write_described_statement(path, found, api, Calls(options.allow, options.never))
     except OSError as error:
         raise StatementError(str(error)) from error
     for remark in (*found.remarks, *found.unread):

@@ -18,7 +18,7 @@ from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.commandline.terminal import inert
 from conformance.contract.locating import ContractError
-from conformance.contract.pack import DEFAULT_PACK, Contract
+from conformance.contract.pack import Contract
 from conformance.engine.stored_result import MALFORMED, StoredResultError, findings, not_well_made, read_result
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Statement, StatementError, api_of, load_statement
@@ -214,13 +214,11 @@ def _described(statement_file: Path, given: dict[str, Any]) -> tuple[Statement, 
         StatementError, ContractError, DescriptionError: one of them cannot be used.
         UnreachableError: the server of the description does not respond.
     """
-    from conformance.target.naming import what_is_judged  # noqa: PLC0415 - see replay()
+    from conformance.target.naming import DeviceOptions, what_is_judged  # noqa: PLC0415 - see replay()
 
     folder = Path(click.get_current_context().with_resource(tempfile.TemporaryDirectory()))
-    unset = ("base_url", "wsdl", "schemas", "profile", "ros_domain_id")
-    empty = ("overlays", "allow", "never", "classes")
-    options = {**dict.fromkeys(unset), **dict.fromkeys(empty, ()), "pack": DEFAULT_PACK, "out": folder, **given}
-    return what_is_judged(None, statement_file, options)
+    statement, contract, _ = what_is_judged(None, statement_file, DeviceOptions.of(given, out=folder))
+    return statement, contract
 
 
 def _check_addresses(failures: list[dict[str, Any]], trusted: tuple[str, ...]) -> None:

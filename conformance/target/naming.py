@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import click
 import msgspec
@@ -13,7 +14,7 @@ import msgspec
 from conformance.commandline.device_options import advice
 from conformance.commandline.extras import lacking_soap
 from conformance.commandline.out_folder import FolderError, held
-from conformance.contract.pack import Contract
+from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.documents.description import is_url
 from conformance.documents.openapi import operations_of
 from conformance.statement.endpoints import Endpoints
@@ -33,6 +34,55 @@ from conformance.target.connecting import connection_of, keyed
 from conformance.target.describing import described_contract, is_wsdl, soap_contract
 
 
+@dataclass(frozen=True)
+class DeviceOptions:
+    """What a command says of a device; it overrides the statement.
+
+    Attributes:
+        endpoints: the given fields of Endpoints, by name.
+        pack: the contract pack.
+        out: folder of the results, in which the pack of a description is written.
+        overlays, base_url, wsdl, schemas, allow_files: as in Api; on the device's description.
+        profile, classes: what is claimed.
+        allow, never: patterns of operations that may or must not be called.
+        ros_domain_id: the device's ROS domain, or None.
+    """
+
+    endpoints: Mapping[str, Any] = field(default_factory=dict)
+    pack: Path | str = DEFAULT_PACK
+    out: Path = Path("out")
+    overlays: tuple[str, ...] = ()
+    base_url: str | None = None
+    wsdl: str | None = None
+    schemas: Path | None = None
+    allow_files: bool = False
+    profile: str | None = None
+    classes: tuple[str, ...] = ()
+    allow: tuple[str, ...] = ()
+    never: tuple[str, ...] = ()
+    ros_domain_id: int | None = None
+
+    @classmethod
+    def of(cls, options: Mapping[str, Any], **own: Any) -> Self:
+        """Return what the options of a command say, by their names in Python; ``own`` overrides them."""
+        given = {name: value for name, value in {**options, **own}.items() if value is not None and value != ()}
+        where = {name: given[name] for name in Endpoints.__struct_fields__ if name in given}
+        known = {one.name for one in fields(cls)} - {"endpoints"}
+        return cls(where, **{name: value for name, value in given.items() if name in known})
+
+    def applied(self, endpoints: Endpoints) -> Endpoints:
+        """Return endpoints with those given by the command."""
+        return msgspec.structs.replace(endpoints, **self.endpoints)
+
+
+class Judged(NamedTuple):
+    """What a device is judged by, and what the reader of the result should know of that."""
+
+    statement: Statement
+    contract: Contract
+    remarks: tuple[str, ...] = ()
+
+
 def told_apart(targets: tuple[str, ...], openapi: str | None) -> tuple[str | None, Path | None]:
     """Return the description and the statement that the command names; either may be None.
 
@@ -48,62 +98,58 @@ def told_apart(targets: tuple[str, ...], openapi: str | None) -> tuple[str | Non
     return next(iter(described), None), Path(statements[0]) if statements else None
 
 
-def what_is_judged(source: str | None, statement: Path | None, options: dict[str, Any]) -> tuple[Statement, Contract]:
-    """Return what a device is judged by: statement and contract.
+def what_is_judged(source: str | None, statement: Path | None, options: DeviceOptions) -> Judged:
+    """Return what a device is judged by.
 
     Raises:
         DescriptionError, StatementError, ContractError: one of them cannot be used.
         UnreachableError: the server of the description does not respond.
     """
-    contract = Contract.load(options["pack"])
+    contract = Contract.load(options.pack)
     api = api_of(statement) if statement else None
     source = source or (api.openapi or api.wsdl if api else None)
     if source is not None:
         return _described(source, api, statement, options)
     declared = load_statement(statement, contract) if statement else empty_statement(contract)
-    return _apply(declared, options, contract), contract
+    return Judged(_apply(declared, options, contract), contract)
 
 
-def _described(
-    source: str, api: Api | None, statement: Path | None, options: dict[str, Any]
-) -> tuple[Statement, Contract]:
-    """Return statement and contract of a device that is judged by its own description.
+def _described(source: str, api: Api | None, statement: Path | None, options: DeviceOptions) -> Judged:
+    """Return what a device is judged by that is judged by its own description.
 
     Raises:
         DescriptionError, StatementError, ContractError: one of them cannot be used.
         UnreachableError: the server of the description does not respond.
     """
-    given = {key: options[key] for key in Endpoints.__struct_fields__ if options.get(key) not in {None, ()}}
-    where = msgspec.structs.replace(endpoints_of(statement) if statement else Endpoints(), **given)
-    overlays = tuple(options["overlays"]) or (api.overlays if api else ())
-    base_url = options["base_url"] or (api.base_url if api else None)
-    soap = is_wsdl(source) or source in {options["wsdl"], api.wsdl if api else None}
+    where = options.applied(endpoints_of(statement) if statement else Endpoints())
+    api = api or Api()
+    base_url = options.base_url or api.base_url
+    soap = is_wsdl(source) or source in {options.wsdl, api.wsdl}
     _check_soap(["soap"] if soap else [])
     try:
         # Where an API key goes, the description may say, so that it is read without one.
         connection = connection_of(where if where.api_key else msgspec.structs.replace(where, api_key_file=None))
         more = {
             "moves": statement is not None and has_motion_map(statement),
-            "allow_files": bool(options.get("allow_files") or (api and api.allow_files)),
+            "allow_files": options.allow_files or api.allow_files,
         }
         if soap:
-            schemas = options.get("schemas") or (Path(api.schemas) if api and api.schemas else None)
+            schemas = options.schemas or (Path(api.schemas) if api.schemas else None)
             contract, where, remarks = soap_contract(
-                source, base_url, where, connection, options["out"], schemas=schemas, **more
+                source, base_url, where, connection, options.out, schemas=schemas, **more
             )
         else:
             contract, where, remarks = described_contract(
-                source, overlays, base_url, where, connection, options["out"], **more
+                source, options.overlays or api.overlays, base_url, where, connection, options.out, **more
             )
     except OSError as error:
         raise StatementError(str(error)) from error
-    options["remarks"] = remarks
     declared = load_statement(statement, contract) if statement else empty_statement(contract)
     _check_map(declared, contract)
     if soap and declared.motion_map is not None:
         _check_messages(declared.motion_map, contract)
     where = keyed(where, contract.openapi)
-    return _apply(msgspec.structs.replace(declared, endpoints=where), options, contract), contract
+    return Judged(_apply(msgspec.structs.replace(declared, endpoints=where), options, contract), contract, remarks)
 
 
 def _check_map(declared: Statement, contract: Contract) -> None:
@@ -141,14 +187,13 @@ def _check_messages(motion: MotionMap, contract: Contract) -> None:
                 raise StatementError(f"[motion] {call}: {error}") from error
 
 
-def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> Statement:
+def _apply(declared: Statement, options: DeviceOptions, contract: Contract) -> Statement:
     """Return the statement with the options applied, which override it.
 
     Raises:
         StatementError: an option has an invalid value.
     """
-    given = {key: options[key] for key in declared.endpoints.__struct_fields__ if options.get(key) not in {None, ()}}
-    where = msgspec.structs.replace(declared.endpoints, **given)
+    where = options.applied(declared.endpoints)
     for key in ("rest", "publishers_endpoint", "subscribers_endpoint"):
         url = getattr(where, key)
         if url is not None and not url.startswith(("http://", "https://")):
@@ -161,13 +206,13 @@ def _apply(declared: Statement, options: dict[str, Any], contract: Contract) -> 
         )
     _check_soap(where.interfaces)
     claims = declared.claims
-    if options["profile"] or options["classes"]:
+    if options.profile or options.classes:
         claims = _claims(options, contract)
-    if options["ros_domain_id"] is not None:
-        declared = declared.on_domain(options["ros_domain_id"])
+    if options.ros_domain_id is not None:
+        declared = declared.on_domain(options.ros_domain_id)
     calls = declared.calls
-    if options["allow"] or options["never"]:
-        calls = Calls((*calls.allow, *options["allow"]), (*calls.never, *options["never"]))
+    if options.allow or options.never:
+        calls = Calls((*calls.allow, *options.allow), (*calls.never, *options.never))
     return msgspec.structs.replace(declared, endpoints=where, claims=claims, calls=calls)
 
 
@@ -182,20 +227,20 @@ def _check_soap(interfaces: Iterable[str]) -> None:
         raise click.UsageError(problem)
 
 
-def _claims(options: dict[str, Any], contract: Contract) -> tuple[str, ...]:
+def _claims(options: DeviceOptions, contract: Contract) -> tuple[str, ...]:
     """Return the classes that the options claim.
 
     Raises:
         StatementError: the contract has no such profile or class.
     """
     for option, names, known in (
-        ("--profile", filter(None, [options["profile"]]), contract.profiles),
-        ("--class", options["classes"], contract.classes),
+        ("--profile", filter(None, [options.profile]), contract.profiles),
+        ("--class", options.classes, contract.classes),
     ):
         for name in names:
             if name not in known:
                 raise StatementError(f"{option} {name!r}: {contract.name} has {', '.join(known)}")
-    return (*contract.profiles.get(options["profile"] or "", ()), *options["classes"])
+    return (*contract.profiles.get(options.profile or "", ()), *options.classes)
 
 
 def hold_folder(out: Path) -> None:

@@ -12,7 +12,7 @@ import msgspec
 from conformance.api.permission import Permission
 from conformance.api.rest.interface import RestInterface
 from conformance.contract.locating import ContractError
-from conformance.contract.pack import DEFAULT_PACK, Contract
+from conformance.contract.pack import Contract
 from conformance.documents.description import DescriptionError, is_url
 from conformance.documents.openapi import Operation, operations_of
 from conformance.scenarios.scenario import NotPossibleError
@@ -21,7 +21,7 @@ from conformance.statement.motion_map import shape_of
 from conformance.statement.statement import Statement, StatementError, api_of
 from conformance.target.connecting import connection_of
 from conformance.target.describing import is_wsdl, soap_contract, trusting
-from conformance.target.naming import told_apart, what_is_judged
+from conformance.target.naming import DeviceOptions, told_apart, what_is_judged
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswerError
 from conformance.transport.reach import UnreachableError
@@ -140,13 +140,12 @@ class Device:
             SettingsError: the description, the statement or a credential cannot be used.
             CallError: the server of the description does not respond.
         """
-        own = {"pack": DEFAULT_PACK, "profile": None, "classes": (), "ros_domain_id": None}
         try:
             with TemporaryDirectory(prefix="roaas-load-") as folder:
-                taken: dict[str, Any] = {**options, **own, "out": Path(folder)}
-                statement, contract = what_is_judged(named.source, named.statement, taken)
+                wanted = DeviceOptions.of(options, out=Path(folder))
+                statement, contract, remarks = what_is_judged(named.source, named.statement, wanted)
                 run = Run(statement=statement, contract=contract, allow_motion=bool(options["allow_motion"]))
-                return cls._opened(run, connection_of(statement.endpoints), taken.get("remarks", ()))
+                return cls._opened(run, connection_of(statement.endpoints), remarks)
         except (StatementError, ContractError, DescriptionError, NotPossibleError, OSError) as error:
             raise SettingsError(str(error)) from None
         except (UnreachableError, NoAnswerError) as error:

@@ -1,0 +1,46 @@
+"""The options of `roaas certify`, which travel through it as one value."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+from click.core import ParameterSource
+
+from conformance.target.naming import DeviceOptions
+
+
+@dataclass(frozen=True)
+class CertifyOptions(DeviceOptions):
+    """The options of `roaas certify`, by their names in Python; see --help."""
+
+    openapi: str | None = None
+    init: bool = False
+    force: bool = False
+    plan: bool = False
+    requirements: str | None = None
+    allow_motion: bool = False
+    effort: str = "standard"
+    minutes: float | None = None
+    seed: int = 0
+    nonce: str | None = None
+    restart_command: str = ""
+    wait_s: float | None = None
+    baseline: Path | None = None
+    fleet: str | None = None
+    parallel: int | None = None
+    key: str | None = None
+    progress: str = "auto"
+    as_json: bool = False
+
+    def check_nonce(self) -> None:
+        """Check that the seed follows from the nonce, where there is one.
+
+        Raises:
+            click.UsageError: the nonce is not printable, or a seed is given as well.
+        """
+        if self.nonce is None:
+            return
+        if not self.nonce.strip() or not self.nonce.isprintable():
+            raise click.UsageError(f"--nonce {self.nonce!r} must be printable text")
+        if click.get_current_context().get_parameter_source("seed") is ParameterSource.COMMANDLINE:
+            raise click.UsageError("--seed follows from --nonce: give one of the two")
