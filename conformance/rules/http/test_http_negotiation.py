@@ -61,7 +61,7 @@ _LONG_AGO = "Sat, 29 Oct 1994 19:43:31 GMT"
 _STANDARD = 10
 
 
-@pytest.mark.requirement(_PRECONDITIONS)
+@pytest.mark.requirement(_PRECONDITIONS, "http/entity-tag")
 def test_what_a_cache_asks(api: RestInterface) -> None:
     """Send conditions of a client without a current copy."""
     for call in api.run.effort.draw(answered(api, _PRECONDITIONS), _STANDARD, f"{api.run.seed}/preconditions"):
