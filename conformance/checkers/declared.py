@@ -8,7 +8,8 @@ from conformance.api.rest.accept import quality
 from conformance.api.rest.statuses import CRASHES, is_cut_off
 from conformance.api.rest.validity import INVALID, VALID
 from conformance.checkers.occasion import METHODS, Occasion
-from conformance.documents.json_schema import Schema, Shape, shape_of
+from conformance.documents.json_schema import Schema
+from conformance.documents.json_shape import Shape, shape_of
 from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.documents.patterns import PatternError
 from conformance.documents.representation import UnreadableError, read

@@ -6,7 +6,7 @@ from http import HTTPStatus
 from typing import Final, NamedTuple
 
 from conformance.checkers.occasion import METHODS, Occasion
-from conformance.documents.json_schema import shape_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json
 from conformance.documents.resources import Resource, resource_at, resources_of

@@ -11,7 +11,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed, resolved, shape_of
+from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed, resolved
+from conformance.documents.json_shape import shape_of
 from conformance.documents.openapi import methods_of
 from conformance.documents.resources import PARAMETER
 from conformance.documents.schema_places import DATA

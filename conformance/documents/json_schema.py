@@ -1,59 +1,23 @@
-"""Validate JSON values by the schemas of an OpenAPI description, converted to Draft 2020-12.
-
-``jsonschema_rs`` accepts valid values fast (1 ms for a plan of a thousand poses, where ``jsonschema`` takes 300 ms).
-``jsonschema`` validates the others, because it names each violation with its place.
-
-Over 600 lines because lazy references belong to both: copying a schema makes them, and validating follows them.
-"""
+"""Read and copy the schemas of an OpenAPI description, converted to Draft 2020-12; long ones have lazy references."""
 
 from __future__ import annotations
 
-import json
 import math
-import re
-import threading
-from collections import defaultdict
 from collections.abc import Callable, Iterator
-from contextlib import suppress
-from fractions import Fraction
-from functools import cache, cached_property, lru_cache, partial
-from hashlib import sha256
-from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar, cast
+from functools import lru_cache
+from typing import Any, Final
 from urllib.parse import unquote
 
-import jsonschema_rs
-import msgspec
-
-from conformance.documents import patterns
-from conformance.documents.json_text import shown
-
-if TYPE_CHECKING:
-    from jsonschema.exceptions import ValidationError
-
 Schema = dict[str, Any]
-T = TypeVar("T")
 # So many nodes of a document, and references one behind the other, are copied before the others stay lazy references.
 MOST_NODES: Final = 2_000
 _DEEPEST: Final = 8
-_SCHEME: Final = "roaas-lazy:"
-# The keyword of such a reference where its schema is compiled on its own.
-_KEYWORD: Final = "roaas-referred"
-_UNEVALUATED: Final = frozenset({"unevaluatedProperties", "unevaluatedItems"})
-# A schema that refers to no more than so many is compiled together with them.
-_MOST_TOGETHER: Final = 30
-# Schemas of so many nodes are kept compiled, in nearly 1 kB each.
-_MOST_KEPT: Final = 100_000
-# So many judgements of parts of values are remembered, in about 250 octets each.
-_MOST_JUDGED: Final = 100_000
-# A part of so many octets as JSON is remembered by its digest.
-_DIGESTED: Final = 100
-# So many references are followed to name a violation: alternatives that refer to each other multiply.
-_MOST_FOLLOWED: Final = 1_000
-# How a lazy reference is written where `bundled` has put what it leads to.
-_BUNDLED: Final = re.compile(r"#/\$defs/(\d+(?:,\w+)*)")
+#: How lazy references begin.
+LAZY_SCHEME: Final = "roaas-lazy:"
 _LAZY: Final[list[tuple[Schema, str]]] = []
 _LAZY_NUMBERS: Final[dict[tuple[int, str], int]] = {}
-_VALUES: Final = frozenset({"example", "examples", "default", "enum", "const"})
+#: Keywords whose values are data, and no schemas.
+VALUE_KEYWORDS: Final = frozenset({"example", "examples", "default", "enum", "const"})
 _DATA: Final = frozenset({"enum", "const"})
 _NAMING: Final = frozenset({"properties", "patternProperties", "dependentSchemas", "$defs", "definitions", "schemas"})
 _CONSTRAINTS: Final = frozenset(
@@ -66,10 +30,6 @@ _CONSTRAINTS: Final = frozenset(
 )  # fmt: skip
 _SCHEMA_WORDS: Final = _CONSTRAINTS - {"required"} | {"$ref"}
 _OTHERS: Final = frozenset({"in", "content", "responses", "schema"})
-_encode: Final = msgspec.json.Encoder().encode
-# An integer that is no double has 309 digits or more; to find so many in a row, each digit is taken for a 0.
-_AS_ZERO: Final = bytes.maketrans(b"123456789", b"0" * 9)
-_TOO_LONG: Final = b"0" * 309
 
 
 class UnresolvedError(Exception):
@@ -134,7 +94,7 @@ class _Resolver:
         }
 
     def _referred(self, value: Schema, reference: str, trail: tuple[str, ...]) -> Any:
-        if reference.startswith(f"{_SCHEME}/"):
+        if reference.startswith(f"{LAZY_SCHEME}/"):
             return value  # the ring in which it is was resolved before
         found = pointed(self._document, reference)
         # OpenAPI 3.0 ignores what stands beside a $ref; `nullable` is taken as its author means it.
@@ -173,7 +133,7 @@ def lazy_reference(document: Schema, reference: str) -> str:
     if key not in _LAZY_NUMBERS:
         _LAZY_NUMBERS[key] = len(_LAZY)
         _LAZY.append((document, reference))
-    return f"{_SCHEME}/{_LAZY_NUMBERS[key]}"
+    return f"{LAZY_SCHEME}/{_LAZY_NUMBERS[key]}"
 
 
 def changed_alike(schema: Schema, change: str) -> Schema:
@@ -184,7 +144,7 @@ def changed_alike(schema: Schema, change: str) -> Schema:
         change: the key of the change in `CHANGES`.
     """
     reference = schema.get("$ref")
-    if not isinstance(reference, str) or not reference.startswith(_SCHEME) or reference.endswith(f",{change}"):
+    if not isinstance(reference, str) or not reference.startswith(LAZY_SCHEME) or reference.endswith(f",{change}"):
         return schema
     return {**schema, "$ref": f"{reference},{change}"}
 
@@ -196,9 +156,9 @@ def referred(uri: str) -> Any:
     Raises:
         UnresolvedError: it is another URI. Nothing is fetched for a schema.
     """
-    if not uri.startswith(f"{_SCHEME}/"):
+    if not uri.startswith(f"{LAZY_SCHEME}/"):
         raise UnresolvedError(f"$ref {uri!r} is not local")
-    number, *changes = uri.removeprefix(f"{_SCHEME}/").split(",")
+    number, *changes = uri.removeprefix(f"{LAZY_SCHEME}/").split(",")
     document, reference = _LAZY[int(number)]
     schema = _Resolver(document, deepest=0).copy(pointed(document, reference), (reference,))
     for change in changes:
@@ -212,7 +172,7 @@ def whole(schema: Schema) -> Schema:
     if reference is None:
         return schema
     seen: set[str] = set()
-    while isinstance(reference, str) and reference.startswith(_SCHEME) and reference not in seen:
+    while isinstance(reference, str) and reference.startswith(LAZY_SCHEME) and reference not in seen:
         seen.add(reference)
         target = referred(reference)
         schema = {**target, **{key: item for key, item in schema.items() if key != "$ref"}}
@@ -226,7 +186,7 @@ def modern(schema: Any) -> Any:
         return [modern(item) for item in schema]
     if not isinstance(schema, dict):
         return schema
-    result = {key: item if key in _VALUES else modern(item) for key, item in schema.items()}
+    result = {key: item if key in VALUE_KEYWORDS else modern(item) for key, item in schema.items()}
     if isinstance(result.get("nullable"), bool) and result.pop("nullable"):
         result = _with_null(result)
     if (
@@ -262,7 +222,7 @@ def opened(schema: Any) -> Any:
     if not isinstance(schema, dict):
         return schema
     found = {
-        key: item if key in _VALUES else opened(item)
+        key: item if key in VALUE_KEYWORDS else opened(item)
         for key, item in schema.items()
         if not (key in {"additionalProperties", "unevaluatedProperties"} and item is False)
     }
@@ -324,406 +284,38 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(as_double(value))
 
 
-@cache
-def _naming() -> Any:
-    """Return the validator class that names violations."""
-    # Imported late: it costs a tenth of a second, and is needed when something is wrong.
-    from jsonschema import Draft202012Validator  # noqa: PLC0415
-    from jsonschema.validators import extend  # noqa: PLC0415
-
-    types = Draft202012Validator.TYPE_CHECKER.redefine("number", lambda _, value: is_number(value))
-    keywords = {
-        "$ref": _followed,
-        "multipleOf": _multiple,
-        "pattern": _pattern,
-        "patternProperties": _members,
-        "additionalProperties": _further,
-        "unevaluatedProperties": _unevaluated,
-    }
-    # jsonschema gives extend() no types.
-    return cast("Any", extend)(Draft202012Validator, validators=keywords, type_checker=types)
-
-
-class _Following(threading.local):
-    """How many references are still followed to name what is wrong with a value."""
-
-    left = 0
-
-
-_FOLLOWING: Final = _Following()
-
-
-def _followed(validator: Any, reference: str, instance: Any, schema: Schema) -> Iterator[ValidationError]:
-    """Find the violations behind a reference; beyond the budget, one that names only the place."""
-    from jsonschema import Draft202012Validator  # noqa: PLC0415 - as above
-    from jsonschema.exceptions import ValidationError  # noqa: PLC0415 - as above
-
-    if found := _BUNDLED.fullmatch(reference):
-        is_finite = _all_finite(instance)
-        if is_finite and _holds_by(f"{_SCHEME}/{found[1]}", instance):
-            return
-        _FOLLOWING.left -= 1
-        # Whether a value with an infinity is valid is known by following alone.
-        if _FOLLOWING.left < (0 if is_finite else -_MOST_FOLLOWED):
-            yield ValidationError("it fits none of the alternatives", validator="anyOf")
-            return
-    yield from Draft202012Validator.VALIDATORS["$ref"](validator, reference, instance, schema)
-
-
-def _multiple(_: Any, step: float, instance: Any, __: Schema) -> Iterator[ValidationError]:
-    """Judge by decimal digits, as jsonschema-rs does: 0.07 is a multiple of 0.01, though no double says so."""
-    from jsonschema.exceptions import ValidationError  # noqa: PLC0415 - as above
-
-    if is_number(instance) and Fraction(str(instance)) % Fraction(str(step)):
-        yield ValidationError(f"{instance} is not a multiple of {step}")
-
-
-def _pattern(_: Any, pattern: str, instance: Any, __: Schema) -> Iterator[ValidationError]:
-    from jsonschema.exceptions import ValidationError  # noqa: PLC0415 - as above
-
-    if isinstance(instance, str) and not patterns.matches(pattern, instance):
-        yield ValidationError(f"{instance!r} does not match {pattern!r}")
-
-
-def _members(validator: Any, named: Schema, instance: Any, _: Schema) -> Iterator[ValidationError]:
-    for pattern, schema in named.items() if isinstance(instance, dict) else ():
-        for name, value in instance.items():
-            if patterns.matches(pattern, name):
-                yield from validator.descend(value, schema, path=name, schema_path=pattern)
-
-
-def _further(validator: Any, schema: Any, instance: Any, beside: Schema) -> Iterator[ValidationError]:
-    from jsonschema.exceptions import ValidationError  # noqa: PLC0415 - as above
-
-    named = beside.get("patternProperties", {})
-    for name in instance if isinstance(instance, dict) else ():
-        if name in beside.get("properties", {}) or any(patterns.matches(pattern, name) for pattern in named):
-            continue
-        if schema is False:
-            yield ValidationError(f"Additional properties are not allowed ({name!r} was unexpected)")
-        else:
-            yield from validator.descend(instance[name], schema, path=name)
-
-
 def bundled(schema: Schema) -> Schema:
     """Return a schema with what its lazy references lead to below ``$defs``; one without any as it is."""
     waiting: list[str] = []
-    result: Schema = _local(schema, waiting)
+    result: Schema = bundled_into(schema, waiting)
     found: dict[str, Any] = {}
     while waiting:
         uri = waiting.pop()
-        if (name := uri.removeprefix(f"{_SCHEME}/")) not in found:
-            found[name], more = _localized(uri)
+        if (name := uri.removeprefix(f"{LAZY_SCHEME}/")) not in found:
+            found[name], more = bundled_part(uri)
             waiting += more
     return {**result, "$defs": found} if found else schema
 
 
-def _local(value: Any, uris: list[str]) -> Any:
+def bundled_into(value: Any, uris: list[str]) -> Any:
     """Return a copy of a schema whose lazy references lead below ``$defs``, and add their URIs to a list."""
     if isinstance(value, list):
-        return [_local(item, uris) for item in value]
+        return [bundled_into(item, uris) for item in value]
     if not isinstance(value, dict):
         return value
-    result = {key: _local(item, uris) for key, item in value.items()}
+    result = {key: bundled_into(item, uris) for key, item in value.items()}
     uri = value.get("$ref")
-    if isinstance(uri, str) and uri.startswith(_SCHEME):
+    if isinstance(uri, str) and uri.startswith(LAZY_SCHEME):
         uris.append(uri)
-        result["$ref"] = f"#/$defs/{uri.removeprefix(f'{_SCHEME}/')}"
+        result["$ref"] = f"#/$defs/{uri.removeprefix(f'{LAZY_SCHEME}/')}"
     return result
 
 
 @lru_cache(maxsize=4096)
-def _localized(uri: str) -> tuple[Any, tuple[str, ...]]:
+def bundled_part(uri: str) -> tuple[Any, tuple[str, ...]]:
     """Return the schema of a lazy reference as `bundled` has it, and the URIs that it refers to; many share it."""
     uris: list[str] = []
-    return _local(referred(uri), uris), tuple(uris)
-
-
-def _unevaluated(validator: Any, schema: Any, instance: Any, beside: Schema) -> Iterator[ValidationError]:
-    """Judge as jsonschema does, if Python reads the patterns of names too; else members pass."""
-    from jsonschema import Draft202012Validator  # noqa: PLC0415 - as above
-
-    with suppress(re.error):
-        yield from Draft202012Validator.VALIDATORS["unevaluatedProperties"](validator, schema, instance, beside)
-
-
-class _Pattern:
-    """The keyword ``pattern`` for jsonschema-rs, by ECMA-262."""
-
-    def __init__(self, _: Schema, pattern: str, __: list[Any]) -> None:
-        self._pattern = pattern
-
-    def validate(self, instance: Any) -> None:
-        if isinstance(instance, str) and not patterns.matches(self._pattern, instance):
-            raise ValueError(f"{instance!r} does not match {self._pattern!r}")
-
-
-def _patterns_in(schema: Any, *, names: bool) -> Iterator[str]:
-    """Yield the patterns of texts in a schema, or those of the names of members."""
-    if isinstance(schema, list):
-        for item in schema:
-            yield from _patterns_in(item, names=names)
-    for key, item in schema.items() if isinstance(schema, dict) else ():
-        if key == "pattern" and isinstance(item, str) and not names:
-            yield item
-        elif key not in _VALUES:
-            yield from item if names and key == "patternProperties" and isinstance(item, dict) else ()
-            yield from _patterns_in(item, names=names)
-
-
-def _without_names(schema: Any) -> Any:
-    """Return a schema that allows any member wherever patterns say what members it has."""
-    if isinstance(schema, list):
-        return [_without_names(item) for item in schema]
-    if not isinstance(schema, dict):
-        return schema
-    left_out = {"patternProperties", "additionalProperties", "unevaluatedProperties"}
-    left_out = left_out if isinstance(schema.get("patternProperties"), dict) else set()
-    return {
-        key: item if key in _VALUES else _without_names(item) for key, item in schema.items() if key not in left_out
-    }
-
-
-def _are_plain(found: Iterator[str]) -> bool:
-    """Return whether jsonschema-rs reads patterns as ECMA-262 does.
-
-    Raises:
-        PatternError: one of them is no regular expression.
-    """
-    others = [one for one in found if not patterns.is_plain(one)]
-    for one in others:
-        patterns.check(one)
-    return not others
-
-
-class _Referred:
-    """The keyword that stands for a lazy reference in jsonschema-rs: its schema is compiled when a value gets there."""
-
-    def __init__(self, holds: Callable[[str, Any], bool], _: Schema, uri: str, __: list[Any]) -> None:
-        self._holds, self._uri = holds, uri
-
-    def validate(self, instance: Any) -> None:
-        if not self._holds(self._uri, instance):
-            raise ValueError("a value that the schema refuses")
-
-
-def _by_keyword(schema: Any) -> Any:
-    """Return a copy of a schema with the keyword in the place of each lazy reference."""
-    if isinstance(schema, list):
-        return [_by_keyword(item) for item in schema]
-    if not isinstance(schema, dict):
-        return schema
-    is_lazy = isinstance(schema.get("$ref"), str) and schema["$ref"].startswith(_SCHEME)
-    return {_KEYWORD if is_lazy and key == "$ref" else key: _by_keyword(item) for key, item in schema.items()}
-
-
-def validator_of(schema: Schema, holds: Callable[[str, Any], bool] | None = None, **options: Any) -> Any:
-    """Return jsonschema-rs's validator for a schema; it follows lazy references, and fetches nothing.
-
-    If patterns that it does not read as ECMA-262 does name members, members pass that the schema refuses.
-
-    Args:
-        schema: to be compiled.
-        holds: returns whether a value is valid by the schema of a lazy reference. Without it, all that the schema
-            refers to is compiled with it, as often as others do so.
-        options: of jsonschema-rs.
-
-    Raises:
-        ValueError: it is no JSON Schema.
-    """
-    keywords: dict[str, Any] = {}
-    if holds is None or _is_together(schema):
-        whole = bundled(schema)
-    else:
-        whole = _by_keyword(schema)
-        keywords[_KEYWORD] = partial(_Referred, holds)
-    if not _are_plain(_patterns_in(whole, names=True)):
-        whole = _without_names(whole)
-    if not _are_plain(_patterns_in(whole, names=False)):
-        keywords["pattern"] = _Pattern
-    if keywords:
-        options["keywords"] = keywords
-    return jsonschema_rs.validator_for(whole, offline=True, **options)
-
-
-def _has_words(schema: Any, words: frozenset[str]) -> bool:
-    if isinstance(schema, dict):
-        return not words.isdisjoint(schema) or any(_has_words(item, words) for item in schema.values())
-    return isinstance(schema, list) and any(_has_words(item, words) for item in schema)
-
-
-def _is_together(schema: Schema) -> bool:
-    """Return whether a schema is compiled with all that it refers to: that is quicker to judge by, if it is little."""
-    # What is evaluated behind a keyword of ours is unknown to these words.
-    if _has_words(schema, _UNEVALUATED):
-        return True
-    waiting: list[str] = []
-    _local(schema, waiting)
-    seen: set[str] = set()
-    while waiting and len(seen) <= _MOST_TOGETHER:
-        if (uri := waiting.pop()) not in seen:
-            seen.add(uri)
-            waiting += _localized(uri)[1]
-    return len(seen) <= _MOST_TOGETHER
-
-
-def _compiled_of(schema: Schema) -> Schema:
-    return bundled(schema) if _is_together(schema) else schema
-
-
-class Kept(Generic[T]):
-    """What schemas are compiled to, by the schema object, as long as these do not have too many nodes together."""
-
-    def __init__(self, compiled: Callable[[Schema], T]) -> None:
-        self._compiled = compiled
-        self._kept: dict[int, tuple[Schema, T]] = {}
-        self._nodes = 0
-
-    def of(self, schema: Schema) -> T:
-        """Return what a schema is compiled to."""
-        found = self._kept.get(id(schema))
-        if found is None or found[0] is not schema:
-            nodes = _nodes_in(_compiled_of(schema))
-            if self._nodes + nodes > _MOST_KEPT:
-                self._kept.clear()
-                self._nodes = 0
-            self._nodes += nodes
-            found = self._kept[id(schema)] = schema, self._compiled(schema)
-        return found[1]
-
-
-def _nodes_in(value: Any) -> int:
-    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
-    return 1 + sum(map(_nodes_in, inner))
-
-
-class Shape:
-    """A schema without references, for validating values. Numbers must be finite doubles."""
-
-    def __init__(self, schema: Schema) -> None:
-        self.schema = schema
-        self._quick = validator_of(schema, _holds_by)
-        # By such names, jsonschema-rs allows too much.
-        self._is_exact = _are_plain(_patterns_in(_compiled_of(schema), names=True))
-
-    def problem(self, value: Any, where: str = "") -> str:
-        """Return the first violation in ``value``, with its place below ``where``; empty if the value is valid."""
-        try:
-            if self._passes(value):
-                return ""
-            error = self._first_error(value)
-        except RecursionError:
-            return "the value is nested too deeply"
-        return _described(error, where) if error is not None else ""
-
-    def holds(self, value: Any) -> bool:
-        """Return whether ``value`` has no problem: quicker, because the problem is not looked for."""
-        try:
-            return self._passes(value) or self._is_valid(value)
-        except RecursionError:
-            return False
-
-    def holds_within(self, value: Any) -> bool:
-        """Return the same for a part of a value whose numbers are finite."""
-        return bool(self._quick.is_valid(value)) if self._is_exact else self._is_valid(value)
-
-    def broken_rule(self, value: Any) -> tuple[str, bool]:
-        """Return the violated schema keyword, and True if ``value`` itself violates it, and not only a member.
-
-        For a valid value, return an empty keyword and False.
-        """
-        error = self._first_error(value)
-        return ("", False) if error is None else (str(error.validator), not error.absolute_path)
-
-    @cached_property
-    def _validator(self) -> Any:
-        from jsonschema_specifications import REGISTRY  # noqa: PLC0415 - as above
-
-        # With a registry of one's own, jsonschema fetches nothing.
-        return _naming()(bundled(self.schema), registry=REGISTRY)
-
-    def _is_valid(self, value: Any) -> bool:
-        # One judgement may ask for another, in the midst of a search for a name.
-        before, _FOLLOWING.left = _FOLLOWING.left, 0
-        try:
-            return bool(self._validator.is_valid(value))
-        finally:
-            _FOLLOWING.left = before
-
-    def _first_error(self, value: Any) -> ValidationError | None:
-        """Return the worst violation; of alternatives, that in the one which fits best, if there is one."""
-        from jsonschema.exceptions import relevance  # noqa: PLC0415 - as above
-
-        _FOLLOWING.left = _MOST_FOLLOWED
-        error: ValidationError | None = max(self._validator.iter_errors(value), key=relevance, default=None)
-        while error is not None and error.context:
-            alternatives = defaultdict(list)
-            for one in error.context:
-                alternatives[one.relative_schema_path[0]].append(one)
-            best, *others = sorted(alternatives.values(), key=_misfit)
-            if others and _misfit(best) == _misfit(others[0]):
-                break
-            error = max(best, key=relevance)
-        return error
-
-    def _passes(self, value: Any) -> bool:
-        try:
-            return self._is_exact and bool(self._quick.is_valid(value)) and _all_finite(value)
-        except (ValueError, TypeError, OverflowError):
-            return False  # a number that it does not take (an Infinity): the other one judges that
-
-
-def _misfit(errors: list[ValidationError]) -> tuple[bool, bool, int]:
-    """Return how far a value is from an alternative: another type, another kind by a fixed value, and its errors."""
-    is_another_type = any(one.validator == "type" and not one.relative_path for one in errors)
-    return is_another_type, any(one.validator in {"const", "enum"} for one in errors), len(errors)
-
-
-def _described(error: ValidationError, where: str) -> str:
-    place = where
-    for part in error.absolute_path:
-        place += f"[{part}]" if isinstance(part, int) else f".{part}" if place else str(part)
-    value: Any = error.instance
-    rule: Any = error.validator_value
-    if error.validator == "required":
-        missing = next(name for name in rule if name not in value)
-        return f"{place}.{missing} is missing" if place else f"{missing} is missing"
-    place = place or "the value"
-    if error.validator == "type":
-        return f"{place} is {shown(value)}, not of type {rule}"
-    if error.validator in {"minItems", "maxItems"}:
-        return f"{place} has {len(value)} items"
-    return f"{place}: {error.message[:300]}"
-
-
-_SHAPES: Final = Kept(Shape)
-
-
-def shape_of(schema: Schema) -> Shape:
-    """Return the Shape of a schema, cached by the schema object."""
-    return _SHAPES.of(schema)
-
-
-_JUDGED: Final[dict[tuple[str, bytes], bool]] = {}
-
-
-def _holds_by(uri: str, value: Any) -> bool:
-    """Judge a part of a value by a lazy reference, once: alternatives that refer to each other ask again and again."""
-    schema = referred(uri)
-    if not isinstance(schema, dict):
-        return schema is not False
-    try:
-        text = _encode(value)
-    except (TypeError, ValueError, OverflowError):
-        text = json.dumps(value).encode()  # a lone surrogate
-    text = text if len(text) < _DIGESTED else sha256(text).digest()
-    found = _JUDGED.get((uri, text))
-    if found is None:
-        found = shape_of(schema).holds_within(value)
-        if len(_JUDGED) >= _MOST_JUDGED:
-            _JUDGED.clear()
-        _JUDGED[uri, text] = found
-    return found
+    return bundled_into(referred(uri), uris), tuple(uris)
 
 
 def numbers_in(value: Any) -> Iterator[float]:
@@ -738,26 +330,6 @@ def numbers_in(value: Any) -> Iterator[float]:
     elif isinstance(value, dict):
         for item in value.values():
             yield from numbers_in(item)
-
-
-def _all_finite(value: Any) -> bool:
-    """Return whether all numbers in a JSON value are finite doubles; called for every response."""
-    try:
-        text = _encode(value)
-    except (TypeError, ValueError, OverflowError, RecursionError):
-        return _each_finite(value)
-    # An infinity or NaN is encoded as null: a text without null has none. It is several times as fast as a walk.
-    return (b"null" not in text and _TOO_LONG not in text.translate(_AS_ZERO)) or _each_finite(value)
-
-
-def _each_finite(value: Any) -> bool:
-    if isinstance(value, float):
-        return math.isfinite(value)
-    if isinstance(value, list):
-        return all(map(_each_finite, value))
-    if isinstance(value, dict):
-        return all(map(_each_finite, value.values()))
-    return not isinstance(value, int) or math.isfinite(as_double(value))
 
 
 def as_double(value: float) -> float:

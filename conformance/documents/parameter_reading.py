@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 from urllib.parse import unquote, unquote_plus
 
-from conformance.documents.json_schema import Schema, kinds_of, shape_of
+from conformance.documents.json_schema import Schema, kinds_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json
 from conformance.documents.parameters import Parameter

@@ -5,16 +5,8 @@ from __future__ import annotations
 import re
 from typing import Any, Final
 
-from conformance.documents.json_schema import (
-    CHANGES,
-    Kept,
-    Schema,
-    bundled,
-    changed_alike,
-    pointed,
-    referred,
-    validator_of,
-)
+from conformance.documents.json_schema import CHANGES, Schema, bundled, changed_alike, pointed, referred
+from conformance.documents.json_shape import Kept, validator_of
 
 _SINGLE: Final = 3.4028234663852886e38
 # The lowest and the highest value by the OpenAPI Initiative's Format Registry. Any number of JSON may be a double.

@@ -19,7 +19,7 @@ from soap_devices import CAMERA, CAMERA_XSD
 from conformance.api.rest.generated import _loaded
 from conformance.commandline.secret_file import read_secret
 from conformance.documents.description import DescriptionError
-from conformance.documents.json_schema import shape_of
+from conformance.documents.json_shape import shape_of
 from conformance.statement.endpoints import Endpoints
 from conformance.target.describing import described_contract, fetch_description, soap_contract
 from conformance.transport.client import Connection

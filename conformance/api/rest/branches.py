@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Final
 
-from conformance.documents.json_schema import Schema, shape_of
+from conformance.documents.json_schema import Schema
+from conformance.documents.json_shape import shape_of
 
 _DEPTH: Final = 8
 _ITEMS: Final = 20

@@ -7,7 +7,8 @@ from typing import Any
 
 from conformance.api.mutations import STRANGE_NAME, STRANGE_TEXT, Member, Mutation, broken_members
 from conformance.api.rest.samples import sample
-from conformance.documents.json_schema import Schema, kind_of, shape_of, types_of
+from conformance.documents.json_schema import Schema, kind_of, types_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.representation import flat
 from conformance.documents.writing import Pairs, Token, json_text

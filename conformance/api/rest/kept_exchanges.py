@@ -7,7 +7,7 @@ from conformance.api.rest.description import Described
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.request_context import RequestContext
 from conformance.api.rest.validity import INVALID, VALID, validity, validity_by
-from conformance.documents.json_schema import shape_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json
 from conformance.documents.patterns import PatternError

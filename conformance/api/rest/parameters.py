@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from conformance.documents.json_schema import kinds_of, shape_of
+from conformance.documents.json_schema import kinds_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.parameters import Parameter
 
 # Letters, nothing, and texts that programming languages take for numbers and the contract does not.

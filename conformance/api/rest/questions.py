@@ -12,7 +12,8 @@ from conformance.api.rest.applicable import allowed, answered
 from conformance.api.rest.calls import JSON, Call, example_call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.statuses import CRASHES
-from conformance.documents.json_schema import Schema, is_numeric, shape_of
+from conformance.documents.json_schema import Schema, is_numeric
+from conformance.documents.json_shape import shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, operations_of
 from conformance.documents.patterns import PatternError

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
-from conformance.documents.json_schema import Schema, kinds_of, shape_of
+from conformance.documents.json_schema import Schema, kinds_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.pattern_python import for_python
 from conformance.documents.representation import discriminator_of, flat
 

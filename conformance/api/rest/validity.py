@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from conformance.contract.pack import Contract
 from conformance.documents.field_reading import multipart_verdict, query_verdicts, text_verdict, urlencoded_verdict
-from conformance.documents.json_schema import Schema, kinds_of, shape_of
+from conformance.documents.json_schema import Schema, kinds_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Body, Operation, is_json, is_xml
 from conformance.documents.parameter_reading import INVALID, UNCLEAR, VALID, decoded_path, judged, judged_json

@@ -5,7 +5,8 @@ from typing import Any
 
 from conformance.api.mutations import STRANGE_NAME, STRANGE_TEXT, Mutation
 from conformance.api.rest.json_mutations import Place, places, replaced
-from conformance.documents.json_schema import Schema, numbers_in, shape_of
+from conformance.documents.json_schema import Schema, numbers_in
+from conformance.documents.json_shape import shape_of
 from conformance.documents.representation import UnreadableError, from_element, local_name, parse_xml
 from conformance.documents.writing import xml_bytes
 

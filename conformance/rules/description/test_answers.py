@@ -9,7 +9,8 @@ from typing import Any
 from conformance.api.rest.statuses import CRASHES
 from conformance.api.rest.variations import Kind
 from conformance.documents.field_reading import parts_of
-from conformance.documents.json_schema import Schema, kinds_of, shape_of
+from conformance.documents.json_schema import Schema, kinds_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.documents.patterns import SlowPatternError

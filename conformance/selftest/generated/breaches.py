@@ -10,7 +10,8 @@ from typing import Any
 
 import jsonschema_rs
 
-from conformance.documents.json_schema import Kept, Schema, referred, validator_of
+from conformance.documents.json_schema import Schema, referred
+from conformance.documents.json_shape import Kept, validator_of
 from conformance.documents.openapi import Operation, is_json
 from conformance.mutation.messages import Response
 

@@ -5,7 +5,7 @@ from openapi_spec_validator import OpenAPIV31SpecValidator
 
 from conformance.api.rest.description import described_by_wadl, differences
 from conformance.contract.pack import Contract
-from conformance.documents.json_schema import shape_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.openapi import operations_of
 from conformance.documents.representation import from_element, parse_xml
 

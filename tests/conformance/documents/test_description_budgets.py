@@ -9,7 +9,8 @@ from small_device import described, reading
 
 from conformance.contract.document_text import parsed
 from conformance.documents.description import Description, DescriptionError, read_description
-from conformance.documents.json_schema import Shape, modern, resolved, shape_of
+from conformance.documents.json_schema import modern, resolved
+from conformance.documents.json_shape import Shape, shape_of
 from conformance.documents.openapi import read_operations
 from conformance.documents.value_formats import has_formats
 

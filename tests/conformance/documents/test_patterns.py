@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from conformance.documents.json_schema import shape_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.pattern_python import for_python, with_python_patterns
 from conformance.documents.patterns import PatternError, SlowPatternError, check, matches
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from conformance.documents.json_schema import modern, shape_of
+from conformance.documents.json_schema import modern
+from conformance.documents.json_shape import shape_of
 
 
 def _object(**members):

@@ -7,7 +7,7 @@ import pytest
 
 from conformance.contract.document_text import parsed
 from conformance.documents.description import read_description
-from conformance.documents.json_schema import shape_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.openapi import read_operations
 from conformance.documents.representation import flat
 

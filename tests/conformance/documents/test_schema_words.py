@@ -6,7 +6,7 @@ import pytest
 
 from conformance.documents.description import read_description
 from conformance.documents.description_faults import invalid
-from conformance.documents.json_schema import shape_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.openapi import read_operations
 
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from conformance.documents.description import read_description
-from conformance.documents.json_schema import shape_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.openapi import read_operations
 
 _OK = {"responses": {"200": {"description": "ok", "content": {"application/json": {"schema": {"type": "integer"}}}}}}

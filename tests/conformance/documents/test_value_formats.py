@@ -2,7 +2,8 @@
 
 import pytest
 
-from conformance.documents.json_schema import modern, resolved, validator_of
+from conformance.documents.json_schema import modern, resolved
+from conformance.documents.json_shape import validator_of
 from conformance.documents.value_formats import has_formats, wrong_formats
 
 _RIGHT = {

@@ -8,7 +8,7 @@ import pytest
 from conformance.api.rest.variations import Kind
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
-from conformance.documents.json_schema import shape_of
+from conformance.documents.json_shape import shape_of
 from conformance.rules.description import test_answers as answers
 from conformance.rules.description import test_requests as requests
 from conformance.rules.robustness import test_robustness as robustness

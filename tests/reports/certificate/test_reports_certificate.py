@@ -263,3 +263,19 @@ def test_a_source_links_to_the_section_that_it_cites(result):
     assert heading.getnext().text_content() == "- PUT: `goal` is\n  <required>."
     assert "contract.md#nowhere" in text(shown)
     assert not [link for link in shown.iter("a") if link.get("href") == "#contract-nowhere"]
+
+
+@pytest.mark.parametrize(("number", "shown"), [(1, "1 warning "), (2, "2 warnings ")])
+def test_warnings_are_counted_in_their_number(result, number, shown):
+    for requirement in result["requirements"]:
+        requirement["verdict"] = "pass"
+    for requirement in result["requirements"][:number]:
+        requirement["verdict"] = "warn"
+    tally = text(page(result).find_class("tally")[0])
+    assert shown in f"{tally} "
+    assert f"{len(result['requirements']) - number} passed" in tally
+
+
+def test_by_which_requests_a_requirement_was_judged(result):
+    result["requirements"][0]["occasions"] = {"GET JSON": 1234, "SOAP": 5, "after a refusal": 6}
+    assert "By GET JSON: 1,234, SOAP: 5, after a refusal: 6" in text(page(result)).replace("\u202f", ",")

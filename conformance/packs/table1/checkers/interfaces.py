@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from http import HTTPStatus
 from typing import Any, Final
 
-from conformance.documents.json_schema import Shape
+from conformance.documents.json_shape import Shape
 from conformance.documents.representation import UnreadableError, read
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.goal import difference

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from conformance.documents.json_schema import Shape
+from conformance.documents.json_shape import Shape
 from conformance.documents.representation import from_element
 from conformance.packs.table1.robot.agreement import entries_of
 from conformance.packs.table1.robot.message_shapes import MESSAGE_TYPE, SERVICE_TYPE, read_as

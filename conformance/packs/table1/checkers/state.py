@@ -11,7 +11,7 @@ from http import HTTPStatus
 from statistics import median
 from typing import Any, Final
 
-from conformance.documents.json_schema import Shape
+from conformance.documents.json_shape import Shape
 from conformance.packs.table1.checkers.single_readings import BesideOdometry, OneSample
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.clock import Clock

@@ -9,7 +9,8 @@ from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.contract.pack import Contract
-from conformance.documents.json_schema import Schema, Shape
+from conformance.documents.json_schema import Schema
+from conformance.documents.json_shape import Shape
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import operations_of
 from conformance.transport.exchange import Response

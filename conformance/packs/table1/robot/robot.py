@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 from conformance.api.rest.calls import JSON
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
-from conformance.documents.json_schema import Shape
+from conformance.documents.json_shape import Shape
 from conformance.documents.representation import projected
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.observe.polling import Patience

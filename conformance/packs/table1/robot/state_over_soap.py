@@ -7,7 +7,7 @@ from typing import Any, Final
 import msgspec
 
 from conformance.api.soap.service import SoapService
-from conformance.documents.json_schema import Shape
+from conformance.documents.json_shape import Shape
 from conformance.documents.representation import from_element
 from conformance.packs.table1.robot.agreement import Slack, disagreement, stamp_of
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST

@@ -5,7 +5,7 @@ from conformance.api.rest.parameters import wrong_texts
 from conformance.api.rest.samples import sample
 from conformance.api.rest.xml_mutations import xml_mutations
 from conformance.contract.pack import Contract
-from conformance.documents.json_schema import shape_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.openapi import operations_of
 from conformance.documents.writing import json_text, xml_bytes
 

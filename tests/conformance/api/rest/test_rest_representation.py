@@ -6,7 +6,7 @@ import pytest
 
 from conformance.api.rest.accept import quality
 from conformance.contract.pack import Contract
-from conformance.documents.json_schema import shape_of
+from conformance.documents.json_shape import shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import operations_of
 from conformance.documents.representation import UnreadableError, flattened, read

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from operator import attrgetter
 from typing import Any
 
-from conformance.documents.json_schema import Shape
+from conformance.documents.json_shape import Shape
 from conformance.packs.table1.checkers.single_readings import BesideOdometry, Place
 from conformance.packs.table1.robot.geometry import pose_of
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST

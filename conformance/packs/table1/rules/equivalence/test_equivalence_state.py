@@ -10,7 +10,7 @@ import pytest
 
 from conformance.api.rest.snapshot import steady
 from conformance.api.soap.service import SoapService
-from conformance.documents.json_schema import Shape
+from conformance.documents.json_shape import Shape
 from conformance.documents.representation import flattened, from_element, projected
 from conformance.packs.table1.checkers.single_readings import BesideOdometry
 from conformance.packs.table1.robot.agreement import Slack, disagreement, entries_of, unstamped

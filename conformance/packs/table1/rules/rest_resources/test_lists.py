@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.documents.json_schema import Shape
+from conformance.documents.json_shape import Shape
 from conformance.packs.table1.robot.agreement import entries_of
 from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.packs.table1.robot.message_shapes import SERVICES as SERVICES_SHAPE
