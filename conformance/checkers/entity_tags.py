@@ -110,8 +110,13 @@ class EntityTags:
             now = self._now.get(occasion.request.url)
             known = now.header("etag") if now is not None else None
             expected = f"status 304 with ETag: {known}, as status 200 has one (RFC 9110 15.4.5)" if known else expected
-            holds = known is None or answer.header("etag") is not None
+            tag = answer.header("etag")
+            holds = known is None or tag is not None
             yield occasion.case(_TAGS, holds, expected, "status 304 without ETag", cause=f"{label} 304 without")
+            if tag is not None and tags:
+                expected = "status 304 with an ETag that is in If-None-Match"
+                is_named = tag.removeprefix("W/") in tags
+                yield occasion.case(_TAGS, is_named, expected, f"ETag: {tag}", cause=f"{label} 304 other")
             yield from self._ignored
             self._ignored.clear()
         elif answer.status == HTTPStatus.OK and (answer.header("etag") or "").removeprefix("W/") in tags:

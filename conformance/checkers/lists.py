@@ -43,6 +43,11 @@ class Lists:
         # By operation, parameter and value: the other values that items had when this one was asked for.
         self._others: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
         self._totals = Totals()
+        # By operation and other parameters: the most items so far; and by their number, lists that a limit did not cut.
+        self._longest: dict[object, int] = defaultdict(int)
+        self._raised: dict[object, dict[int, list[Case]]] = defaultdict(dict)
+        # Lists that had fewer items than the default, although there are more: number of items, total, case.
+        self._short: dict[object, tuple[int, int, Case]] = {}
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
@@ -55,7 +60,7 @@ class Lists:
         page, sent = page_of(occasion.response), listing.sent(occasion.context.target)
         if page is None or sent is None:
             return
-        yield from _limit(occasion, listing, page, sent)
+        yield from self._limit(occasion, listing, page, sent)
         yield from self._filters(occasion, listing, page, sent)
         yield from self._order(occasion, listing, page, sent)
         yield from self._totals(occasion, listing, page, sent)
@@ -74,6 +79,43 @@ class Lists:
             value = members_of(item).get(name)
             if value is not None and hash((listing.operation.label, identity, name, str(value))) in self._seen:
                 yield value
+
+    def _limit(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+        """Judge that there are no more items than the parameter allows; 0 may mean all.
+
+        A device may raise a limit to its least one, or to a step. It then shows as many items for the raised limit.
+        """
+        most, count = listing.most(sent), len(page.items)
+        if listing.limit is None:
+            return
+        cause = listing.operation.label
+        key = cause, frozenset(one for one in sent.items() if one[0] != listing.limit.name)
+        longest, self._longest[key] = self._longest[key], max(self._longest[key], count)
+        if most <= 0:
+            return
+        by = "asks for" if listing.limit.name in sent else "has as its default"
+        expected = f"at most {most} items, which the parameter {listing.limit.name} {by}"
+        case = occasion.case("description/list-limit", count <= most, expected, f"{count} items", cause=cause)
+        waiting, is_sent = self._raised[key], listing.limit.name in sent
+        yield from waiting.pop(most, []) if is_sent and count > most else ()
+        if is_sent and count == most:
+            waiting.pop(most, None)
+        is_cut = page.goes_on or max([longest, *page.totals.values()]) > count
+        total, short = max(page.totals.values(), default=0), self._short.get(key)
+        is_first = not any(
+            one is not None and one.name in sent for one in (listing.offset, listing.page, listing.cursor)
+        )
+        if not is_sent and is_first and count < most and total > count:
+            expected = f"{min(most, total)} of {total} items, by the default of {listing.limit.name}"
+            case = occasion.case("description/list-limit", False, expected, f"{count} items", cause=cause)  # noqa: FBT003
+            self._short[key] = count, total, case
+        elif is_sent and short is not None and short[0] < count <= most <= listing.most({}) and total == short[1]:
+            yield self._short.pop(key)[2]
+            return
+        if case.holds or not (is_sent and is_cut):
+            yield from [case] if key not in self._short or is_sent else ()
+        else:
+            waiting.setdefault(count, []).append(case)
 
     def _filters(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
         for name, parameter in listing.filters.items():
@@ -163,20 +205,6 @@ def _comes_first(page: Page, member: str, descending: bool | None) -> bool:  # n
         if len(ways) == 1 and descending not in ways:
             return True
     return False
-
-
-def _limit(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
-    """Judge that there are no more items than the parameter allows; 0 may mean all."""
-    most = listing.most(sent)
-    if listing.limit is not None and most > 0:
-        by = "asks for" if listing.limit.name in sent else "has as its default"
-        yield occasion.case(
-            "description/list-limit",
-            len(page.items) <= most,
-            f"at most {most} items, which the parameter {listing.limit.name} {by}",
-            f"{len(page.items)} items",
-            cause=listing.operation.label,
-        )
 
 
 def _choices(parameter: Parameter) -> list[str]:

@@ -7,6 +7,7 @@ judged.
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -26,9 +27,10 @@ from conformance.api.rest.things import (
 )
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
-from conformance.documents.json_text import read_json
+from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
 from conformance.transport.exchange import Exchange
 from conformance.transport.reach import is_same, joined
 from conformance.verdict.case import Case
@@ -44,6 +46,10 @@ _MOST_THINGS: Final = 1_000
 # A body of more octets is not remembered, and of a value so many characters are.
 _MOST_OCTETS: Final = 65_536
 _SHOWN: Final = 200
+_MERGE: Final = "application/merge-patch+json"
+# Members of a device that no change of its thing changes; and the fewest characters that no device has by chance.
+_FOR_EVER: Final = re.compile(r"id|uuid|guid|serial|serialnumber|created(?:at|on|time|date)?|creation(?:time|date)")
+_TELLING: Final = 5
 
 
 @dataclass
@@ -56,9 +62,11 @@ class _Thing:
         status: how that was answered.
         changed_s: when, s of the monotonic clock.
         gone: whether that deleted it.
+        own: whether this run has created what it deleted.
         made: whether this run created it, and no read has shown it yet.
         body: hash of that of the POST that created it; 0: there was none.
         replaced: whether an equal one was created later, which may be there in its place.
+        cleared: members that a merge patch has removed, with what they were.
         written: what it has to read, by member, with the operation that wrote it.
         shown: the members that were read as written, with how much had been sent by then that may change something.
         differs: how often a member was read in another way.
@@ -69,9 +77,11 @@ class _Thing:
     status: int
     changed_s: float
     gone: bool = False
+    own: bool = False
     made: bool = False
     body: int = 0
     replaced: bool = False
+    cleared: dict[str, Any] = field(default_factory=dict)
     written: dict[str, tuple[Any, Operation]] = field(default_factory=dict)
     shown: dict[str, int] = field(default_factory=dict)
     differs: dict[str, int] = field(default_factory=lambda: defaultdict(int))
@@ -106,6 +116,15 @@ class Memory:
         }
         self._collections = collections_of(operations)
         self._things: dict[str, _Thing] = {}
+        self._own = {template: _read_only(one) for template, one in self._items.items()}
+        # The members of things as they were read last, by path, with what clients sent since for those of the device.
+        self._last: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
+        # Other values than the declared default in the responses to creations, by operation and member.
+        self._undefaulted: dict[tuple[str, str], Any] = {}
+        # What the run created; collections of which something else was deleted and is gone, and what waits for that.
+        self._made: set[str] = set()
+        self._gone: set[str] = set()
+        self._back: dict[str, list[Case]] = defaultdict(list)
         self._acts = 0
         # For how long something lasted by its value, s: things by their template, members by template and name.
         self._lasted: dict[tuple[str, str], dict[str, float]] = defaultdict(lambda: defaultdict(float))
@@ -117,6 +136,7 @@ class Memory:
         self._things = {} if deletes else {key: one for key, one in self._things.items() if not one.gone}
         for thing in self._things.values():
             thing.written.clear()
+        self._last.clear()
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
@@ -136,12 +156,13 @@ class Memory:
         if operation is None or not occasion.response.ok:
             self.forget()
         elif item is not None and method in {"PUT", "PATCH", "DELETE"}:
-            self._changed(occasion, operation, path)
+            yield from self._changed(occasion, operation, path)
         elif made is not None and method == "POST":
-            self._created(occasion, operation, made, path)
+            yield from self._created(occasion, operation, made, path)
         elif operation.template in self._actions:
             # Its action may change it, and what is below it.
             self._drop(lambda other: _is_below(path, other) or _is_below(other, path))
+            self._last.clear()
         elif operation.template in self._single and method in {"PUT", "PATCH"}:
             # Settings may change what things read, and neither create nor delete one.
             for thing in self._things.values():
@@ -152,8 +173,14 @@ class Memory:
     def _drop(self, concerns: Any) -> None:
         self._things = {key: one for key, one in self._things.items() if not concerns(one.path)}
 
-    def _changed(self, occasion: Occasion, operation: Operation, path: str) -> None:
+    def _changed(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
         """Take a PUT, PATCH or DELETE of an item."""
+        last = self._last.pop(path, None)
+        if operation.method != "DELETE" and last is not None and occasion.context.usual:
+            self._last[path] = last[0], last[1] | _sent_of(occasion)
+        if operation.method == "PUT" and occasion.response.status == HTTPStatus.CREATED:
+            yield from self._located(occasion, path, path)
+            yield from self._defaults(occasion, operation)
         self._drop(lambda other: other != path and (_is_below(other, path) or other.casefold() == path.casefold()))
         before = self._things.pop(path.casefold(), None)
         status = occasion.response.status
@@ -161,9 +188,14 @@ class Memory:
         if status == HTTPStatus.ACCEPTED or overlaps or not occasion.context.usual:
             return
         thing = _Thing.of(path, occasion.exchange, made=status == HTTPStatus.CREATED)
+        if occasion.request.media_type == _MERGE and last is not None:
+            nulls = [name for name, one in _sent_of(occasion).items() if one is None]
+            thing.cleared = {name: last[0][name] for name in nulls if last[0].get(name) is not None}
         if occasion.request.method == "DELETE":
-            thing.gone = True
-        elif (body := _body_of(occasion, operation)) is not None:
+            thing.gone, thing.own = True, path in self._made
+        if status == HTTPStatus.CREATED:
+            self._made.add(path)
+        if not thing.gone and (body := _body_of(occasion, operation)) is not None:
             if occasion.request.method == "PATCH" and before is not None and not before.gone:
                 thing.written, thing.shown = dict(before.written), dict(before.shown)
             for name, value in body.items():
@@ -171,7 +203,7 @@ class Memory:
                 thing.shown.pop(name, None)
         self._things[path.casefold()] = thing
 
-    def _created(self, occasion: Occasion, operation: Operation, item: Operation, path: str) -> None:
+    def _created(self, occasion: Occasion, operation: Operation, item: Operation, path: str) -> Iterator[Case]:
         """Take a POST to a collection."""
         response = occasion.response
         _, id_ = identified(read_json(response.body).value, item) if is_json(response.media_type) else ("", None)
@@ -186,10 +218,20 @@ class Memory:
             # It may be any of them.
             self._drop(lambda other: _is_below(other, path))
             return
-        self._things.pop(target.casefold(), None)
+        before = self._things.pop(target.casefold(), None)
+        self._last.pop(target, None)
         if response.status == HTTPStatus.CREATED:
+            yield from self._located(occasion, path, target)
+            yield from self._defaults(occasion, operation)
+            sent = _sent_of(occasion)
+            if before is not None and before.gone and flat(item.parameter("path")[-1].schema).get("format") == "uuid":
+                expected = f"a UUID of its own, not that of the thing that {before.change} has deleted"
+                is_chosen = target.rpartition("/")[2].casefold() in {str(one).casefold() for one in sent.values()}
+                yield occasion.case("description/created-is-there", is_chosen, expected, target, cause=operation.label)
+            self._last[target] = {}, sent
             body = _body_of(occasion, operation) or {}
             written = {name: (value, operation) for name, value in body.items()}
+            self._made.add(target)
             thing = _Thing.of(target, occasion.exchange, made=True)
             thing.written, thing.body = written, hash(occasion.request.body)
             for one in self._things.values():
@@ -198,18 +240,76 @@ class Memory:
             if len(self._things) > _MOST_THINGS:
                 del self._things[next(iter(self._things))]
 
+    def _located(self, occasion: Occasion, above: str, path: str) -> Iterator[Case]:
+        """Judge whether the header fields of a creation name no other thing (RFC 9110 8.7, 15.3.2)."""
+        for name in ("Location", "Content-Location"):
+            value, url = occasion.response.header(name), occasion.request.url
+            found = urlsplit(joined(url, value)) if value and is_same(joined(url, value), url) else None
+            base = urlsplit(url.removesuffix(occasion.context.target)).path
+            there = _path_in(found.path.removeprefix(base)) if found is not None and not found.query else path
+            near = {above, above.rpartition("/")[0]}
+            if there.rpartition("/")[0] in near and there.count("/") == path.count("/"):
+                holds, expected = there.casefold() == path.casefold(), f"{name}: {path}, where the created thing is"
+                label = occasion.operation.label if occasion.operation else ""
+                id_ = "description/created-is-there"
+                yield occasion.case(id_, holds, expected, f"{name}: {value}", cause=f"{label} {name}")
+
+    def _defaults(self, occasion: Occasion, operation: Operation) -> Iterator[Case]:
+        """Judge whether a created thing has the declared default of what its creation left out; once may be chance."""
+        body, sent = operation.bodies.get(occasion.request.media_type), _sent_of(occasion)
+        answer = read_json(occasion.response.body).value if is_json(occasion.response.media_type) else None
+        if body is None or not occasion.request.body or not occasion.is_valid:
+            return
+        parts = flat(body.schema).get("properties", {})
+        given = {name: flat(one).get("default") for name, one in parts.items() if name not in sent}
+        given = {name: one for name, one in given.items() if isinstance(one, str | int | float) and one != ""}
+        now = represented(answer, {plain_name(name) for name in (*sent, *given)})
+        for name, one in ((name, one) for name, one in given.items() if name in now):
+            other = next(differences({name: one}, now, body.schema, operation.shape, self._collections), "")
+            key = operation.label, name
+            before = self._undefaulted.pop(key, None)
+            if other:
+                self._undefaulted[key] = now[name]
+            if not other or before == now[name]:
+                expected = f"the declared default of what {operation.label} left out"
+                yield occasion.case(
+                    "description/defaults", not other, expected, other, cause=f"{operation.label} {name}"
+                )
+
+    def _devices(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
+        """Judge whether no request has written what is the device's, nor changed what stays for ever."""
+        own = self._own[item.template.rstrip("/")]
+        answer = read_json(occasion.response.body).value if is_json(occasion.response.media_type) else None
+        shape = flat(item.shape or {}).get("properties", {})
+        now = represented(answer, {plain_name(name) for name in shape})
+        now = {name: one for name, one in now.items() if len(str(one)) <= _SHOWN}
+        before, sent = self._last.pop(path, ({}, {}))
+        if len(self._last) < _MOST_THINGS:
+            self._last[path] = now, {}
+        for name in own & now.keys() & {*before, *sent}:
+            is_taken = name in sent and sent[name] == now[name] != before.get(name)
+            # A word or a truth value may be the device's own as well.
+            is_taken = is_taken and not isinstance(now[name], bool) and len(str(now[name])) >= _TELLING
+            is_other = (
+                name in before and before[name] != now[name] and _FOR_EVER.fullmatch(plain_name(name)) is not None
+            )
+            expected = f"{name}, which is readOnly, as the device gave it"
+            found = f"{shown(now[name])} as {name}" + (f", and {shown(before[name])} before" if name in before else "")
+            holds = not (is_taken or is_other)
+            yield occasion.case("description/written-is-read", holds, expected, found, cause=f"{item.label} {name}")
+
     def _read(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
         thing = self._things.get(path.casefold())
         response = occasion.response
+        if response.ok:
+            yield from self._devices(occasion, item, path)
         if thing is None or thing.path != path:
             return
         age_s = _sent_s(occasion) - thing.changed_s
         if age_s < 0:
             return  # it was sent before that
         if thing.gone:
-            if response.ok and age_s > _SETTLES_S and not is_marked_deleted(read_json(response.body).value):
-                expected = f"status 404 or 410, {age_s:.0f} s after {thing.change} was answered {thing.status}"
-                yield self._case("deleted-is-gone", occasion, expected, cause=item.label)
+            yield from self._deleted(occasion, item, thing, age_s)
             return
         kept = item.template, ""
         if response.status in _ABSENT and thing.made:
@@ -221,6 +321,21 @@ class Memory:
             thing.made = False
             yield from self._lasts(kept, age_s, "there")
             yield from self._compared(occasion, item, thing, age_s)
+
+    def _deleted(self, occasion: Occasion, item: Operation, thing: _Thing, age_s: float) -> Iterator[Case]:
+        """Judge a read of what was deleted."""
+        response = occasion.response
+        if response.ok and age_s > _SETTLES_S and not is_marked_deleted(read_json(response.body).value):
+            expected = f"status 404 or 410, {age_s:.0f} s after {thing.change} was answered {thing.status}"
+            case = self._case("deleted-is-gone", occasion, expected, cause=item.label)
+            # What is always there is emptied, or as it was at first.
+            if thing.own or item.template in self._gone:
+                yield case
+            elif len(self._back[item.template]) < _MOST_PENDING:
+                self._back[item.template].append(case)
+        elif response.status in _ABSENT and not thing.own:
+            self._gone.add(item.template)
+            yield from self._back.pop(item.template, [])
 
     def _lasts(self, kept: tuple[str, str], age_s: float, value: str) -> Iterator[Case]:
         """Note for how long something has lasted; yield what should have lasted as well."""
@@ -243,7 +358,13 @@ class Memory:
     def _compared(self, occasion: Occasion, item: Operation, thing: _Thing, age_s: float) -> Iterator[Case]:
         """Judge whether the members of a thing read as they were written."""
         value = read_json(occasion.response.body).value if is_json(occasion.response.media_type) else None
-        now = represented(value, {plain_name(name) for name in thing.written})
+        names = {plain_name(name) for name in (*thing.written, *thing.cleared)}
+        now = represented(value, names)
+        for name, was in thing.cleared.items():
+            other = f"{shown(was)} as {name}" if now.get(name) == was and was != _default(item, name) else ""
+            expected = f"no {name}, which {thing.change} removed by null (RFC 7396 2)"
+            if other:
+                yield self._case("written-is-read", occasion, expected, other, cause=f"{item.label} {name} null")
         for name, (wanted, operation) in thing.written.items() if now else ():
             schema = operation.bodies[next(iter(operation.bodies))].schema
             other = next(differences({name: wanted}, now, schema, item.shape, self._collections), "")
@@ -267,6 +388,27 @@ class Memory:
     @staticmethod
     def _case(name: str, occasion: Occasion, expected: str, found: str = "", *, cause: str) -> Case:
         return occasion.case(f"description/{name}", False, expected, found, cause=cause)  # noqa: FBT003
+
+
+def _read_only(item: Operation) -> frozenset[str]:
+    """Return the members of an item that its schema marks as the device's."""
+    outer = flat(item.shape or {}).get("properties", {})
+    inner = [flat(one).get("properties", {}) for one in outer.values() if isinstance(one, dict)]
+    parts = [(name, one) for part in (outer, *inner) for name, one in part.items() if isinstance(one, dict)]
+    return frozenset(name for name, one in parts if flat(one).get("readOnly"))
+
+
+def _default(item: Operation, name: str) -> Any:
+    part = flat(item.shape or {}).get("properties", {}).get(name)
+    return flat(part).get("default") if isinstance(part, dict) else None
+
+
+def _sent_of(occasion: Occasion) -> dict[str, Any]:
+    """Return the members of a JSON object in a request, whatever the description says of them."""
+    request = occasion.request
+    is_short = len(request.body) <= _MOST_OCTETS and is_json(request.media_type)
+    value = read_json(request.body).value if is_short else None
+    return value if isinstance(value, dict) else {}
 
 
 def _above(template: str) -> Iterator[str]:

@@ -84,7 +84,7 @@ class Resources:
             self._varies.add(occasion.request.url)
         if len(self._got) < _MOST:
             self._got[key] = shown
-        if head is not None and before == shown and answer.ok:
+        if head is not None and before == shown and (answer.ok or answer.status in _GONE):
             yield from self._like_get(head, shown)
 
     def _like_get(self, head: Occasion, shown: _Shown) -> Iterator[Case]:
@@ -94,12 +94,13 @@ class Resources:
             return
         same = answer.status == shown.status
         expected, found = f"status {shown.status} for HEAD, as for GET", f"status {answer.status}"
-        case = head.case(id_, same, expected, found, cause=f"{label} status")
+        case = head.case(id_, same, expected, found, cause=f"{label} status {shown.status in _GONE}")
         if not same:
             if self._has_head or answer.status not in _NO_HEAD:
                 yield case
             else:
                 self._without_head.append(case)
+        if not same or shown.status in _GONE:
             return
         # What changes by itself may have been something else between two equal contents.
         is_steady = head.request.url not in self._varies

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from conformance.api.rest.listing import COUNTS, Listing, Page, number_of
+from conformance.api.rest.listing import COUNTS, TOTALS, Listing, Page, number_of
 from conformance.checkers.occasion import Occasion
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
@@ -20,6 +20,8 @@ _OFTEN: Final = 2
 # Where servers cut a list without saying so, and where they stop counting.
 _CUTS: Final = (5, 16)
 _FEWEST_CUT: Final = 10
+# So many choices of filters are remembered.
+_MOST: Final = 1000
 _CAP: Final = 50  # also the fewest items that a list without parameters for its parts is cut at
 
 
@@ -32,7 +34,6 @@ class _Part:
         page: what it shows.
         names: the parameters of its request.
         offset: how many items are before it.
-        plain: whether no filter was asked for.
         whole: whether it goes to the end.
         sure: whether it does so for certain: no server has cut it at a bound of its own.
     """
@@ -41,7 +42,6 @@ class _Part:
     page: Page
     names: frozenset[str]
     offset: int
-    plain: bool
     whole: bool
     sure: bool
 
@@ -53,13 +53,13 @@ class _Part:
 
 @dataclass
 class _Count:
-    """What is known of one total of one operation.
+    """What is known of one total of one operation, with one choice of filters.
 
     Attributes:
         agrees: whether it was the number of items the first time that a whole list was shown; None: none was.
         is_of_all: whether it was more than the items on a page, so that it is not the number of those.
-        by_filter: whether it counts what a filter leaves, by the first list with a filter; None: there was none.
-        all: the number of all items when it agreed last.
+        all: the number of items when it agreed last.
+        all_s: when that was.
         last: what identified the items of the last whole list that it agreed with.
         wrong_since_s: by the names of the parameters, when it was wrong first since such a list agreed with it.
         times: how often it was wrong while nothing changed.
@@ -68,8 +68,8 @@ class _Count:
 
     agrees: bool | None = None
     is_of_all: bool = False
-    by_filter: bool | None = None
     all: int = 0
+    all_s: float = float("-inf")
     last: frozenset[str] = frozenset()
     wrong_since_s: dict[frozenset[str], float] = field(default_factory=dict)
     times: int = 0
@@ -78,12 +78,10 @@ class _Count:
     def learn(self, total: int, part: _Part) -> None:
         """Note what a total means beside the end of a list; where a server may have cut it, only what agrees counts."""
         agrees = total == part.least
-        if part.plain and self.agrees is None and (part.sure or agrees):
+        if self.agrees is None and (part.sure or agrees):
             self.agrees = agrees
-        if part.plain and agrees:
-            self.all = total
-        elif not part.plain and part.least < self.all and self.by_filter is None and part.sure:
-            self.by_filter = agrees
+        if agrees:
+            self.all, self.all_s = total, part.occasion.response.received_s
 
     def is_sure(self, part: _Part, changed_s: float) -> bool:
         """Note a wrong total; return whether no change that is under way explains it."""
@@ -108,7 +106,7 @@ class Totals:
     """Judges totals over a run, each by what it meant the first time that it was seen beside a whole list."""
 
     def __init__(self) -> None:
-        self._counts: dict[tuple[str, str], _Count] = defaultdict(_Count)
+        self._counts: dict[tuple[str, str, frozenset[tuple[str, str]]], _Count] = defaultdict(_Count)
         self._longest: dict[str, int] = defaultdict(int)
         self._changed_s = float("-inf")
 
@@ -127,20 +125,24 @@ class Totals:
         if any(number_of(text) == 0 and text != "0" for text in texts.values()):
             return
         offset = number_of(sent.get(listing.offset.name, "")) if listing.offset is not None else 0
-        plain = sent.keys().isdisjoint(one.name for one in listing.filters.values())
+        names = {one.name for one in listing.filters.values()}
+        chosen = frozenset((name, text) for name, text in sent.items() if name in names)
         most = listing.most(sent)
         # A limit of 0 may ask for no items, or for all.
         is_open = listing.limit is None or listing.limit.name not in sent
         is_beyond = shown == 0 and offset > 0
         whole = not page.goes_on and (shown < most or (is_open and not most)) and not is_beyond
         sure = whole and not self._is_cut(listing, shown, sent)
-        part = _Part(occasion, page, frozenset(sent), offset, plain=plain, whole=whole, sure=sure)
+        part = _Part(occasion, page, frozenset(sent), offset, whole=whole, sure=sure)
         for name, total in page.totals.items():
-            count = self._counts[label, name]
-            count.is_of_all |= total > shown > 0
-            if whole and shown:
+            every = self._counts[label, name, frozenset()]
+            count = self._counts[label, name, chosen] if len(self._counts) < _MOST else every
+            every.is_of_all |= total > shown > 0
+            count.is_of_all |= every.is_of_all
+            # A filter that leaves all items does not show whether the total is that of what it leaves.
+            if whole and shown and (not chosen or part.least < every.all):
                 count.learn(total, part)
-            if count.agrees and (plain or count.by_filter):
+            if count.agrees and (count is not every or not chosen):
                 yield from self._judged(count, part, name, total)
 
     def _judged(self, count: _Count, part: _Part, name: str, total: int) -> Iterator[Case]:
@@ -149,7 +151,7 @@ class Totals:
         is_of_page = plain_name(name) in COUNTS and not count.is_of_all and total >= shown
         if part.whole and total == least:
             count.wrong_since_s.pop(part.names, None)
-            for one, told in count.agreed(part.page, self._changed_s) if part.plain and not part.offset else ():
+            for one, told in count.agreed(part.page, self._changed_s) if not part.offset else ():
                 expected = f"{total} as {name}, as the whole list tells before and after"
                 yield _case(one, name, f"{told} as {name}", expected, holds=False)
             yield _case(part.occasion, name, "", "the number of items that are shown", holds=True)
@@ -160,8 +162,13 @@ class Totals:
                 number = f"{'' if part.sure else 'at least '}{least}"
                 expected = f"{number} as {name}, by the offset and the items that are shown"
                 yield _case(part.occasion, name, f"{total} as {name}", expected, holds=False)
-        elif part.plain and not part.whole and shown and count.is_of_all and total != count.all:
+        elif not part.whole and shown and (count.is_of_all or plain_name(name) in TOTALS) and total != count.all:
             count.other.append((part.occasion, total))
+            # Nothing was changed since the whole list was read.
+            count.times += total == shown and count.all_s > self._changed_s
+            if total == shown and count.all_s > self._changed_s and count.times >= _OFTEN:
+                expected = f"{count.all} as {name}, as the whole list tells"
+                yield _case(part.occasion, name, f"{total} as {name}", expected, holds=False)
 
     def _is_cut(self, listing: Listing, shown: int, sent: Mapping[str, str]) -> bool:
         """Return whether a server may have cut a list at its own bound: a round number that no list exceeded."""

@@ -15,10 +15,11 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
 from conformance.contract.described import SOAP
 from conformance.documents.openapi import Operation
+from conformance.scenarios.drawing import drawn
 from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.soap_survey import requests_of
 from conformance.scenarios.stage import Leaves, Need, Stage
-from conformance.scenarios.survey import COVERAGE, FEWEST_REPEATS, FUZZED, REPEATS, TIMED, drawn
+from conformance.scenarios.survey import COVERAGE, FEWEST_REPEATS, FUZZED, REPEATS, TIMED
 from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run

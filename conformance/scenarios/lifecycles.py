@@ -15,9 +15,8 @@ from urllib.parse import quote, unquote, urlsplit
 from conformance.api.rest.applicable import allowed
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import listed
-from conformance.api.rest.samples import fits
 from conformance.api.rest.statuses import HELD, held_text
-from conformance.api.rest.things import collection_of, identified, identifier_of
+from conformance.api.rest.things import collection_of, identified, identifier_of, path_chosen
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, operations_of
@@ -42,9 +41,6 @@ _ACTIONS: Final = 3
 _ALONE_S: Final = 6.0
 # The turns of changes, of refused requests, and of an identifier that is never created, so that their values differ.
 _CHANGED, _REFUSED, _NEVER = 30, 60, 99
-# Identifiers that a client may choose for what it creates.
-_CHOSEN: Final = ("roaas-{}", "roaas{}", "3fa85f64-5717-4562-b3fc-2c963f66af{:02}")
-_CHOSEN_NUMBER: Final = 987_001
 # Members that say when something was changed.
 _TIMES: Final = re.compile(r"(?:created|updated|modified|changed|timestamp|time|at|on|version|revision|etag)$")
 
@@ -247,7 +243,7 @@ class _Cycle:
         path, before = "", self._ids()
         things = self.living.things
         if self.create.method == "PUT":
-            path = self._chosen(turn)
+            path = path_chosen(self.read, turn)
             if not path or self.writer.send(self.read, path).response.status not in ABSENT:
                 return False
         usual = [None] if not things and self.create.method == "POST" else []
@@ -349,18 +345,9 @@ class _Cycle:
 
     def _absent(self, path: str) -> str:
         """Return the path of a thing that hardly exists, beside another one; empty if none can be made."""
-        found = self._chosen(_NEVER)
+        found = path_chosen(self.read, _NEVER)
         above, _, last = path.rstrip("/").rpartition("/")
         return found and f"{above}/{found.rstrip('/').rpartition('/')[2]}{path[len(above) + 1 + len(last) :]}"
-
-    def _chosen(self, turn: int) -> str:
-        """Return the path of a thing that does not exist, with an identifier that the client chooses; else empty."""
-        parameter = self.read.parameter("path")[-1]
-        candidates: list[Any] = [one.format(turn) for one in _CHOSEN] + [_CHOSEN_NUMBER + turn]
-        id_ = next((one for one in candidates if fits(parameter.schema, one)), None)
-        if id_ is None or len(self.read.parameter("path")) > 1:
-            return ""
-        return self.read.template.replace(f"{{{parameter.name}}}", str(id_))
 
 
 def _news(was: dict[str, Any], said: dict[str, Any]) -> dict[str, Any]:

@@ -30,8 +30,10 @@ from conformance.transport.exchange import Exchange, NoAnswerError
 
 # So many pages are read one after another, and so many values of one parameter are sent: at quick, and else.
 _PAGES: Final = 4
-_VALUES: Final = {"quick": 3}
+_VALUES: Final = {"quick": 8}
 _MOST_VALUES: Final = 12
+# So many of them are sent for a part of the list as well.
+_WITH_PART: Final = 6
 # As many times an exploration's time one list may take; one that once took more than a second, this part of it.
 _BUDGETS: Final = 3
 _SLOW_SHARE: Final = 4
@@ -127,10 +129,12 @@ def vary_lists(api: RestInterface, values: Values) -> None:
             page, until = reader.page(), reader.until
             if page is not None and page.items:
                 reader.refused()
+                filters, doubted = {one.name for one in listing.filters.values()}, list[dict[str, Any]]()
                 for query in _queries(listing, page, _VALUES.get(api.run.effort.name, _MOST_VALUES)):
-                    if time.monotonic() < until:
-                        reader.read(query)
-                _settled(reader)
+                    found = page_of(reader.read(query).response) if time.monotonic() < until else None
+                    if found is not None and query.keys() <= filters and found.items and _is_doubted(listing, found):
+                        doubted.append(query)
+                _settled(reader, doubted)
 
 
 @dataclass(frozen=True)
@@ -168,7 +172,13 @@ class Reader:
             inputs = inputs.having("query", name, value)
         # A device may answer on a new connection in another way.
         is_odd = len(query or {}) % 2 == 1
-        return self.api.send(written(self.listing.operation, inputs), fresh=is_odd)
+        found, limit = self.api.send(written(self.listing.operation, inputs), fresh=is_odd), self.listing.limit
+        page, most = page_of(found.response), inputs.query.get(limit.name) if limit is not None else None
+        if limit is not None and page is not None and isinstance(most, int) and 0 < most < len(page.items):
+            # A device that raises the limit shows as many items for the raised one.
+            raised = inputs.having("query", limit.name, len(page.items))
+            self.api.send(written(self.listing.operation, raised))
+        return found
 
     def refused(self) -> None:
         """Send an invalid request, after which the valid ones have to be answered as before."""
@@ -187,17 +197,36 @@ class Reader:
         return None if part is None else part[1]
 
 
-def _settled(reader: Reader) -> None:
-    """Read a list; where a total has ceased to be the number of items, once more when no change explains it."""
-    first, now = reader.api.first.get(reader.listing.operation.label), reader.page()
-    before = page_of(first.response) if first is not None else None
-    if before is None or now is None or now.goes_on:
+def _settled(reader: Reader, doubted: list[dict[str, Any]]) -> None:
+    """Read what had a wrong total once more, when no change explains it.
+
+    Args:
+        reader: of the list.
+        doubted: queries by which a total was not the number of items.
+    """
+    listing, first = reader.listing, reader.api.first.get(reader.listing.operation.label)
+    before, now, query = page_of(first.response) if first is not None else None, reader.page(), dict[str, Any]()
+    if now is not None and listing.limit is not None and 0 < listing.most({}) <= len(now.items):
+        most = max(now.totals.values(), default=0) + _FEWEST
+        query = {listing.limit.name: most} if fitting(listing.limit, most) else {}
+        part = reader.part(query) if query else None
+        now = part[1] if part is not None else None
+    if before is None or now is None:
         return
-    agreed = [name for name, total in before.totals.items() if total == len(before.items)]
-    if any(now.totals.get(name, len(now.items)) != len(now.items) for name in agreed):
+    agreed = [name for name, total in before.totals.items() if total >= len(before.items)]
+    wrong = [query] if not now.goes_on and any(now.totals.get(name) != len(now.items) for name in agreed) else []
+    # A total of all items whatever the filter is right as well.
+    pages = {index: part[1] for index, one in enumerate(doubted) if (part := reader.part(one)) is not None}
+    wrong += [doubted[index] for index, one in pages.items() if one.totals != now.totals and _is_doubted(listing, one)]
+    if wrong:
         time.sleep(SETTLES_S)
-        for _ in range(_TWICE):
-            reader.read()
+        for one in (*wrong, *wrong):
+            reader.read(one)
+
+
+def _is_doubted(listing: Listing, page: Page) -> bool:
+    is_cut = page.goes_on or 0 < listing.most({}) <= len(page.items)
+    return not is_cut and any(0 < total != len(page.items) for total in page.totals.values())
 
 
 def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]]:
@@ -217,6 +246,8 @@ def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]
     sorts = {listing.sort.name: rows[-1][listing.sort.name]} if listing.sort is not None and listing.sortings else {}
     for number, row in enumerate(rows or [{}]):
         yield row
+        if number >= _WITH_PART:
+            continue
         if part and number % 2 == 0:
             yield {**row, **part}
         elif later or part:
@@ -246,7 +277,15 @@ class _Parts:
         fewest = _FEWEST if self.reader.by or whole is None else max(_FEWEST, len(whole.items))
         if whole is None or len(set(whole.identities)) < fewest:
             return
-        for walk in (self._entire, self._shifted, self._beyond, self._by_offset, self._by_page, self._by_cursor):
+        for walk in (
+            self._entire,
+            self._shifted,
+            self._beyond,
+            self._last,
+            self._by_offset,
+            self._by_page,
+            self._by_cursor,
+        ):
             found = self._twice(walk, whole) if time.monotonic() < until else None
             if found is not None:
                 yield found
@@ -292,7 +331,8 @@ class _Parts:
 
     def _beyond(self, whole: Page) -> Paged | None:
         """Read far beyond the end."""
-        offset, end = self.reader.listing.offset, max([len(whole.items), *whole.totals.values()])
+        listing, end = self.reader.listing, max([len(whole.items), *whole.totals.values()])
+        offset = listing.offset or listing.page
         far = next((end + more for more in _BEYOND if fitting(offset, end + more)), None)
         part = self.reader.part({offset.name: far}) if offset is not None and far is not None else None
         if offset is None or part is None or (whole.goes_on and not whole.totals):
@@ -300,6 +340,16 @@ class _Parts:
         again = [one for one in part[1].identities if one in whole.identities]
         fault = f"the item {again[0]} of the first page" if again else ""
         return self._paged(offset.name, part[0], f"no item of the first page, by {offset.name}={far}", fault)
+
+    def _last(self, whole: Page) -> Paged | None:
+        """Read the last two items, where a total tells where they are."""
+        offset, end = self.reader.listing.offset, max(whole.totals.values(), default=0)
+        is_later = end > len(whole.items) and not self.reader.always and fitting(offset, end - _FEWEST)
+        part = self.reader.part({offset.name: end - _FEWEST}) if offset is not None and is_later else None
+        if offset is None or part is None or part[1].totals != whole.totals:
+            return None
+        fault = "" if len(part[1].items) >= _FEWEST else f"{len(part[1].items)} items"
+        return self._paged(offset.name, part[0], f"the last {_FEWEST} of {end} items, by {offset.name}", fault)
 
     def _by_offset(self, whole: Page) -> Paged | None:
         offset = self.reader.listing.offset
@@ -331,8 +381,18 @@ class _Parts:
 
     def _size(self, whole: Page) -> int:
         """Return how many items a page is asked to have, so that there are about three; 0 where none is allowed."""
-        sizes = range((len(whole.items) + 2) // 3, len(whole.items))
+        count = self._count(whole)
+        sizes = range((count + 2) // 3, count)
         return next((one for one in sizes if fitting(self.reader.listing.limit, one)), 0)
+
+    def _count(self, whole: Page) -> int:
+        """Return how many items the pages have together: all of the list, as far as its totals tell."""
+        count = len(whole.items)
+        return (
+            count
+            if self.reader.always
+            else max([count, *(one for one in whole.totals.values() if one <= _PAGES * count)])
+        )
 
     def _walk(self, whole: Page, way: str, where: Callable[[int, int], dict[str, Any] | None]) -> Paged | None:
         """Read page after page, and compare all of them with the list.
@@ -362,7 +422,7 @@ class _Parts:
                 return None
             last = part
             joined += part[1].identities
-            if len(joined) >= len(whole.items) and not whole.goes_on:
+            if len(joined) >= self._count(whole) and not whole.goes_on:
                 break
             if not part[1].items:
                 ends = f"an empty page after {len(joined)} items"
@@ -371,7 +431,7 @@ class _Parts:
             return None
         expected = whole.identities[: len(joined)]
         fault = "" if tuple(joined[: len(expected)]) == expected else _difference(expected, tuple(joined))
-        fault = fault or (ends if len(joined) < len(whole.items) else "")
+        fault = fault or (ends if len(joined) < self._count(whole) else "")
         twice = next((f"the item {one[:60]} twice" for one in joined if joined.count(one) > 1), "")
         fault = fault or ("" if self.reader.by else twice)
         return self._paged(way, last[0], f"each item of the list once, page after page by {way}", fault)

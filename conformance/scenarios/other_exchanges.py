@@ -3,7 +3,9 @@
 A fault in one response of a hundred may meet none of the survey's requests, so its rules judge these as well.
 """
 
+import time
 from contextlib import suppress
+from itertools import islice
 from typing import Final
 
 from conformance.api.rest.applicable import allowed
@@ -16,6 +18,7 @@ from conformance.api.rest.variations import Kind
 from conformance.contract.described import SOAP
 from conformance.documents.openapi import operations_of
 from conformance.documents.resources import matching
+from conformance.scenarios.living import ABSENT
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey
@@ -25,7 +28,10 @@ from conformance.verdict.time_limit import TimeIsOverError
 # Different responses that are kept, so that a long run needs no more memory.
 _MOST: Final = 2000
 # Things that are read at the end: by then even a slow device has them, or has them no more.
-_MOST_THINGS: Final = 30
+_MOST_THINGS, _REMEMBERED = 40, 400
+# A device that acts later has so long, s: a little longer than the checkers wait.
+_SETTLES_S: Final = 3.2
+_ERRORS: Final = range(400, 500)
 _ANY_FORMAT: Final = frozenset({None, "*/*", "application/json"})
 
 
@@ -34,12 +40,13 @@ class OtherExchanges(Listener):
 
     Attributes:
         probes: the exchanges, those with equal responses once.
-        things: paths of what was created or deleted, in this order.
+        things: by the path of what was created or deleted whether it should be there, and since when, s of the
+            monotonic clock; what was not read since then comes first.
     """
 
     def __init__(self, api: RestInterface) -> None:
         self.probes: list[Probe] = []
-        self.things: dict[str, None] = {}
+        self.things: dict[str, tuple[bool, float]] = {}
         self._made = LeftBehind(operations_of(api.run.contract), api.client.base_url).made
         self._api = api
         self._seen: set[int] = set()
@@ -49,8 +56,12 @@ class OtherExchanges(Listener):
         answer = exchange.response
         names = sorted(name.lower() for name, _ in answer.headers)
         self._keep(exchange, (answer.status, answer.media_type, *names, answer.body))
-        if answer.ok and exchange.request.method in {"POST", "PUT", "DELETE"} and len(self.things) < _MOST_THINGS:
+        if answer.ok and exchange.request.method in {"POST", "PUT", "DELETE"}:
             self._note(exchange)
+        elif exchange.request.method == "GET":
+            path = exchange.request.url.removeprefix(self._api.client.base_url)
+            if self.things.get(path, (None,))[0] is answer.ok:
+                self.things[path] = self.things.pop(path)
 
     def _note(self, exchange: Exchange) -> None:
         context = RequestContext.of(self._api.run.contract, self._api.client.base_url, exchange.request)
@@ -59,7 +70,11 @@ class OtherExchanges(Listener):
             made = path if exchange.request.method == "DELETE" else self._made(context.operation, path, exchange)
             reads = matching(self._api.run.contract, "GET", made) if made else None
             if reads is not None and allowed(self._api, reads):
-                self.things[made] = None
+                self.things.pop(made, None)
+                known = exchange.request.method != "DELETE", exchange.response.received_s
+                self.things = {made: known, **self.things}
+                if len(self.things) > _REMEMBERED:
+                    self.things.popitem()
 
     def unanswered(self, request: Unanswered) -> None:
         """Keep a request whose connection was closed; several clients at once may be refused, and are not told."""
@@ -69,13 +84,23 @@ class OtherExchanges(Listener):
     def _keep(self, attempt: Attempt, shown: tuple[object, ...]) -> None:
         if self._api.is_recorded or len(self.probes) >= _MOST:
             return
-        label = self._operation_of(attempt)
+        kind, label = Kind.OTHER, self._operation_of(attempt)
+        if not label and isinstance(attempt, Exchange) and attempt.response.status in _ERRORS:
+            kind, label = Kind.ODD, self._refused(attempt)
         key = hash((label, shown))
         if not label or key in self._seen:
             return
         self._seen.add(key)
         exchange, unanswered = (attempt, None) if isinstance(attempt, Exchange) else (None, attempt)
-        self.probes.append(Probe(label, Kind.OTHER, exchange=exchange, unanswered=unanswered))
+        self.probes.append(Probe(label, kind, exchange=exchange, unanswered=unanswered))
+
+    def _refused(self, exchange: Exchange) -> str:
+        """Return the operation that refuses a request by a status which it declares; or an empty text."""
+        context = RequestContext.of(self._api.run.contract, self._api.client.base_url, exchange.request)
+        operation = context.operation if context and exchange.request.raw is None else None
+        is_own = operation is not None and operation.method == exchange.request.method
+        declared = operation.responses if operation is not None and is_own else {}
+        return operation.label if operation is not None and str(exchange.response.status) in declared else ""
 
     def _operation_of(self, attempt: Attempt) -> str:
         """Return the operation of a usual and valid request, if it was answered 2xx before; or an empty text."""
@@ -97,12 +122,22 @@ class OtherExchanges(Listener):
         return operation.label if said.verdict == VALID and not invents else ""
 
 
+def _read(api: RestInterface, things: dict[str, tuple[bool, float]]) -> dict[str, tuple[bool, float]]:
+    """Read things; return those that are missing, or are there although they were deleted."""
+    sent = {path: api.client.send("GET", path, headers=(("Accept", "*/*"),)) for path in things}
+    return {path: one for path, one in things.items() if one[0] is (sent[path].response.status in ABSENT)}
+
+
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)
 def others(api: RestInterface, other_exchanges: OtherExchanges) -> Survey:
     """Read what was created or deleted once more, and return what other checks have sent and received."""
     with suppress(NoAnswerError, TimeIsOverError):
-        for path in other_exchanges.things:
-            api.client.send("GET", path, headers=(("Accept", "*/*"),))
+        wrong = _read(api, dict(islice(other_exchanges.things.items(), _MOST_THINGS)))
+        # A device may take a while, but not for ever.
+        if wrong:
+            until = max(when for _, when in wrong.values()) + _SETTLES_S
+            time.sleep(max(0.0, until - time.monotonic()))
+            _read(api, wrong)
     held = {label: status for label, status in api.usual_status.items() if status in HELD}
     if not api.working and held:
         raise NoOccasionError(held_text(held, set(held.values())))

@@ -9,24 +9,26 @@ from typing import Any, Final
 from urllib.parse import quote, urlsplit
 
 from conformance.api.rest.applicable import allowed
-from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import another, collection_of, identified
+from conformance.api.rest.things import another, collection_of, identified, is_devices, path_chosen
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation
 from conformance.documents.json_schema import Schema
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json, operations_of
+from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.resources import resources_of
+from conformance.scenarios.living import ABSENT
 from conformance.scenarios.neighbours import NO_TAG
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey, Surveyor
 from conformance.scenarios.writing import Writer, members
-from conformance.transport.exchange import NoAnswerError, NotPermittedError, Outgoing
+from conformance.transport.exchange import Exchange, NoAnswerError, NotPermittedError, Outgoing
 from conformance.transport.reach import is_same, joined, path_of
 
 _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
@@ -34,6 +36,11 @@ _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
 _TEXT: Final = "Zo\u00eb e\u0301 \U0001f916"
 # So many members of a resource are written one by one.
 _MEMBERS: Final = 6
+# So many members are removed by null, where a patch may; the turn of an identifier that no other check chooses.
+_NULLS, _TURN = 2, 98
+# So many are written one by one after all together, which shows whether the others stay.
+_SINGLES: Final = 4
+_MERGE: Final = "application/merge-patch+json"
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
@@ -48,13 +55,14 @@ def own_things(api: RestInterface, values: Values) -> Survey:
             continue
         api.run.limit.check()
         changes = [operations[name, path] for name in ("PATCH", "PUT") if (name, path) in operations]
-        create, delete = operations.get(("POST", collection_of(path))), operations.get(("DELETE", path))
+        create = operations.get(("POST", collection_of(path))) or operations.get(("PUT", path))
+        delete = operations.get(("DELETE", path))
         with api.run.limit.lifted(), suppress(NoAnswerError):
             if not read.parameter("path"):
                 if changes:
                     _Thing(surveyor, read, path_of_usual(read, values)).written(changes)
             elif create is not None and collection_of(path):
-                thing = _created(surveyor, create, read)
+                thing = _put(surveyor, create, read) if create.method == "PUT" else _created(surveyor, create, read)
                 if thing is not None:
                     thing.asked()
                     thing.written(changes)
@@ -67,12 +75,22 @@ def path_of_usual(read: Operation, values: Values) -> str:
     return written(read, usual_inputs(read, values)[0]).target
 
 
+def _put(surveyor: Surveyor, create: Operation, read: Operation) -> _Thing | None:
+    """Create a thing under an identifier that the client chooses; return it if nothing was there before."""
+    path = path_chosen(read, _TURN)
+    thing = _Thing(surveyor, read, path)
+    if not path or thing.get(place="path of what does not exist").status not in ABSENT:
+        return None
+    return thing if thing.sent(create, None).ok else None
+
+
 def _created(surveyor: Surveyor, create: Operation, read: Operation) -> _Thing | None:
     """Create a thing; return it if the response says where it is."""
     made: Probe | None = None
     usual = usual_inputs(create, surveyor.values)[:2]
     body = _with_texts(create, usual[0].body)
-    for inputs in (*([replace(usual[0], body=body)] if body else []), *usual):
+    owned = _with_owned(create, read, usual[0].body)
+    for inputs in (*(replace(usual[0], body=one) for one in (owned, body) if one), *usual):
         made = surveyor.send(create, Variation(Kind.AGAIN, "", "", inputs))
         if made.ok:
             break
@@ -97,6 +115,7 @@ class _Thing:
     read: Operation
     target: str
     tag: str = ""
+    last: Exchange | None = None
 
     @property
     def api(self) -> RestInterface:
@@ -105,12 +124,13 @@ class _Thing:
 
     def get(self, *fields: tuple[str, str], place: str = "") -> Probe:
         """Read it, and note its entity tag."""
-        probe = self._send(self.read, None, *fields, place=place)
+        probe = self.sent(self.read, None, *fields, place=place)
         if probe.ok and probe.exchange is not None:
-            self.tag = probe.exchange.response.header("etag") or ""
+            self.last, self.tag = probe.exchange, probe.exchange.response.header("etag") or ""
         return probe
 
-    def _send(self, operation: Operation, body: Any, *fields: tuple[str, str], place: str = "") -> Probe:
+    def sent(self, operation: Operation, body: Any, *fields: tuple[str, str], place: str = "") -> Probe:
+        """Send an operation to it, with its usual body or another one."""
         inputs = usual_inputs(operation, self.surveyor.values)[0]
         inputs = inputs if body is None else replace(inputs, body=body)
         request = written(operation, inputs)
@@ -142,12 +162,40 @@ class _Thing:
         for change in changes:
             bodies = self._bodies(change, members(first.exchange, ()))
             for body in bodies[:1] if self.tag else ():
-                self._send(change, body, ("If-Match", NO_TAG))
+                self.sent(change, body, ("If-Match", NO_TAG))
                 self.get()
-            alone = bodies if self.tag and change is changes[0] else bodies[-1:]
+            singles = bodies[:_SINGLES] if change.method == "PATCH" else []
+            alone = bodies if self.tag and change is changes[0] else bodies[-1:] + singles
             for body in alone if self.tag else [one for one in bodies if _is_beyond_ascii(one)][:1] + alone:
-                if self._send(change, body, *self._current()).ok:
+                if self.sent(change, body, *self._current()).ok:
                     self.get()
+            for body in self._special(change):
+                if self.sent(change, body, *self._current()).ok:
+                    self.get()
+
+    def _special(self, change: Operation) -> list[Any]:
+        """Return bodies with other values for what the device sets itself, and with null for what may be removed."""
+        media_type, now = next(iter(change.bodies), ""), members(self.last, ()) if self.last is not None else {}
+        usual = usual_inputs(change, self.surveyor.values)[0].body
+        if not is_json(media_type) or not isinstance(usual, dict):
+            return []
+        base = {} if change.method == "PATCH" else usual
+        parts, found = flat(change.bodies[media_type].schema).get("properties", {}), []
+        found += [body] if (body := _with_owned(change, self.read, base)) else []
+        needed = flat(self.read.shape or {}).get("required", ())
+        nulls = [
+            name
+            for name, one in now.items()
+            if one is not None
+            and name in parts
+            and name not in needed
+            and not is_devices(name, parts[name], frozenset())
+        ]
+        if media_type.startswith(_MERGE):
+            found += [{name: None} for name in nulls[:_NULLS]]
+        elif change.method == "PATCH":
+            found += [{name: None} for name in nulls[:_NULLS] if fits(parts[name], None)]
+        return found
 
     def _current(self) -> tuple[tuple[str, str], ...]:
         """Return If-Match with its entity tag; a weak one matches none (RFC 9110 13.1.1)."""
@@ -158,10 +206,14 @@ class _Thing:
         if delete is None:
             return
         if self.tag:
-            self._send(delete, None, ("If-Match", NO_TAG))
+            self.sent(delete, None, ("If-Match", NO_TAG))
             if not self.get().ok:
                 return
-        self._send(delete, None, *self._current())
+        self.sent(delete, None, *self._current())
+        self.get(place="path of what was deleted")
+        head = replace(written(self.read, usual_inputs(self.read, self.surveyor.values)[0]), method="HEAD")
+        variation = Variation(Kind.ODD, "", "path of what was deleted", Inputs())
+        self.surveyor.send(self.read, variation, replace(head, target=self.target), fresh=False)
         self.get(place="path of what was deleted")
 
     def _bodies(self, change: Operation, now: dict[str, Any]) -> list[Any]:
@@ -181,6 +233,27 @@ class _Thing:
             body = {name: value} if change.method == "PATCH" else {**whole, name: value}
             found += [body] if fits(schema, body) else []
         return [*found[:_MEMBERS], *([whole] if found and fits(schema, whole) else [])]
+
+
+def _with_owned(change: Operation, read: Operation, body: Any) -> dict[str, Any] | None:
+    """Return a body with values for what the schemas mark as the device's; None where they do not allow it."""
+    media_type = next(iter(change.bodies), "")
+    if not is_json(media_type) or not isinstance(body, dict):
+        return None
+    schema = change.bodies[media_type].schema
+    shown = flat(read.shape or {}).get("properties", {})
+    own = {name: _own_value(one) for name, one in shown.items() if isinstance(one, dict) and flat(one).get("readOnly")}
+    identifying = {plain_name(one.name) for one in read.parameter("path")} | {"id"}
+    own = {name: one for name, one in own.items() if one is not None and plain_name(name) not in identifying}
+    changed = {**body, **own}
+    return changed if own and fits(schema, changed) else None
+
+
+def _own_value(schema: Schema) -> Any:
+    """Return a value that a device hardly gives itself; None for what has few values."""
+    given = flat(schema)
+    candidates: tuple[Any, ...] = ("2001-02-03T04:05:06Z", "2001-02-03", "roaas-own", 987_653, 98_765.25)
+    return None if "enum" in given else next((one for one in candidates if fits(schema, one)), None)
 
 
 def _with_texts(create: Operation, body: Any) -> Any:

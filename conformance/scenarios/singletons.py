@@ -5,13 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, Final
 
 from conformance.api.call_rules import HARMFUL, words_of
 from conformance.api.rest.inputs import usual_inputs
 from conformance.api.rest.samples import alike_and_apart, fits
-from conformance.api.rest.things import another, is_devices
+from conformance.api.rest.things import another, differences, is_devices
 from conformance.documents.json_schema import Schema, is_number, kinds_of
+from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
@@ -43,7 +45,9 @@ _KEEPING: Final = frozenset(
         "profile",
     }
 )
-_MOST_VALUES: Final = 5
+_MOST_VALUES, _MOST_ITEMS = 5, 10
+# A part of a number that is no whole one.
+_PART: Final = 0.375
 # So many members of one resource are written, at quick and at other efforts, and so many resources.
 _FEW_MEMBERS, _MEMBERS, _RESOURCES = 4, 30, 6
 _ACCEPTED: Final = 202
@@ -81,24 +85,65 @@ def _written(writer: Writer, read: Operation, write: Operation) -> list[Write]:
     }
     if not first or not fits(schema, first):
         return []
-    effort, found = writer.api.run.effort, list[Write]()
-    chosen = [name for name in first if _is_changeable(name, parts[name], writer)]
+    chosen = {
+        name: list(values_of(parts[name], first[name], writer.values.collections))
+        for name in first
+        if _is_changeable(name, parts[name], writer)
+    }
+    effort, found, first_time = writer.api.run.effort, list[Write](), list[Write]()
+    few = _FEW_MEMBERS if effort.name == "quick" or effort.slow else _MEMBERS
     until = time.monotonic() + _BUDGETS * effort.budget_s
+
+    last = before
+
+    def done(values: dict[str, Any], before: Exchange) -> list[Write]:
+        nonlocal last
+        body = values if write.method == "PATCH" and fits(schema, values) else {**first, **values}
+        in_time = time.monotonic() < until
+        writes = _write(writer, read, write, body, before) if in_time and fits(schema, body) else []
+        last = writes[-1].found if writes else last
+        return writes
+
     try:
-        for name in chosen[: _FEW_MEMBERS if effort.name == "quick" or effort.slow else _MEMBERS]:
-            done = list[Write]()
-            for value in values_of(parts[name], first[name], writer.values.collections):
-                body = (
-                    {name: value} if write.method == "PATCH" and fits(schema, {name: value}) else {**first, name: value}
-                )
-                if fits(schema, body) and time.monotonic() < until:
-                    done += _write(writer, read, write, body, before)
-            # What never reads as written may show what the device does.
-            is_kept = words_of(read.template) & _KEEPING or any(not one.other for one in done)
-            found += done if is_kept else ()
+        for turn in range(max(map(len, chosen.values()), default=0)):
+            values = {name: some[turn] for name, some in chosen.items() if turn < len(some)}
+            then, again = last, list[Write]()
+            whole = done(values, then)
+            is_told = bool(whole and whole[-1].other)
+            if len(values) > 1 and (is_told or not whole):
+                # Members may depend on each other.
+                wrong = _lost(writer, read, write, whole[-1]) if whole else dict.fromkeys(values, True)
+                names = [name for name in values if wrong.get(name)][:few]
+                again = [one for name in names for one in done({name: values[name]}, then)]
+            found += again or ([] if is_told and len(values) > 1 else whole)
+            first_time += whole or again
     finally:
-        done = _write(writer, read, write, first, before) if chosen else []
-    return found + (done if found else [])
+        restored = _write(writer, read, write, first, last) if chosen else []
+    # What never reads as written when it is written first may show what the device does.
+    is_keeping = bool(words_of(read.template) & _KEEPING)
+    shown = {
+        name
+        for one in first_time
+        for name, lost in _lost(writer, read, write, one).items()
+        if not lost and _body(one)[name] != first.get(name)
+    }
+    kept = [name for name in chosen if is_keeping or name in shown]
+    told = [(one, _lost(writer, read, write, one)) for one in found]
+    known = [replace(one, other=tuple(text for name in kept for text in own.get(name, ()))) for one, own in told]
+    return known + (restored if kept else []) if known else []
+
+
+def _lost(writer: Writer, read: Operation, write: Operation, done: Write) -> dict[str, Any]:
+    """Return what reads otherwise than it was written, by each member that was sent."""
+    body, schema = _body(done), write.bodies[done.sent.request.media_type].schema
+    now, collections = members(done.found, body), writer.values.collections
+    found = {name: differences({name: one}, now, schema, read.shape, collections) for name, one in body.items()}
+    return {name: tuple(text for text in texts if text in done.other) for name, texts in found.items()}
+
+
+def _body(done: Write) -> dict[str, Any]:
+    body = read_json(done.sent.request.body).value
+    return body if isinstance(body, dict) else {}
 
 
 def _write(writer: Writer, read: Operation, write: Operation, body: Any, before: Exchange) -> list[Write]:
@@ -126,11 +171,12 @@ def values_of(schema: Schema, first: Any, collections: frozenset[str]) -> Iterat
         found = [not first]
     elif not found and is_number(first):
         found = [given.get("minimum"), given.get("maximum"), 0] if kinds & {"number", "integer"} else []
+        found += [sum(found[:2]) / 2 + _PART] if "number" in kinds and all(map(is_number, found)) else []
         found += [first + 1, first - 1] if not any(map(is_number, found[:2])) else []
     elif not found and isinstance(first, list):
-        found = [[], alike_and_apart(schema)[1]]
+        found = [[], alike_and_apart({**given, "minItems": min(given.get("maxItems", 2), _MOST_ITEMS)})[1]]
     elif not found and isinstance(first, str) and "pattern" not in given and "format" not in given:
-        found = ["", "roaas 1"]
+        found = ["roaas 1", ""]
     elif isinstance(first, dict):
         found = [another(schema, first, turn, collections) for turn in range(_TURNS)]
     usable = [one for one in found if one is not None and one != first and fits(schema, one)]

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from itertools import islice
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import unquote
 
@@ -16,22 +15,15 @@ from conformance.api.rest.applicable import allowed
 from conformance.api.rest.calls import Call, value_text
 from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.statuses import HELD
 from conformance.api.rest.things import collection_of
-from conformance.api.rest.validity import UNCLEAR, Validity, validity
+from conformance.api.rest.validity import UNCLEAR, VALID, Validity, validity
 from conformance.api.rest.values import Values
-from conformance.api.rest.variations import (
-    UNKNOWN,
-    Kind,
-    Variation,
-    odd_variations,
-    unknown_variations,
-    valid_variations,
-)
-from conformance.documents.openapi import Operation, operations_of
+from conformance.api.rest.variations import UNKNOWN, Kind, Variation
+from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.documents.patterns import SlowPatternError
 from conformance.documents.resources import known_path
+from conformance.scenarios.drawing import SLOW_SHARE, drawn
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import (
@@ -50,13 +42,10 @@ from conformance.verdict.time_limit import TimeIsOverError
 if TYPE_CHECKING:
     from conformance.api.rest.generated import Target
 
-# At standard effort, of one operation: valid, invalid and odd requests; and at least so many of each at quick.
-# Of so many requests of one kind the sent ones are drawn: schemas that refer to each other in many ways make millions.
-_CASES: Final = 400
-_MOST: Final = {"valid": 60, "invalid": 60, "odd": 40}
-_LEAST: Final = {"valid": 40, "invalid": 20, "odd": 12}
-# Valid requests of an operation that changes something: each leaves something behind.
-_ACTING: Final = 12
+# So many parts of a request with several members are sent alone, where it is refused.
+_MOST_PARTS: Final = 24
+# As many refused requests are tried again in other states, and in so many of them.
+_TRIED, _STATES = 3, 2
 #: At standard effort the usual request is sent and timed so often before the groups of others and after each: a failure
 #: in one call of twenty is met.
 TIMED: Final = 5
@@ -66,11 +55,11 @@ _FRESH: Final = 5
 _GRACE: Final = 1.25
 # How often a thing is created and deleted.
 _CYCLES: Final = 24
-# An operation that once took more than a second gets this part of the requests.
-_SLOW_SHARE: Final = 4
 # Statuses of an operation that is not there.
 _NOT_FOUND: Final = 404
 _NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
+#: Where a request has JSON with a charset, which means nothing (RFC 8259 11).
+CHARSET: Final = "header Content-Type"
 #: Statuses by which a request is refused for what is in it, or for the thing's state.
 REFUSALS: Final = frozenset({400, 404, 405, 409, 411, 412, 413, 415, 422})
 # Those by which a device may refuse a second thing of one name, and the requests that ask for acceptance.
@@ -376,7 +365,7 @@ class Surveyor:
     def vary(self, operation: Operation, effort: Effort, seed: int) -> Iterator[None]:
         """Send requests that differ from the usual one in one thing, and then the usual one again."""
         usual = self.usual[operation.label]
-        groups = drawn(operation, usual, self.values, effort, seed, self.api.slow)
+        groups, parts = drawn(operation, usual, self.values, effort, seed, self.api.slow), _MOST_PARTS
         left = _BUDGETS * effort.budget_s
         self._time(operation, usual, effort, time.monotonic() + left)
         for variations in groups:
@@ -388,11 +377,19 @@ class Surveyor:
                     return
                 if time.monotonic() > until:
                     self.cut_short(f"survey of {operation.label}")
-                else:
-                    self.send(operation, one)
+                    continue
+                sent = self.send(operation, one)
+                for part in one.parts if sent.ok else ():
+                    self.record(replace(sent, kind=part.kind, says=part.says, place=part.place))
+                for part in one.parts[:parts] if sent.status in REFUSALS else ():
+                    parts -= 1
+                    self.send(operation, part)
             self._time(operation, usual, effort, until)
             left -= time.monotonic() - began
             yield
+        if is_json(usual.media_type) and operation.label not in self.given_up:
+            request = written(operation, usual).having_type(f"{usual.media_type}; charset=utf-8")
+            self.send(operation, Variation(Kind.OPTIONAL, "with a charset", CHARSET, usual), request)
         self.send(operation, Variation(Kind.AGAIN, "", "", usual))
 
     def create_and_delete(self, operations: Sequence[Operation]) -> None:
@@ -416,6 +413,33 @@ class Surveyor:
                     deleted = self.usual[operation.label].having("path", which.name, known[0])
                     self.send(operation, Variation(Kind.AGAIN, "", "", deleted))
 
+    def try_again(self, operations: Sequence[Operation]) -> None:
+        """Send valid requests that were refused once more in another state, by other values of settings beside them."""
+        by_label = {item.label: item for item in operations}
+        enums = [one for one in self.probes if one.ok and one.kind is Kind.ENUM and one.operation in by_label]
+        refused = [one for one in self.probes if one.kind in {Kind.BOUND, Kind.ENUM} and one.status in {400, 422}]
+        for one in [one for one in refused if one.validity == VALID and one.operation in by_label][:_TRIED]:
+            operation = by_label[one.operation]
+            settings = [by_label[other.operation] for other in enums]
+            near = [
+                (item, other)
+                for item, other in zip(settings, enums, strict=True)
+                if item is not operation and not item.safe and _is_near(item.template, operation.template)
+            ]
+            for item, other in near[:_STATES]:
+                self.send(item, Variation(Kind.AGAIN, "", "", self.usual[item.label]), self._again(other))
+                self.send(
+                    operation, Variation(one.kind, one.says, one.place, self.usual[operation.label]), self._again(one)
+                )
+            for item in dict.fromkeys(item for item, _ in near[:_STATES]):
+                self.send(item, Variation(Kind.AGAIN, "", "", self.usual[item.label]))
+
+    def _again(self, probe: Probe) -> Outgoing:
+        """Return the request of a probe, to be sent again."""
+        request = probe.attempt.request
+        fields = tuple(pair for pair in request.headers if pair[0].lower() in {"content-type", "accept"})
+        return Outgoing(request.method, request.url.removeprefix(self.api.client.base_url), fields, request.body)
+
     def _time(self, operation: Operation, usual: Inputs, effort: Effort, until: float) -> None:
         """Send the usual request a few times, to compare response times; DELETE would find nothing the second time."""
         for _ in range(0 if effort.name == "quick" or operation.method == "DELETE" else TIMED):
@@ -423,31 +447,10 @@ class Surveyor:
                 self.send(operation, Variation(Kind.AGAIN, "", "", usual))
 
 
-def drawn(
-    operation: Operation, usual: Inputs, values: Values, effort: Effort, seed: int, slow: Container[str] = ()
-) -> Iterator[list[Variation]]:
-    """Yield the valid, the invalid and the odd requests that are sent to an operation.
-
-    Args:
-        operation: the operation.
-        usual: values of its usual request.
-        values: those that the device gave.
-        effort: how many are drawn.
-        seed: of the run.
-        slow: labels of operations that get fewer; looked into when a group is drawn.
-    """
-    valid = list(islice(valid_variations(operation, usual, values), _CASES))
-    if not operation.safe:
-        valid = effort.draw(valid, _ACTING, f"{seed}/valid {operation.label}")
-    groups = {
-        "valid": [*valid, *unknown_variations(operation, usual)],
-        "invalid": list(islice(invalid_variations(operation, usual), _CASES)),
-        "odd": list(islice(odd_variations(operation, usual), _CASES)),
-    }
-    for name, variations in groups.items():
-        standard = max(_MOST[name], round(_LEAST[name] / effort.factor))
-        standard //= _SLOW_SHARE if operation.label in slow else 1
-        yield effort.draw(variations, standard, f"{seed}/{name} {operation.label}")
+def _is_near(template: str, other: str) -> bool:
+    """Return whether one path is below the other one, or beside it."""
+    above = template.rstrip("/").rpartition("/")[0]
+    return other.startswith(f"{template}/") or (bool(above) and f"{other}/".startswith(f"{above}/"))
 
 
 def order_of(operation: Operation) -> tuple[int, int]:
@@ -472,6 +475,7 @@ def survey(api: RestInterface, values: Values) -> Survey:
     is_complete = run.limit.in_turns(steps, SURVEY_SHARE, behind)
     if is_complete:
         surveyor.create_and_delete(operations)
+        surveyor.try_again(operations)
     for operation in operations if is_complete else ():
         if operation.method == "GET" and operation.parameter("path") and operation.label not in surveyor.given_up:
             # What was created meanwhile has an id now.
@@ -548,7 +552,7 @@ def _send_generated(surveyor: Surveyor, operation: Operation, target: Target, ex
 
     run = surveyor.api.run
     until = time.monotonic() + _BUDGETS * run.effort.budget_s
-    count = COVERAGE // (_SLOW_SHARE if operation.label in surveyor.api.slow else 1)
+    count = COVERAGE // (SLOW_SHARE if operation.label in surveyor.api.slow else 1)
     chosen = run.effort.draw_passing(target.covering(), count, f"{run.seed}/coverage {target.label}")
     run.tally.planned += len(chosen)
     for case in chosen:

@@ -162,6 +162,13 @@ class Effort:
         chooser = random.Random(zlib.crc32(seed.encode()))  # noqa: S311 - no secret
         return [items[index] for index in sorted(chooser.sample(range(len(items)), count))]
 
+    def draw_first(self, items: Sequence[_Item], others: Sequence[_Item], standard: int, seed: str) -> list[_Item]:
+        """Return what draw() returns of the items; where that are fewer, some of others too."""
+        chosen = self.draw(items, standard, seed)
+        left = self.cases(standard) - len(chosen)
+        chooser = random.Random(zlib.crc32(seed.encode()))  # noqa: S311 - no secret
+        return [*chosen, *chooser.sample(others, min(max(left, 0), len(others)))]
+
     def draw_passing(self, items: Iterable[_Item], standard: int, seed: str) -> list[_Item]:
         """Return the same of items that pass by, of which all together may be too many to keep."""
         chooser = random.Random(zlib.crc32(seed.encode()))  # noqa: S311 - no secret

@@ -17,6 +17,11 @@ from conformance.documents.representation import flat
 
 # A longer array is a load test.
 _MOST_ITEMS: Final = 100
+# What frameworks refuse in any place.
+_OTHER_TYPE: Final = "which has another type"
+_NOT_ASCII: Final = "which is none of its values, and beyond ASCII"
+_BEYOND: Final = frozenset({"beyond its maximum", "at its exclusiveMaximum"})
+_COMMON: Final = frozenset({_OTHER_TYPE, _NOT_ASCII})
 
 
 def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
@@ -29,7 +34,11 @@ def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
         for value, why in _wrong_values(item.schema, usual.at(item.where).get(item.name)):
             if parameter_verdict(operation, item, value) == INVALID:
                 changed = usual.having(item.where, item.name, value)
-                yield Variation(Kind.INVALID, f"{shown(value)} as {place}, {why}", place, changed)
+                says = f"{shown(value)} as {place}, {why}"
+                yield Variation(Kind.INVALID, says, place, changed, is_common=why in _COMMON)
+                if item.where == "query" and why in _BEYOND:
+                    beside = _beside(operation, changed)
+                    yield from (Variation(Kind.INVALID, f"{says}, with {name}", place, one) for name, one in beside)
     if usual.media_type in {FORM, MULTIPART} and isinstance(usual.body, dict):
         found = _invalid_fields(usual, usual.body, flat(operation.bodies[usual.media_type].schema))
         yield from (one for one in found if body_verdict(operation, one.inputs) == INVALID)
@@ -46,7 +55,20 @@ def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
         yield Variation(Kind.INVALID, "a list instead of an object", "body", replace(usual, body=[]))
     # What one alternative of a union forbids, another one may allow.
     found = _invalid_parts(usual, usual.body, body.schema, ())
-    yield from (one for one in found if not fits(body.schema, one.inputs.body))
+    # A merge patch leaves out what it does not change (RFC 7396).
+    is_whole = "merge-patch" not in usual.media_type
+    yield from (
+        one for one in found if not fits(body.schema, one.inputs.body) and (is_whole or one.kind is Kind.INVALID)
+    )
+
+
+def _beside(operation: Operation, inputs: Inputs) -> Iterator[tuple[str, Inputs]]:
+    """Yield inputs with a value of one more parameter: a filter may have a path of its own through the code."""
+    for item in operation.parameter("query"):
+        values = [True] if kinds_of(item.schema) == {"boolean"} else flat(item.schema).get("enum", ())
+        if item.name not in inputs.query and values:
+            yield item.name, inputs.having("query", item.name, values[0])
+            break
 
 
 def _invalid_parts(usual: Inputs, value: Any, schema: Schema, steps: Steps) -> Iterator[Variation]:
@@ -65,7 +87,8 @@ def _invalid_part(usual: Inputs, value: Any, schema: Schema, here: Steps) -> Ite
     place = place_of(here)
     for wrong, why in _invalid_values(schema):
         body = with_member(usual.body, here, wrong)
-        yield Variation(Kind.INVALID, f"{shown(wrong)} as {place}, {why}", place, replace(usual, body=body))
+        says, changed = f"{shown(wrong)} as {place}, {why}", replace(usual, body=body)
+        yield Variation(Kind.INVALID, says, place, changed, is_common=why in _COMMON)
     if len(here) <= DEPTH:
         yield from _invalid_parts(usual, value, schema, here)
 
@@ -106,10 +129,10 @@ def _invalid_values(schema: Schema) -> Iterator[tuple[Any, str]]:
     for value in ({"roaas": 1}, UNKNOWN, 17):
         is_plain = isinstance(value, str) or (isinstance(value, int) and kinds <= {"object", "array", "boolean"})
         if not fits(schema, value) and (is_plain or isinstance(value, dict)):
-            yield value, "which has another type" if "enum" not in merged else "which is none of its values"
+            yield value, _OTHER_TYPE if "enum" not in merged else "which is none of its values"
             break
     if kinds & {"number", "integer"} and "string" not in kinds and not fits(schema, value=False):
-        yield False, "which has another type"
+        yield False, _OTHER_TYPE
 
 
 def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:
@@ -122,7 +145,7 @@ def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:
     if isinstance(schema.get("enum"), list) and schema["enum"]:
         yield UNKNOWN, "which is none of its values"
         if all(isinstance(one, str) for one in schema["enum"]):
-            yield f"{UNKNOWN}é", "which is none of its values, and beyond ASCII"
+            yield f"{UNKNOWN}é", _NOT_ASCII
     if isinstance(schema.get("maxItems"), int) and schema["maxItems"] <= _MOST_ITEMS:
         items = schema.get("items")
         one = sample(items if isinstance(items, dict) else {})
@@ -186,6 +209,7 @@ def _wrong_scalars(schema: Schema) -> Iterator[tuple[Any, str]]:
         is_text = isinstance(value, str) or "string" not in kinds
         if is_text and not isinstance(value, list) and not fits(schema, value):
             yield value, why
-            break
+            if isinstance(value, str):
+                break
     if "string" not in kinds and "enum" not in merged:
-        yield UNKNOWN, "which has another type"
+        yield UNKNOWN, _OTHER_TYPE

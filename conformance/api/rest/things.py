@@ -32,6 +32,9 @@ _ALIVE: Final = frozenset({"active", "isactive", "alive"})
 _SHARED: Final = re.compile(r"(?:default|primary|active|selected|current|order|index|rank|priority|position|sequence)$")
 # Formats of texts that are the same in every spelling but for case and punctuation.
 _COMPARED: Final = frozenset({"", "email", "uuid", "hostname", "date", "date-time"})
+# Identifiers that a client may choose for what it creates.
+_CHOSEN: Final = ("roaas-{}", "roaas{}", "3fa85f64-5717-4562-b3fc-2c963f66af{:02}")
+_CHOSEN_NUMBER: Final = 987_001
 _NEAR: Final = {"rel_tol": 0.02, "abs_tol": 0.01}
 _SECOND: Final = 1.0
 
@@ -40,6 +43,16 @@ def collection_of(template: str) -> str:
     """Return the path of the collection that an item's path is in, without a slash at its end; empty if it is none."""
     before, _, last = template.rstrip("/").rpartition("/")
     return before if re.fullmatch(r"\{[^{}]+\}", last) else ""
+
+
+def path_chosen(item: Operation, turn: int) -> str:
+    """Return the path of a thing with an identifier that the client chooses, another one each turn; else empty."""
+    parameter = item.parameter("path")[-1]
+    candidates: list[Any] = [one.format(turn) for one in _CHOSEN] + [_CHOSEN_NUMBER + turn]
+    id_ = next((one for one in candidates if fits(parameter.schema, one)), None)
+    if id_ is None or len(item.parameter("path")) > 1:
+        return ""
+    return item.template.replace(f"{{{parameter.name}}}", str(id_))
 
 
 def identified(value: Any, item: Operation) -> tuple[str, Any]:
@@ -144,8 +157,8 @@ def differences(
 def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, Any], schema: Schema) -> dict[str, Any]:
     """Return what was written, with the values that the response to it shows instead.
 
-    A device that tells which other value it took has written that, but for the one that was there before, and where the
-    schema states which values there are.
+    A device that tells which other value it took has written that, but for the one that was there before, and for
+    another value of an enumeration.
 
     Args:
         sent: the members that were sent.
@@ -161,9 +174,7 @@ def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, 
 
 
 def _is_told(sent: Any, told: Any, before: Any, schema: Schema) -> bool:
-    ranges = ("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum")
-    is_stated = "enum" in schema or all(any(word in schema for word in words) for words in ranges)
-    return isinstance(told, str | int | float) and told not in (sent, before) and not is_stated
+    return isinstance(told, str | int | float) and told not in (sent, before) and "enum" not in schema
 
 
 def _parts(schema: Schema, names: Collection[str]) -> dict[str, Any]:

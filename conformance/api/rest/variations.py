@@ -10,6 +10,7 @@ from enum import StrEnum
 from typing import Any, Final
 
 from conformance.api.rest.inputs import NOTHING, Inputs, parameter_verdict, whole_body
+from conformance.api.rest.references import is_free_text
 from conformance.api.rest.samples import alike_and_apart, fits, sample
 from conformance.api.rest.validity import VALID
 from conformance.api.rest.values import Values
@@ -73,12 +74,16 @@ class Variation:
         says: what is special about it, as a noun phrase; empty for the usual request.
         place: the parameter or member that is special ("query limit", "body /a/b"); empty for the whole request.
         inputs: its values.
+        parts: the requests that it puts together, each with one of its members.
+        is_common: whether it has nothing but another type or text, which frameworks refuse in any place.
     """
 
     kind: Kind
     says: str
     place: str
     inputs: Inputs
+    parts: tuple[Variation, ...] = ()
+    is_common: bool = False
 
 
 def valid_variations(operation: Operation, usual: Inputs, values: Values) -> Iterator[Variation]:
@@ -100,6 +105,64 @@ def valid_variations(operation: Operation, usual: Inputs, values: Values) -> Ite
         yield Variation(Kind.OPTIONAL, "all members of the body", "body", replace(usual, body=whole))
     for name in operation.formats[:_FEW] if len(operation.formats) > 1 else ():
         yield Variation(Kind.FORMAT, f"Accept: {name}", "header Accept", replace(usual, accept=name))
+
+
+def together(operation: Operation, usual: Inputs, variations: list[Variation]) -> list[Variation]:
+    """Return few requests with the members of many: each has at most one value of each member, and is valid.
+
+    Args:
+        operation: takes JSON.
+        usual: of it.
+        variations: valid requests; what differs in no member, or is valid only alone, stays a request of its own.
+    """
+    alone, groups = list[Variation](), list[tuple[Any, list[Variation]]]()
+    schema = operation.bodies[usual.media_type].schema if usual.media_type in operation.bodies else {}
+    for one in variations:
+        if not one.place.startswith("body /") or not isinstance(usual.body, dict):
+            alone.append(one)
+            continue
+        for index, (body, parts) in enumerate(groups):
+            meeting = [other.inputs.body for other in parts if _meet(one.place, other.place)]
+            is_there = meeting == [one.inputs.body] * len(meeting)
+            whole = (body if meeting else _with_part(body, one)) if is_there else None
+            if whole is not None and fits(schema, whole):
+                groups[index] = whole, [*parts, one]
+                break
+        else:
+            groups.append((one.inputs.body, [one]))
+    for turn, (body, parts) in enumerate(groups, 1):
+        fresh = _with_new_texts(body, schema, usual.body, turn) if operation.method == "POST" else body
+        says, inputs = f"{len(parts)} members of the body", replace(usual, body=fresh)
+        # Members may exclude each other.
+        alone.append(Variation(Kind.ODD, says, "body", inputs, tuple(parts)) if len(parts) > 1 else parts[0])
+    return alone
+
+
+def _meet(place: str, other: str) -> bool:
+    return place == other or place.startswith(f"{other}/") or other.startswith(f"{place}/")
+
+
+def _with_part(body: dict[str, Any], part: Variation) -> Any:
+    """Return a body with the member of another one; None if an index is in its place."""
+    steps, value, there = part.place.removeprefix("body /").split("/"), part.inputs.body, body
+    for depth, step in enumerate(steps, 1):
+        if not isinstance(value, dict) or step not in value:
+            return None
+        value = value[step]
+        if depth == len(steps) or not isinstance(there.get(step), dict):
+            return with_member(body, tuple(steps[:depth]), value)
+        there = there[step]
+    return None
+
+
+def _with_new_texts(body: dict[str, Any], schema: Schema, usual: dict[str, Any], turn: int) -> dict[str, Any]:
+    """Return a body with other free texts than the usual ones, since there may be only one thing of a name."""
+    parts, changed = flat(schema).get("properties", {}), dict(body)
+    for name, one in body.items():
+        text = f"roaas {turn}"
+        if isinstance(one, str) and one == usual.get(name) and is_free_text(parts[name]) and fits(parts[name], text):
+            changed[name] = text
+    return changed if fits(schema, changed) else body
 
 
 def _knowing(variation: Variation, operation: Operation, values: Values) -> Variation:
@@ -133,11 +196,23 @@ def _bounds(schema: Schema) -> Iterator[Any]:
             yield schema[key]
     if "array" in kinds_of(schema) and (apart := alike_and_apart(schema)[1]):
         yield apart  # what stands between items shows from the second one on
+        yield from _lists(schema)
     if "pattern" in schema or "format" in schema or "enum" in schema:
         return
     for key in ("minLength", "maxLength"):
         if isinstance(schema.get(key), int) and 0 < schema[key] <= LONG:
             yield "a" * schema[key]
+
+
+def _lists(schema: Schema) -> Iterator[list[Any]]:
+    """Yield arrays of the most items, and with each value of an enumeration of their items."""
+    most, items = schema.get("maxItems"), flat(schema["items"])
+    values = [one for one in items.get("enum", ()) if one is not None][:_FEW]
+    if isinstance(most, int) and 0 < most <= _FEW:
+        whole = alike_and_apart({**schema, "minItems": most})[1]
+        yield whole or values[:most]
+        values = [one for one in values if one not in whole]
+    yield from ([one] for one in values)
 
 
 def _valid_members(usual: Inputs, value: Any, schema: Schema, steps: tuple[str, ...]) -> Iterator[Variation]:
@@ -148,15 +223,17 @@ def _valid_members(usual: Inputs, value: Any, schema: Schema, steps: tuple[str, 
         if part.get("readOnly"):
             continue
         flatter = flat(part)
+        inner, filled = value.get(name), usual
         if name not in value:
-            body = with_member(usual.body, here, sample(part, whole=True))
-            yield Variation(Kind.OPTIONAL, f"the optional member {place}", place, replace(usual, body=body))
+            inner = sample(part, whole=True)
+            filled = replace(usual, body=with_member(usual.body, here, inner))
+            yield Variation(Kind.OPTIONAL, f"the optional member {place}", place, filled)
         for kind, one in _valid_values(flatter, flatter.get("examples", ()) or (), [], required=True):
             if one != value.get(name, NOTHING):
                 body = with_member(usual.body, here, one)
                 yield Variation(kind, f"{shown(one)} as {place}", place, replace(usual, body=body))
-        if isinstance(value.get(name), dict) and len(steps) < DEPTH:
-            yield from _valid_members(usual, value[name], part, here)
+        if isinstance(inner, dict) and len(steps) < DEPTH:
+            yield from _valid_members(filled, inner, part, here)
 
 
 def unknown_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:

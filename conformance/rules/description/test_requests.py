@@ -6,15 +6,18 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import Any
 
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.statuses import HELD
 from conformance.api.rest.validity import INVALID, VALID
 from conformance.api.rest.variations import Kind
+from conformance.documents.json_text import read_json
 from conformance.documents.openapi import operations_of
+from conformance.documents.writing import json_text
 from conformance.rules.told_once import Fault, held_back, told_once, without_numbers
 from conformance.scenarios.rule import Outcome, rule
-from conformance.scenarios.survey import Probe, Survey, generated_requests, survey
+from conformance.scenarios.survey import CHARSET, Probe, Survey, generated_requests, survey
 from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
 
@@ -154,7 +157,9 @@ def defaults(trace: Survey) -> Iterable[Outcome]:
 @rule("description/valid-accepted", on=(survey, generated_requests))
 def valid_accepted(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether requests that the description allows are accepted."""
-    trace = replace(trace, probes=tuple(_named(trace, run)))
+    # A device that takes no charset anywhere knows application/json alone.
+    is_taken = any(one.ok for one in trace.probes if one.place == CHARSET)
+    trace = replace(trace, probes=tuple(one for one in _named(trace, run) if one.place != CHARSET or is_taken))
     yield from _accepted(trace, (Kind.OPTIONAL, Kind.BOUND), "a request that the description allows accepted")
     # An operation that never accepts anything may need a state; which status it has then, another rule judges.
     works = {one.operation for one in trace.probes if one.ok}
@@ -169,6 +174,14 @@ def valid_accepted(trace: Survey, run: Run) -> Iterable[Outcome]:
     valid = [one for one in generated if one.validity == VALID and not one.invents]
     yield from held_back(one for one in trace.probes if one.kind is Kind.GENERATED and one.validity == VALID)
     yield from told_once(valid, "a request that the description allows accepted", fault)
+
+
+def _asked(probe: Probe) -> tuple[str, str, str]:
+    """Return the operation of a probe, and the value in the place of the body that it is about, as JSON text."""
+    value: Any = read_json(probe.attempt.request.body).value
+    for step in probe.place.removeprefix("body /").split("/"):
+        value = value.get(step) if isinstance(value, dict) else None
+    return probe.operation, probe.place, json_text(value)
 
 
 def _named(trace: Survey, run: Run) -> Iterator[Probe]:
@@ -194,6 +207,9 @@ def _accepted(trace: Survey, kinds: tuple[Kind, ...], expected: str, *, anyway: 
     sent = [one for one in trace.probes if one.kind in kinds and one.exchange and one.validity != INVALID]
     # Nobody but the device knows which ids and cursors there are.
     probes = [one for one in sent if (anyway or one.operation in works) and not one.invents and one.status not in HELD]
+    # What is accepted in one state, or not judged in it, may be refused in another one.
+    other = {_asked(one) for one in trace.probes if (one.ok or one.status in HELD) and one.place.startswith("body /")}
+    probes = [one for one in probes if one.ok or _asked(one) not in other]
 
     def fault(probe: Probe) -> Fault | None:
         if probe.status not in _REFUSED:

@@ -122,6 +122,41 @@ def test_limits(name, schema, query, count, blamed, tmp_path):
     assert (LIMIT in seen.read(VALVES[:count], **query).broken) == blamed
 
 
+def _served(raised):
+    """Return a device whose limit is raised by a function, and which has eight items."""
+
+    def play(seen, *limits):
+        seen.read(VALVES * 2)
+        for limit in limits:
+            seen.read((VALVES * 2)[: raised(limit)], limit=limit)
+        return seen.broken
+
+    return play
+
+
+@pytest.mark.parametrize(
+    ("raised", "limits", "blamed"),
+    [
+        (lambda limit: max(limit, 3), (1, 3), False),
+        (lambda limit: -(-limit // 5) * 5, (1, 5), False),
+        (lambda limit: limit + 1, (1, 2), True),
+        (lambda _: 8, (1,), True),
+        (lambda limit: 2 * limit, (2, 4), True),
+    ],
+    ids=["to a least one", "to a step", "one more", "ignored", "twice"],
+)
+def test_a_limit_that_is_raised(raised, limits, blamed, tmp_path):
+    assert (_served(raised)(Seen(tmp_path, [_whole("limit")]), *limits) == {LIMIT}) == blamed
+
+
+def test_a_default_that_is_not_applied(tmp_path):
+    for default, blamed in ((4, {LIMIT}), (2, set())):
+        seen = Seen(tmp_path / str(default), [_whole("limit", default=default)])
+        for count, query in ((2, {}), (3, {"limit": 3}), (4, {"limit": 4})):
+            seen.read(VALVES[:count], (("X-Total-Count", "4"),), **query)
+        assert seen.broken == blamed
+
+
 ENVELOPES = {
     "plain": lambda items: items,
     "data": lambda items: {"data": items, "meta": {"x": []}},
@@ -279,6 +314,15 @@ def test_a_total_that_is_wrong_beside_a_part_is_noticed(tmp_path):
             assert not seen.broken
             seen.read(VALVES[:2], body={"items": VALVES[:2], name: number}, limit=2).read(VALVES)
         assert seen.broken == {TOTAL}
+
+
+@pytest.mark.parametrize("query", [{}, {"state": "open"}], ids=["all", "filtered"])
+def test_a_total_that_is_the_size_of_the_page_is_noticed(query, tmp_path):
+    seen = Seen(tmp_path, [_whole("limit"), _text("state", enum=_STATES)], _totalled("total")).read(VALVES)
+    of = [one for one in VALVES if one["state"] == "open"] if query else VALVES
+    seen.read(of, **query).read(of[:1], limit=1, **query)
+    assert not seen.broken, "once may be chance"
+    assert seen.read(of[:1], limit=1, **query).broken == {TOTAL}
 
 
 def _changed_beside(seen):

@@ -15,7 +15,9 @@ _MEMBERS = {
     "id": {"type": "string"}, "name": {"type": "string"}, "rank": {"type": "integer"}, "state": {"type": "string"},
     "is_default": {"type": "boolean"},
 }  # fmt: skip
-_JOB = {"type": "object", "properties": _MEMBERS}
+_OWN = {"built": {"type": "string", "readOnly": True}, "serial": {"type": "integer", "readOnly": True}}
+_JOB = {"type": "object", "properties": {**_MEMBERS, **_OWN, "kept": {"type": "boolean", "default": False}}}
+_UUID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string", "format": "uuid"}}
 _BODY = {"required": True, "content": {"application/json": {"schema": _JOB}}}
 _ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
 _OK = {"200": answers(_JOB), "201": answers(_JOB), "204": {"description": "done"}, "4XX": {"description": "refused"}}
@@ -29,11 +31,18 @@ _PATHS = {
         "delete": {"responses": _OK},
     },
     "/jobs/{id}/cancel": {"parameters": [_ID], "post": {"responses": _OK}},
+    "/keys": {"post": {"requestBody": _BODY, "responses": _OK}},
+    "/keys/{id}": {"parameters": [_UUID], "get": {"responses": _OK}, "delete": {"responses": _OK}},
+    "/notes/{id}": {
+        "parameters": [_ID],
+        "get": {"responses": _OK},
+        "patch": {"requestBody": {"content": {"application/merge-patch+json": {"schema": _JOB}}}, "responses": _OK},
+    },
     "/reset": {"post": {"responses": _OK}},
     "/mode": {"get": {"responses": _OK}, "put": {"requestBody": _BODY, "responses": _OK}},
 }
-GONE, THERE, READ = (
-    f"description/{name}" for name in ("deleted-is-gone", "created-is-there", "written-is-read")
+GONE, THERE, READ, DEFAULTS = (
+    f"description/{name}" for name in ("deleted-is-gone", "created-is-there", "written-is-read", "defaults")
 )  # fmt: skip
 
 
@@ -61,6 +70,22 @@ def _delete(id_, status=204):
     return "DELETE", f"/jobs/{id_}", None, status, None
 
 
+_U1, _U2 = (f"3fa85f64-5717-4562-b3fc-2c963f66af0{number}" for number in (1, 2))
+
+
+def _key(id_, **sent):
+    return "POST", "/keys", {"name": "a", **sent}, 201, _job(id_)
+
+
+_KEPT = ("POST", "/jobs", {"name": "a"}, 201, _job("2", kept=True))
+_KEY_GONE = ("DELETE", f"/keys/{_U1}", None, 204, None)
+_NULLED = ("PATCH", "/notes/1", {"name": None}, 200, _job("1"))
+
+
+def _note(**values):
+    return "GET", "/notes/1", None, 200, _job("1", **values)
+
+
 _REFUSED = ("PATCH", "/jobs/9", {"rank": "x"}, 400, None)
 _RESET = ("POST", "/reset", None, 204, None)
 _MODE = ("PUT", "/mode", {"name": "home"}, 200, {"name": "home"})
@@ -71,9 +96,11 @@ _LOST = ("DELETE", "/jobs/2", None, None, None)
 _LASTING = [_put("8", rank=5, name="c"), 10.0, _get("8", rank=5, name="c")]
 #: What is sent, one second after each other or after so many, and the requirement that is broken.
 BROKEN = {
-    "deleted, and read": ([_delete("1"), 5.0, _get("1")], GONE),
+    "deleted, and read": ([_post("1"), _delete("1"), 5.0, _get("1")], GONE),
+    "deleted where another one is gone": ([_delete("2"), _get("2", 404), _delete("1"), 5.0, _get("1")], GONE),
+    "deleted where another one goes": ([_delete("1"), 5.0, _get("1"), _delete("2"), _get("2", 404)], GONE),
     "deleted after an action": ([_post("1"), _CANCEL, _delete("1"), 4.0, _get("1")], GONE),
-    "deleted, and another one created": ([_delete("1"), _post("2"), 3.0, _get("1")], GONE),
+    "deleted, and another one created": ([_put("1", 201), _delete("1"), _post("2"), 3.0, _get("1")], GONE),
     "created, and never there": ([*_LASTING, _post("1"), 4.0, _get("1", 404)], THERE),
     "created, and another one lasts": (
         [_post("1"), _post("8", name="b"), 4.0, _get("1", 404), _get("8", name="b")], THERE,
@@ -96,15 +123,43 @@ BROKEN = {
         ],
         READ,
     ),
+    "a serial number that changes by PUT": ([_get("1", serial=7), _put("1"), _get("1", serial=8)], READ),
+    "a member of the device's that PUT writes": (
+        [_get("1", built="2026"), _put("1", built="roaas-own"), _get("1", built="roaas-own")], READ,
+    ),
+    "a member of the device's that PATCH writes": (
+        [_get("1", built="2026"), _patch("1", built="roaas-own"), _get("1", built="roaas-own")], READ,
+    ),
+    "a member of the device's that POST writes": ([_post("1", built="roaas-own"), _get("1", built="roaas-own")], READ),
+    "null without effect": ([_note(name="a"), _NULLED, _note(name="a")], READ),
+    "a UUID twice": ([_key(_U1), _KEY_GONE, _key(_U1)], THERE),
+    "a default that is not applied": ([_post("1"), _KEPT, _post("3"), _KEPT], DEFAULTS),
 }  # fmt: skip
 #: The same for right devices.
 RIGHT = {
+    "a member of the device's that changes": [_get("1", built="2026"), _put("1", built="x"), _get("1", built="2027")],
+    "a member of the device's that is sent back": [
+        *(_get("1", serial=71234), _put("1", serial=71234), _get("1", serial=71234)),
+    ],
+    "a serial number of another thing in its place": [
+        *(_get("1", serial=7), _delete("1"), _put("1", 201), _get("1", serial=8)),
+    ],
+    "null removes": [_note(name="a"), _NULLED, ("GET", "/notes/1", None, 200, {"id": "1"})],
+    "null, and written again": [
+        *(_note(name="a"), _NULLED, ("PATCH", "/notes/1", {"name": "a"}, 200, _job("1")), _note(name="a")),
+    ],
+    "a UUID of the client's twice": [_key(_U1, id=_U1), _KEY_GONE, _key(_U1, id=_U1)],
+    "two UUIDs": [_key(_U1), _KEY_GONE, _key(_U2)],
+    "a name twice": [_post("1"), _delete("1"), _post("1")],
+    "a default once": [_KEPT, ("POST", "/jobs", {"name": "a"}, 201, _job("3", kept=False)), _KEPT],
+    "another value than the default that was sent": [_post("1", kept=True), _post("2", kept=True)],
     "another one is the default one": [
         *(_put("8", name="c", is_default=True), 10.0, _get("8", name="c", is_default=True)),
         *(_put("1", is_default=True), _get("1", is_default=True), _put("2", is_default=True)),
         *(_get("1", is_default=False), _get("1", is_default=False), _get("1", is_default=False)),
     ],
     "deleted a moment ago": [_delete("1"), _get("1"), _get("1", 404)],
+    "deleted, and always there": [_post("2"), _delete("2"), _get("2", 404), _delete("1"), 5.0, _get("1")],
     "deleted, and marked so": [_delete("1"), 5.0, _get("1", deleted=True), _get("1", state="archived")],
     "deleted, and put again": [_delete("1"), _put("1", 201), 5.0, _get("1")],
     "deleted, and put in another case": [_delete("a"), _put("A", 201), 5.0, _get("a")],
@@ -181,7 +236,8 @@ def _broken(contract, steps):
         if method == "RAW":
             checkers.forget(deletes=path == "DELETE")
             continue
-        fields = [("Host", "device:8000"), *([("Content-Type", "application/json")] if sent else [])]
+        kind = "application/merge-patch+json" if path.startswith("/notes") else "application/json"
+        fields = [("Host", "device:8000"), *([("Content-Type", kind)] if sent else [])]
         request = Request(method, BASE + path, tuple(fields), json.dumps(sent).encode() if sent else b"")
         body = b"" if seen is None or status in {204, 404} else json.dumps(seen).encode()
         content = (("Content-Type", "application/json"),) if body else ()
@@ -191,7 +247,7 @@ def _broken(contract, steps):
             else Exchange(request, Response(status, content, body, 10.0, received_s=now))
         )
         broken |= {case.requirement for case in checkers(attempt) if not case.holds}
-    return broken & {GONE, THERE, READ}
+    return broken & {GONE, THERE, READ, DEFAULTS}
 
 
 @pytest.mark.parametrize("name", BROKEN)

@@ -65,7 +65,7 @@ _READ, _TAG_A, _TAG_B = one(_GET, _A), one(_GET, _A, etag='"a"'), one(_GET, _B, 
 _FIRST, _CONFIG = one("GET /tubes?limit=1 200", _A), one("GET /config 200", _A)
 _REFUSED = one("PUT /tubes/1 412", body=_B, if_match='"x"')
 _WRITTEN = one("PUT /tubes/1 200", _B, _B, if_match='"x"')
-_CURRENT = one("GET /tubes/1 304", if_none_match='"a"')
+_CURRENT, _GONE = one("GET /tubes/1 304", if_none_match='"a"'), one("GET /tubes/9 404", {"error": "none"})
 _UNSTABLE = [_TAG_A, one("PUT /tubes/1 412", body=_B, if_match='"a"'), one(_GET, _A, etag='"c"')]
 _KNOWS = [one("GET /tubes/2 200", _A, etag='"k"'), one("PUT /tubes/2 412", body=_B, if_match='"x"')]
 
@@ -82,6 +82,7 @@ _KNOWS = [one("GET /tubes/2 200", _A, etag='"k"'), one("PUT /tubes/2 412", body=
         [one("HEAD /tubes 200"), _READ, one("HEAD /tubes/1 404"), one("GET /tubes/1 404")],
         [_READ, one(_HEAD, length="12"), one(_GET, {"level": 100})],
         [_READ, one("PUT /tubes/1 200", _B), one(_HEAD, length="99"), _READ],
+        [_GONE, one("HEAD /tubes/9 404", length="7", kind="text/html"), _GONE],
         # 404: of a device that refuses no method; of what is gone; of an unknown thing; by another template.
         [_READ, one(_ACTION), _READ],
         [_REFUSES, _READ, one("DELETE /tubes/1 200", _A), one(_ACTION), one("GET /tubes/1 404")],
@@ -133,6 +134,8 @@ def test_a_device_that_does_not_know_if_match_is_not_blamed(tmp_path):
         ("head", [_TAG_A, one(_HEAD, etag='"b"'), _TAG_A]),
         ("head", [one("HEAD /tubes 200", etag='"x"'), _TAG_A, one(_HEAD), _TAG_A]),
         ("head", [_READ, one(_HEAD, kind="text/plain"), _READ]),
+        ("head", [_GONE, one("HEAD /tubes/9 200"), _GONE]),
+        ("entity-tag", [_TAG_A, one("GET /tubes/1 304", if_none_match='"a"', etag='"b"')]),
         ("length", [_READ, one(_HEAD, length="0"), _READ]),
         ("length", [_READ, one(_HEAD, length="99"), one("PUT /tubes/1 422"), _READ]),
         ("method-refused", [_REFUSES, _READ, one(_ACTION), _READ]),

@@ -92,10 +92,11 @@ def _things(shape, fault):  # noqa: C901, PLR0915 - one device
             return error(404, "no such valve")
         if (value := await given(request)) is None:
             return error(422, "not valid")
-        if fault == "PUT clamps":
-            value["level"] = min(value["level"], 60)
+        kept = {**value, "level": min(value["level"], 60)} if fault == "PUT clamps" else value
+        if shape.get("clamps"):
+            value = kept = {**value, "level": max(value["level"], 30)}
         if fault != "PUT without effect":
-            later(there.__setitem__, number, {"id": number, **value})
+            later(there.__setitem__, number, {"id": number, **kept})
         return body({"id": number, **value})
 
     async def delete(request):
@@ -120,6 +121,7 @@ _SHAPES = {
     "located": {"located": True, "key": "valve_id"},
     "wrapped": {"wrapped": True},
     "later": {"later": 0.5, "gone": 410},
+    "clamps and says so": {"clamps": True},
 }
 _FAULTS = [
     ("slash", "created is lost", "description/created-is-there"),

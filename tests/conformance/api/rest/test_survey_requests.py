@@ -8,7 +8,7 @@ from conformance.api.rest.inputs import NOTHING, Inputs, usual_inputs, written
 from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.samples import fits
 from conformance.api.rest.values import Values
-from conformance.api.rest.variations import Kind, odd_variations, unknown_variations, valid_variations
+from conformance.api.rest.variations import Kind, odd_variations, together, unknown_variations, valid_variations
 from conformance.documents.openapi import read_operations
 
 _POSE = {
@@ -88,6 +88,37 @@ def test_valid_variations_fit():
         (Kind.OPTIONAL, "body /inner"),
         (Kind.ENUM, "header X-H"),
     }
+
+
+def test_members_are_tried_together_and_each_of_their_values_once():
+    usual = usual_inputs(_MANY, Values())[0]
+    found = list(valid_variations(_MANY, usual, Values()))
+    few = together(_MANY, usual, found)
+    schema, of_body = _MANY.bodies["application/json"].schema, [one for one in found if one.place.startswith("body /")]
+    assert len(few) < len(found)
+    assert all(fits(schema, one.inputs.body) for one in few)
+    assert sorted(part.says for one in few for part in one.parts or [one]) == sorted(one.says for one in found)
+    for one in (one for one in few if one.parts):
+        at = {part.place.removeprefix("body /").split("/")[0]: part.inputs.body for part in one.parts}
+        assert all(one.inputs.body[name] == body[name] for name, body in at.items() if name != "inner")
+    assert max(len(one.parts) for one in few) >= 3
+    assert of_body
+
+
+def test_a_merge_patch_may_leave_out_what_is_required():
+    operation = _operation("patch", "/a", body=_POSE, media_type="application/merge-patch+json")
+    kinds = {one.kind for one in _variations(operation, invalid_variations) if one.place.startswith("body /")}
+    assert Kind.INVALID in kinds
+    assert Kind.MISSING not in kinds
+
+
+def test_a_bound_is_exceeded_beside_a_filter_too():
+    parameters = [_item("limit", {"type": "integer", "minimum": 1, "maximum": 9}), _item("open", {"type": "boolean"})]
+    found = _variations(_operation("get", "/a", parameters), invalid_variations)
+    sent = [one.inputs.query for one in found if "limit" in one.inputs.query]
+    assert {(one["limit"], one.get("open")) for one in sent} >= {
+        (0, None), (10, None), (10, True),
+    }  # fmt: skip
 
 
 def test_invalid_variations_do_not_fit():

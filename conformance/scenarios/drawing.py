@@ -1,0 +1,54 @@
+"""Which of the many requests for an operation a run sends: values of several members together, and drawn ones."""
+
+from collections.abc import Container, Iterator
+from itertools import islice
+from typing import Final
+
+from conformance.api.rest.inputs import Inputs
+from conformance.api.rest.invalid_variations import invalid_variations
+from conformance.api.rest.values import Values
+from conformance.api.rest.variations import Variation, odd_variations, together, unknown_variations, valid_variations
+from conformance.documents.openapi import Operation
+from conformance.verdict.effort import Effort
+
+# At standard effort, of one operation: valid, invalid and odd requests; and at least so many of each at quick.
+# Of so many requests of one kind the sent ones are drawn: schemas that refer to each other in many ways make millions.
+_CASES: Final = 400
+_MOST: Final = {"valid": 60, "invalid": 60, "odd": 40}
+_LEAST: Final = {"valid": 40, "invalid": 28, "odd": 12}
+# Valid requests of an operation that changes something: each leaves something behind. With several members at once each
+# value is tried in few requests.
+_ACTING: Final = 12
+#: An operation that once took more than a second gets this part of the requests.
+SLOW_SHARE: Final = 4
+
+
+def drawn(
+    operation: Operation, usual: Inputs, values: Values, effort: Effort, seed: int, slow: Container[str] = ()
+) -> Iterator[list[Variation]]:
+    """Yield the valid, the invalid and the odd requests that are sent to an operation.
+
+    Args:
+        operation: the operation.
+        usual: values of its usual request.
+        values: those that the device gave.
+        effort: how many are drawn.
+        seed: of the run.
+        slow: labels of operations that get fewer; looked into when a group is drawn.
+    """
+    valid = list(islice(valid_variations(operation, usual, values), _CASES))
+    if not operation.safe:
+        valid = together(operation, usual, valid)
+        whole = [one for one in valid if one.parts]
+        alone = effort.draw([one for one in valid if not one.parts], _ACTING, f"{seed}/valid {operation.label}")
+        valid = [*whole[:_ACTING], *alone]
+    groups = {
+        "valid": [*valid, *unknown_variations(operation, usual)],
+        "invalid": list(islice(invalid_variations(operation, usual), _CASES)),
+        "odd": list(islice(odd_variations(operation, usual), _CASES)),
+    }
+    for name, variations in groups.items():
+        standard = max(_MOST[name], round(_LEAST[name] / effort.factor))
+        standard //= SLOW_SHARE if operation.label in slow else 1
+        own, common = ([one for one in variations if one.is_common is is_common] for is_common in (False, True))
+        yield effort.draw_first(own, common, standard, f"{seed}/{name} {operation.label}")
