@@ -31,6 +31,8 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         unit: for readers, such as rad, m or %.
         speed: the greatest speed on the way to a target, units per second; None: not declared.
         tolerance: how far from its target it may rest; None: that of the move.
+        noise: standard deviation of its position as it is read; what a reading shows at rest counts as well.
+        rest: how fast it may seem to move at rest, units per second; None: a fifth of its tolerance.
     """
 
     at: Pointer
@@ -38,6 +40,8 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     unit: str = ""
     speed: Positive | None = None
     tolerance: Positive | None = None
+    noise: NotNegative = 0.0
+    rest: Positive | None = None
 
     def __post_init__(self) -> None:
         """Check the limits.
@@ -130,6 +134,8 @@ class Speed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         of: the axis that it changes.
         scale: how fast the axis ``of`` changes at velocity 1, in its unit per second.
         tolerance: how far the measured velocity may be off; None: that of the command.
+        noise: standard deviation of the measured velocity; what a reading shows at rest counts as well.
+        rest: the measured velocity at rest, at most; None: a tenth of its tolerance.
     """
 
     limits: tuple[Finite, Finite]
@@ -137,6 +143,8 @@ class Speed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     of: str = ""
     scale: Positive = 1.0
     tolerance: Positive | None = None
+    noise: NotNegative = 0.0
+    rest: Positive | None = None
 
     def __post_init__(self) -> None:
         """Check the limits, and that the velocity can be measured.

@@ -3,21 +3,13 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from statistics import median
 
+from conformance.measures.samples import LATE, SEVERAL, longest_s, usual_s
 from conformance.scenarios.motion import moves, several
-from conformance.scenarios.motion.trace import (
-    LATE,
-    SEVERAL,
-    Command,
-    Drive,
-    Leg,
-    Reading,
-    longest_s,
-    middle_of,
-    usual_s,
-)
+from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading, middle_of
 from conformance.scenarios.rule import NotTested, Outcome
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.case import Case
@@ -28,6 +20,8 @@ _SHARE = 0.1
 _LAPSE_S = 0.1
 # And where it is seen to be renewed, s.
 _RENEWED_S = 0.35
+# A velocity that is renewed does not fall to this part of it in between.
+_LULL = 0.5
 # A stop is answered no later than so long after the device must rest, s.
 _TOO_LATE_S = 1.0
 #: The scenarios in which a device moves.
@@ -129,6 +123,9 @@ def _renewed(drive: Drive, name: str, wanted: float, motion: MotionMap) -> Itera
     long_enough = bool(late) and late[-1].sent - late[0].sent >= _RENEWED_S
     found = measured(late, name, motion) if wanted and long_enough else None
     if found is not None:
+        slowest = _slowest(late, name, wanted)
+        if slowest is not None and slowest < _LULL * abs(wanted) and abs(wanted) > 2 * motion.speed_tolerance(name):
+            found = math.copysign(1, wanted) * slowest
         yield Case(
             abs(found - wanted) <= motion.speed_tolerance(name),
             drive.commands[-1].exchange,
@@ -136,6 +133,12 @@ def _renewed(drive: Drive, name: str, wanted: float, motion: MotionMap) -> Itera
             observed=f"{found:.4g}",
             cause=f"{name} renewed",
         )
+
+
+def _slowest(readings: Sequence[Reading], name: str, wanted: float) -> float | None:
+    """Return the least of the medians of several readings in a row, in the direction that is wanted."""
+    seen = [math.copysign(1, wanted) * one.speeds[name] for one in readings if name in one.speeds]
+    return min((median(seen[index : index + SEVERAL]) for index in range(len(seen) - SEVERAL + 1)), default=None)
 
 
 def measured(readings: list[Reading], name: str, motion: MotionMap) -> float | None:

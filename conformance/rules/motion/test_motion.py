@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator
 
+from conformance.measures.samples import SEVERAL
 from conformance.rules.motion.judging import (
     ALL,
     at,
@@ -19,8 +20,9 @@ from conformance.rules.motion.judging import (
     usable,
 )
 from conformance.scenarios.motion.moves import many_commands, new_targets, repeated, stops, targets
+from conformance.scenarios.motion.resting import crept, fastest
 from conformance.scenarios.motion.several import several_clients, several_drivers
-from conformance.scenarios.motion.trace import SEVERAL, Drive, Leg, Reading, fastest, middle_of
+from conformance.scenarios.motion.trace import Drive, Leg, Reading, middle_of
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.case import Case
@@ -151,7 +153,7 @@ def stop_lasts(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
                 yield NotTested("the device did not come to rest in time: motion/stop")
                 continue
             where, last = at(readings[:SEVERAL], motion), at(readings[-SEVERAL:], motion)
-            moved = off(last, where, motion) or fastest(readings, motion)
+            moved = off(last, where, motion) or fastest(readings, motion) or crept(readings, motion, leg.resting)
             after = readings[-1].sent - leg.commands[1].sent
             yield Case(
                 not moved, leg.commands[1].exchange, f"rest after {leg.what}", f"{moved}, {after:.1f} s after the stop"

@@ -5,10 +5,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator
 
+from conformance.measures.samples import SEVERAL
 from conformance.rules.motion.judging import ALL, at, driven, legs_of, off, reached, usable
 from conformance.scenarios.motion.attempts import attempts_at_rest
 from conformance.scenarios.motion.moves import clamped_targets
-from conformance.scenarios.motion.trace import SEVERAL, Drive, Leg, Quiet, Tried, fastest, is_refusal, is_soap
+from conformance.scenarios.motion.resting import fastest
+from conformance.scenarios.motion.trace import Drive, Leg, Quiet, Tried, is_refusal, is_soap
 from conformance.scenarios.motion.velocities import clamped_velocities
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from conformance.measures.samples import SEVERAL
 from conformance.rules.motion.judging import off, stopped, usable
 from conformance.scenarios.motion.moves import stops, targets
 from conformance.scenarios.motion.states import agreement, switched
-from conformance.scenarios.motion.trace import SEVERAL, Leg, Reading, Switched, Told
+from conformance.scenarios.motion.trace import Leg, Reading, Switched, Told
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.case import Case

@@ -5,8 +5,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 
+from conformance.measures.samples import SEVERAL, longest_s
 from conformance.rules.motion.judging import at, driven, is_each_late, measured, must_rest_from, off, went_on
-from conformance.scenarios.motion.trace import SEVERAL, Command, Drive, Reading, fastest, longest_s
+from conformance.scenarios.motion.resting import crept, fastest
+from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.motion.velocities import let_go, velocities
 from conformance.scenarios.rule import NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
@@ -15,6 +17,8 @@ from conformance.verdict.case import Case
 # Of the hold time: within that part the device must still drive, and at least at this part of its velocity.
 _HELD = (0.2, 0.7)
 _STILL_DRIVES = 0.5
+# A velocity holds for at most so much longer than its hold time, as a part of it, and s.
+_LONGER, _LONGER_S = 0.4, 0.25
 # So long after a refusal a device that it stops is seen to be slower, s.
 _SLOWS_S = 0.1
 
@@ -25,13 +29,13 @@ def velocity(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     yield from driven(trace, motion)
 
 
-def _at_rest(readings: list[Reading], motion: MotionMap) -> str | None:
+def _at_rest(readings: list[Reading], drive: Drive, motion: MotionMap) -> str | None:
     """Return what still moves in some readings; empty if nothing does, None if they do not show it."""
     seen = tuple(one for one in readings if one.values)
     if len(seen) < 2 * SEVERAL:
         return None
     moved = off(at(seen[-SEVERAL:], motion), at(seen[:SEVERAL], motion), motion)
-    return moved or fastest(readings, motion)
+    return moved or fastest(readings, motion) or crept(readings, motion, drive.resting)
 
 
 @rule("motion/velocity-stop", on=(velocities,))
@@ -51,7 +55,7 @@ def _ended(drive: Drive, end: Command, settle_s: float, motion: MotionMap, *, ex
         yield Case(holds=False, exchange=end.exchange, expected=f"a 2xx for velocity 0 after {drive.named}")
         return
     due = must_rest_from(end, drive.readings, excused=excused) + settle_s
-    moved = _at_rest([one for one in drive.after if one.sent >= due], motion)
+    moved = _at_rest([one for one in drive.after if one.sent >= due], drive, motion)
     if not excused and not moved:
         axes = motion.velocity.axes if motion.velocity else {}
         speeds = {axes[name].of: speed * axes[name].scale for name, speed in drive.wanted.items() if axes[name].of}
@@ -75,8 +79,24 @@ def watchdog(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
             continue
         last, within_s = drive.commands[-1], motion.velocity.hold_s + motion.velocity.settle_s
         due = last.answered + within_s + longest_s(drive.readings)
-        moved = _at_rest([one for one in drive.after if one.sent >= due], motion)
+        moved = _at_rest([one for one in drive.after if one.sent >= due], drive, motion)
+        moved = moved or _still_driven(drive, due, motion.velocity.hold_s, motion) or moved
         yield from _rests(moved, drive, f"rest {within_s:g} s after the last command ({drive.named})")
+
+
+def _still_driven(drive: Drive, due: float, hold_s: float, motion: MotionMap) -> str:
+    """Return what is as fast as it was commanded, long after the hold time; empty if nothing is.
+
+    A device that is coming to rest by then is slower: commands and readings are delayed by part of the settle time.
+    """
+    settle_s = motion.velocity.settle_s if motion.velocity else 0.0
+    late = due - settle_s + max(_LONGER * hold_s, settle_s / 2, _LONGER_S)
+    seen = [one for one in drive.after if late <= one.sent and one.received <= due]
+    for name, wanted in drive.wanted.items():
+        found = measured(seen, name, motion) if wanted else None
+        if found is not None and abs(found - wanted) <= motion.speed_tolerance(name) < abs(wanted) / 2:
+            return f"{name} at {found:.4g} per second, {seen[0].sent - drive.commands[-1].answered:.2f} s after it"
+    return ""
 
 
 def _held(drive: Drive, hold_s: float) -> tuple[float, float]:

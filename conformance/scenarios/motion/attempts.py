@@ -9,7 +9,8 @@ from typing import Any, Final
 
 from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice
 from conformance.scenarios.motion.moves import beyond
-from conformance.scenarios.motion.trace import Quiet, Tried, fastest
+from conformance.scenarios.motion.resting import fastest
+from conformance.scenarios.motion.trace import Quiet, Tried
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.statement.motion_map import Axis, Goto, Speed, Velocity

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+from conformance.measures.samples import SEVERAL
 from conformance.scenarios.motion.mapped import MappedDevice, Position
 from conformance.scenarios.motion.room import MEASURABLE, Span
-from conformance.scenarios.motion.trace import SEVERAL, Reading
+from conformance.scenarios.motion.trace import Reading
 from conformance.scenarios.scenario import NotPossibleError
 
 # A drive back: this share of the limit, and so long at most, s.
@@ -35,7 +36,8 @@ def with_room(mapped: MappedDevice, choices: Sequence[Mapping[str, float]], last
     for name in {name for one in choices for name, speed in one.items() if speed} & mapped.room.unknown:
         _learn(mapped, name)
     share, begin = mapped.room.plan(choices, lasts_s)
-    mapped.come_to_rest()
+    if not mapped.rests:
+        mapped.come_to_rest()
     here = mapped.where()
     away = {name: span for name, span in begin.items() if not span[0] <= here[name] <= span[1]}
     if away and mapped.motion.goto is not None:

@@ -8,11 +8,13 @@ from typing import Any, Final
 from urllib.parse import urlsplit
 
 from conformance.api.rest.interface import RestInterface
+from conformance.measures.samples import SEVERAL
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.scenarios.motion.binding import Binding, JsonBinding
+from conformance.scenarios.motion.resting import at_rest, fastest
 from conformance.scenarios.motion.room import Room
 from conformance.scenarios.motion.templates import NoValueError, at, filled, numbers_at, seconds_of
-from conformance.scenarios.motion.trace import SEVERAL, Command, Leg, Reading, fastest, middle_of
+from conformance.scenarios.motion.trace import Command, Leg, Reading, Resting, middle_of
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.motion_map import Goto, MotionMap, Stop, Switch, Velocity, names_in
 from conformance.transport.client import is_drafting
@@ -45,6 +47,8 @@ class MappedDevice:
     Attributes:
         home: where it is brought between scenarios: near where it was at first, well within its limits.
         room: how far its velocities take it.
+        resting: what it shows at rest.
+        rests: whether it was seen at rest since it was last commanded.
 
     Raises:
         NotPossibleError: where it is cannot be read.
@@ -65,8 +69,11 @@ class MappedDevice:
         self.room = Room(motion)
         self._answer: Any = None
         self._read_at = 0.0
+        self.resting, self.rests = Resting(), False
         here = self.where() if looks else {}
         self.home = {name: motion.state.axes[name].well_inside(value) for name, value in here.items()}
+        if looks:
+            self.resting = at_rest(self.watch(self.clock.now() + STAYS_S), motion)
         api.stop_device = self.leave_at_rest
 
     @property
@@ -173,11 +180,14 @@ class MappedDevice:
         self, given: Goto | Velocity | Switch | Stop, values: Mapping[str, Any], *, authorized: bool = True
     ) -> Outgoing:
         """Return the request of a command; see call_of()."""
+        self.rests = False
         return self.binding.made(*self.call_of(given, values), authorized=authorized)
 
-    def _sent(self, made: Outgoing, targets: Position, timeout_s: float | None = None) -> Command:
+    def _sent(
+        self, made: Outgoing, targets: Position, timeout_s: float | None = None, *, authorized: bool = True
+    ) -> Command:
         sent = self.clock.now()
-        exchange = self.send(made, timeout_s=timeout_s)
+        exchange = self.send(made, timeout_s=timeout_s, authorized=authorized)
         return Command(sent, self.clock.now(), targets, exchange)
 
     def goto(self, targets: Mapping[str, float], ends: Mapping[str, float] | None = None) -> Command:
@@ -191,13 +201,16 @@ class MappedDevice:
             self.note(command.exchange)
         return command
 
-    def drive(self, speeds: Mapping[str, float]) -> Command:
-        """Command velocities; those without a value are 0.
+    def drive(self, speeds: Mapping[str, Any], *, integers: bool = False, authorized: bool = True) -> Command:
+        """Command velocities; those without a value are 0. ``integers``: write whole numbers without a fraction.
 
         Raises:
             NoAnswerError: there is no response.
         """
-        return self._sent(self.request_of(self.drives, speeds), {**dict.fromkeys(self.drives.axes, 0.0), **speeds})
+        wanted = {**dict.fromkeys(self.drives.axes, 0.0), **speeds}
+        written = {name: int(one) if integers and one == int(one) else one for name, one in wanted.items()}
+        made = self.request_of(self.drives, written, authorized=authorized)
+        return self._sent(made, wanted, authorized=authorized)
 
     def note(self, exchange: Exchange) -> None:
         """Keep the response to an accepted move, if it can be read: a stop may name its id."""
@@ -231,6 +244,12 @@ class MappedDevice:
         if command is not None and command.refused and self.motion.stop and self.motion.velocity:
             self.drive({})
         return command
+
+    def saw_rest(self, readings: Sequence[Reading]) -> None:
+        """Note whether the last ones of some readings show the device at rest."""
+        last = [one for one in readings[-2 * SEVERAL :] if one.values or one.speeds]
+        stays = not self.motion.state.axes or all(self.is_near(one.values, last[0].values) for one in last)
+        self.rests = len(last) == 2 * SEVERAL and stays and not fastest(last, self.motion)
 
     def watch(self, until: float, is_over: Callable[[list[Reading]], object] = lambda _: False) -> list[Reading]:
         """Read until a time, s of the clock, and once more after it, or until ``is_over``."""
@@ -355,6 +374,7 @@ class MappedDevice:
             seen = self.watch(self.clock.now() + STAYS_S)
             stays = self.is_near(self.where(), before) if before else any(one.speeds for one in seen)
             if stays and not fastest(seen, self.motion):
+                self.rests = True
                 return
             if self.clock.now() > until:
                 break

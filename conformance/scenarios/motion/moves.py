@@ -106,13 +106,13 @@ def _axes(mapped: MappedDevice, effort: Effort) -> list[str]:
     return axes[:1] if effort.name == "quick" else axes
 
 
-def _way(mapped: MappedDevice, name: str) -> _Way:
-    """Set out from one end of an axis to the other; return when the move is partly done."""
+def _way(mapped: MappedDevice, name: str, share: float = _UNDER_WAY) -> _Way:
+    """Set out from one end of an axis to the other; return when a share of the move is done."""
     begin, end = mapped.motion.state.axes[name].limits
     mapped.go("one end", {name: begin})
     start = mapped.where()
     command = mapped.goto({name: end})
-    part = abs(end - begin) * _UNDER_WAY
+    part = abs(end - begin) * share
     seen = mapped.watch(
         command.answered + mapped.takes_s,
         lambda so_far: bool(so_far[-1].values) and abs(so_far[-1].values[name] - begin) > part,
@@ -128,25 +128,33 @@ def stops(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
 
 
 def _to_stops(mapped: MappedDevice, effort: Effort, rests_s: float) -> Iterator[Leg]:
-    for name in _axes(mapped, effort):
+    axes, shown = mapped.motion.state.axes, False
+    for name in axes:
+        if shown and effort.name == "quick":
+            return
+        part = _UNDER_WAY
         for _ in range(TRIES):
-            leg = _stopped(mapped, name, rests_s)
+            leg = _stopped(mapped, name, part, rests_s)
             # Each is judged: a stop that comes too late every second time shows in the one that was spoilt.
             yield leg
-            in_time = not leg.commands[1].was_late(leg.readings)
-            if in_time and leg.was_under_way(name, mapped.motion.tolerance(name)):
+            under_way = leg.was_under_way(name, mapped.motion.tolerance(name))
+            if under_way and not leg.commands[1].was_late(leg.readings):
                 break
+            part = part if under_way else part / TRIES
+        shown = shown or under_way
 
 
-def _stopped(mapped: MappedDevice, name: str, rests_s: float) -> Leg:
+def _stopped(mapped: MappedDevice, name: str, part: float, rests_s: float) -> Leg:
     _drive_before(mapped)
-    way = _way(mapped, name)
+    way = _way(mapped, name, part)
     stop = mapped.stop()
     if stop is None:
         raise NotPossibleError("the stop names a value that the response to the move does not have")
     until = min(mapped.due(stop), stop.answered + _AT_MOST_S)
     seen = way.readings + mapped.watch(max(until, stop.answered + rests_s + _AT_LEAST_S))
-    return Leg(f"a stop of {name} under way", way.start, (way.command, stop), tuple(seen), mapped.due(stop))
+    return Leg(
+        f"a stop of {name} under way", way.start, (way.command, stop), tuple(seen), mapped.due(stop), mapped.resting
+    )
 
 
 def _drive_before(mapped: MappedDevice) -> None:

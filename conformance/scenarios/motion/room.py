@@ -9,7 +9,8 @@ import itertools
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from conformance.scenarios.motion.trace import LATE, SEVERAL, Reading, middle_of, usual_s
+from conformance.measures.samples import LATE, SEVERAL, usual_s
+from conformance.scenarios.motion.trace import Reading, middle_of
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_map import MotionMap
 
@@ -63,7 +64,9 @@ class Room:
             down, up = self._way(name, choices, _FASTER * (lasts_s + _BLIND * self.slowest_s))
             if down + up > 0:
                 ways[name] = down, up
-                share = min(share, (axis.limits[1] - axis.limits[0]) / (down + up))
+                # A device is brought to where the drive begins within its tolerance.
+                free = axis.limits[1] - axis.limits[0] - 2 * self._motion.tolerance(name)
+                share = min(share, max(0.0, free) / (down + up))
         for name, speed in ((name, speed) for one in choices for name, speed in one.items() if speed):
             if share < 1 and share * abs(speed) < MEASURABLE * self._motion.speed_tolerance(name):
                 raise NotPossibleError(

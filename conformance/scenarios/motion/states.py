@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from conformance.measures.samples import SEVERAL
 from conformance.observe.polling import poll_for
 from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice
 from conformance.scenarios.motion.moves import recorded
 from conformance.scenarios.motion.templates import NoValueError, at, numbers_at
-from conformance.scenarios.motion.trace import SEVERAL, Reading, Switched, Told
+from conformance.scenarios.motion.trace import Reading, Switched, Told
 from conformance.scenarios.scenario import NotDeclaredError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange

@@ -10,14 +10,10 @@ from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
 
-from conformance.statement.motion_map import MotionMap
+from conformance.measures.samples import LATE, Noise, usual_s
 from conformance.transport.exchange import Exchange
 
-#: So many readings in a row show where a device is, whatever one of them says.
-SEVERAL = 3
-#: A response is late that takes so many times as long as a reading usually does,
-LATE = 3
-# and at least so long, s.
+# A late response takes at least so long, s.
 _LATE_S = 0.1
 
 
@@ -41,6 +37,14 @@ class Reading:
     exchange: Exchange
     speeds: dict[str, float] = field(default_factory=dict)
     action: str = ""
+
+
+@dataclass(frozen=True)
+class Resting:
+    """What a device at rest shows before anything moves it, by axis and by velocity."""
+
+    axes: dict[str, Noise] = field(default_factory=dict)
+    speeds: dict[str, Noise] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -83,6 +87,7 @@ class Leg:
         commands: in order.
         readings: from the first command on.
         due: when the last accepted target must have been reached.
+        resting: what it shows at rest.
     """
 
     what: str
@@ -90,6 +95,7 @@ class Leg:
     commands: tuple[Command, ...]
     readings: tuple[Reading, ...]
     due: float
+    resting: Resting = Resting()
 
     def after(self, moment: float) -> tuple[Reading, ...]:
         """Return the usable readings that were requested after a moment."""
@@ -125,6 +131,7 @@ class Drive:
         after: the readings after that.
         refused: a command after the last one that the device must refuse; None: none was sent.
         slowed: that it was slower than planned, as the limits leave no room; empty: it was not.
+        resting: what the device shows at rest.
     """
 
     what: str
@@ -135,6 +142,7 @@ class Drive:
     after: tuple[Reading, ...]
     refused: Command | None = None
     slowed: str = ""
+    resting: Resting = Resting()
 
     @property
     def named(self) -> str:
@@ -224,27 +232,6 @@ class Quiet:
     alone: tuple[Quiet, ...] = ()
     idle: Quiet | None = None
     home: dict[str, float] = field(default_factory=dict)
-
-
-def usual_s(readings: Sequence[Reading]) -> float:
-    """Return how long a reading takes, by the median, s."""
-    return median(one.received - one.sent for one in readings) if readings else 0.0
-
-
-def longest_s(readings: Sequence[Reading]) -> float:
-    """Return how long the slowest reading took, s: a loaded machine or link may delay anything else by as much."""
-    return max((one.received - one.sent for one in readings), default=0.0)
-
-
-def fastest(readings: Sequence[Reading], motion: MotionMap) -> str:
-    """Return a measured velocity that is not zero in some readings in a row; empty if there is none."""
-    seen = [one.speeds for one in readings if one.speeds]
-    for window in (seen[index : index + SEVERAL] for index in range(len(seen) - SEVERAL + 1)):
-        for name in window[0]:
-            speed = median(one[name] for one in window)
-            if abs(speed) > motion.speed_tolerance(name):
-                return f"{name} at {speed:.4g} per second"
-    return ""
 
 
 def is_refusal(exchange: Exchange) -> bool:

@@ -2,32 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+import math
+import random
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
+from conformance.measures.samples import SEVERAL, longest_s
 from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import MappedDevice, Position
 from conformance.scenarios.motion.moves import TRIES, beyond, recorded
-from conformance.scenarios.motion.trace import SEVERAL, Command, Drive, Reading, longest_s
+from conformance.scenarios.motion.resting import creeping
+from conformance.scenarios.motion.room import MEASURABLE
+from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
 
 _NEEDS: Final = (Need.REST, Need.MOTION)
 # For so long a velocity is measured once it must be reached, s.
 MEASURED_S: Final = 0.5
-# Of the limit: velocities.
-_SHARES: Final = (1.0, 0.4)
+# Of the limit: a slow velocity, and the slowest.
+_SLOW: Final = 0.4
+_SLOWEST: Final = 0.1
 # A slow drive lasts longer than the hold time, up to this, so that a renewed command is seen to last, s.
 _LONGEST_HOLD_S: Final = 2.0
-# After this part of the hold time a command that must be refused follows the last one.
-_REFUSED_AT: Final = 0.6
+# After these parts of the hold time commands that must be refused follow the last one: after the first the device is
+# seen to drive on, and the second renews nothing.
+_REFUSED_AT: Final = (0.1, 0.9)
 # A device is told its velocity that often within its hold time, at least every so many s.
 _KEPT: Final = 3
 _KEPT_S: Final = 0.1
 # After the time to rest it is watched for so long, s.
 _REST_S: Final = 0.5
+# So long one is watched that still moves a little: one that creeps does so on and on, s.
+_SLOWS_S: Final = 2.0
 # And by at most so many readings more.
 _MORE: Final = 50
 # The speed is learned from so many readings.
@@ -36,24 +48,44 @@ _NOTED: Final = 50
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
 def velocities(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
-    """Drive each axis at its limits and slowly, there and back; end each drive with velocity 0.
+    """Drive each axis at its limits and slowly, there and back, and two at once; end each drive with velocity 0.
 
-    At quick there at one limit, and back slowly.
+    At quick each axis at its limits, and slowly two at once, or the only one back.
     """
     return recorded(
         drive
-        for name, axis in mapped.drives.axes.items()
-        for speed in _speeds(list(_there_and_back(mapped, axis.limits, axis.of)), effort)
-        for drive in _drives(
-            mapped, f"{name} {speed:g}", {name: speed}, longer=abs(speed) < max(map(abs, axis.limits)) / 2
-        )
+        for speeds, longer in _planned(mapped, quick=effort.name == "quick")
+        for drive in _drives(mapped, _named(speeds), speeds, longer=longer)
     )
 
 
-def _speeds(limits: list[float], effort: Effort) -> list[float]:
-    if effort.name == "quick" and len(limits) == len(_SHARES):
-        return [share * limit for share, limit in zip(_SHARES, limits, strict=True)]
-    return [share * limit for share in _SHARES for limit in limits]
+def _planned(mapped: MappedDevice, *, quick: bool) -> Iterator[tuple[Position, bool]]:
+    """Yield velocities, and whether they are to outlast the hold time."""
+    several = list(_at_once(mapped))
+    for name, axis in mapped.drives.axes.items():
+        ends = list(_there_and_back(mapped, axis.limits, axis.of))
+        yield from (({name: limit}, False) for limit in ends)
+        slow = ends[-1:] if quick else ends
+        yield from (({name: _SLOW * limit}, True) for limit in slow if not (quick and several))
+    yield from ((speeds, not number) for number, speeds in enumerate(several[:2] if quick else several))
+
+
+def _at_once(mapped: MappedDevice) -> Iterator[Position]:
+    """Yield velocities of the first two axes at once, in each direction, so slow that no wheel limits them."""
+    two = list(mapped.drives.axes.items())[:2]
+    if len(two) > 1:
+        for ends in itertools.product(*(filter(None, axis.limits) for _, axis in two)):
+            yield {name: _SLOW * end for (name, _), end in zip(two, ends, strict=True)}
+
+
+def _slowest(mapped: MappedDevice, name: str, limit: float) -> Position:
+    """Return a velocity that is just fast enough to be told from rest."""
+    least = MEASURABLE * mapped.motion.speed_tolerance(name)
+    return {name: math.copysign(min(max(_SLOWEST * abs(limit), least), _SLOW * abs(limit)), limit)}
+
+
+def _named(speeds: Position) -> str:
+    return " and ".join(f"{name} {speed:g}" for name, speed in speeds.items())
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
@@ -70,32 +102,55 @@ def clamped_velocities(mapped: MappedDevice) -> tuple[Drive, ...]:
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
-def let_go(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
-    """Command a velocity, and then nothing any more, as when the client vanishes or the network breaks."""
+def let_go(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Drive, ...]:
+    """Command a velocity, and then nothing any more, as when the client vanishes or the network breaks.
+
+    A watchdog may work after every other command, for some directions or sizes of a velocity alone, only while somebody
+    reads, or until a command is refused. At quick the seed says which of them are tried.
+    """
     hold_s = mapped.drives.hold_s
     if hold_s is None:
         raise NotDeclaredError("the map declares no hold_s: the device goes on until it is told otherwise")
-    return recorded(_let_go(mapped, effort, hold_s))
+    chance = random.Random(f"{run.seed}/let go")  # noqa: S311 - no secret
+    return recorded(_let_go(mapped, hold_s, chance, quick=effort.name == "quick"))
 
 
-def _let_go(mapped: MappedDevice, effort: Effort, hold_s: float) -> Iterator[Drive]:
+def _let_go(mapped: MappedDevice, hold_s: float, chance: random.Random, *, quick: bool) -> Iterator[Drive]:
     axes = list(mapped.drives.axes.items())
-    quick, made = effort.name == "quick", 0
-    for turn in range(1 if quick else 2):
-        for name, axis in axes[:1] if quick else axes:
-            for limit in _there_and_back(mapped, axis.limits, axis.of):
-                # An odd number of commands and an even one: a watchdog may work after every other command. And with
-                # readings and without: one may work only while somebody asks.
-                silent = made == 1 if quick else turn == 1
-                what = f"{name} {limit:g}, let go" + (", and nothing is read until it must rest" if silent else "")
-                yield from _drives(mapped, what, {name: limit}, let_go_s=hold_s, more=made % 2, silent=silent)
-                made += 1
-    name, axis = axes[0]
-    limit = next(_there_and_back(mapped, axis.limits, axis.of))
-    if mapped.drives.beyond_limits == "refused":
-        refused = {name: next(value for _, end, value in beyond({name: axis}) if end == limit)}
-        what = f"{name} {limit:g}, let go, with {name} {refused[name]:g} after it, which must be refused"
+    ends = {name: list(_there_and_back(mapped, axis.limits, axis.of)) for name, axis in axes}
+    limits = [{name: limit} for name in list(ends)[: 1 if quick else None] for limit in ends[name]]
+    others = list(_at_once(mapped))
+    chance.shuffle(others)
+    slowest = [_slowest(mapped, name, chance.choice(ends[name])) for name in ends]
+    chance.shuffle(slowest)
+    others = [*others[:2], *slowest[:1]] if quick else [*limits, *others, *slowest]
+    refusals = list(_refusals(mapped))
+    chance.shuffle(refusals)
+    for made, speeds in enumerate([*limits, *others]):
+        # An odd number of commands and an even one; and with readings and without.
+        silent = made == 1 if quick else len(limits) <= made < 2 * len(limits)
+        what = f"{_named(speeds)}, let go" + (", and nothing is read until it must rest" if silent else "")
+        yield from _drives(mapped, what, speeds, let_go_s=hold_s, more=made % 2, silent=silent)
+    name = axes[0][0]
+    for kind, refused in refusals[: 1 if quick else None]:
+        limit = next(_there_and_back(mapped, axes[0][1].limits, axes[0][1].of))
+        what = f"{name} {limit:g}, let go, with {kind} after it, which must be refused"
         yield from _drives(mapped, what, {name: limit}, let_go_s=hold_s, refused=refused)
+
+
+def _refusals(mapped: MappedDevice) -> Iterator[tuple[str, Callable[[], Command]]]:
+    """Yield commands that the device must refuse, each as a noun phrase and as what sends it."""
+    name, axis = next(iter(mapped.drives.axes.items()))
+    if mapped.drives.beyond_limits == "refused":
+        for _, _, value in beyond({name: axis}):
+            yield f"{name} {value:g}", partial(mapped.drive, {name: value})
+    if mapped.binding.forbids(*mapped.call_of(mapped.drives, {name: "far"})):
+        yield f'the text "far" as {name}', partial(mapped.drive, {name: "far"})
+    if mapped.binding.has_credentials:
+        yield (
+            f"{name} {axis.limits[1]:g} without credentials",
+            partial(mapped.drive, {name: axis.limits[1]}, authorized=False),
+        )
 
 
 def _there_and_back(mapped: MappedDevice, limits: tuple[float, float], of: str) -> Iterator[float]:
@@ -117,7 +172,7 @@ def _drives(
     let_go_s: float | None = None,
     more: int = 0,
     longer: bool = False,
-    refused: Position | None = None,
+    refused: Callable[[], Command] | None = None,
     silent: bool = False,
 ) -> Iterator[Drive]:
     """Drive at a velocity; again, if a slow link let the hold time pass, or velocity 0 was answered late.
@@ -132,11 +187,13 @@ def _drives(
         let_go_s: its hold time, if nothing is sent after the drive; None: velocity 0 is.
         more: how often the velocity is sent once more at the end.
         longer: whether the drive outlasts the hold time.
-        refused: velocities that the device must refuse, sent after the last command; None: none are.
+        refused: sends what the device must refuse after the last command; None: nothing is sent.
         silent: whether nothing is read until the device must rest.
     """
     drives, hold_s = mapped.drives, mapped.drives.hold_s or 0.0
-    lasts_s = max(drives.settle_s, hold_s if longer and hold_s <= _LONGEST_HOLD_S else 0.0) + MEASURED_S
+    # One that is let go is measured in its hold time.
+    measured_s = MEASURED_S if let_go_s is None else 0.0
+    lasts_s = max(drives.settle_s, hold_s if longer and hold_s <= _LONGEST_HOLD_S else 0.0) + measured_s
     for _ in range(TRIES):
         # What follows the last reading: velocity 0 or the hold time, and until the device rests.
         rests_s = (let_go_s or 0.0) + more * mapped.room.slowest_s + drives.settle_s
@@ -147,13 +204,14 @@ def _drives(
         commands, readings, whole = _kept_up(mapped, made, lasts_s, rests_s)
         commands += [mapped.drive(made) for _ in range(more if whole else 0)]
         wanted = {**dict.fromkeys(drives.axes, 0.0), **made, **(ends or {})}
-        drive = Drive(what, wanted, tuple(commands), tuple(readings), None, (), slowed=slowed)
+        drive = Drive(what, wanted, tuple(commands), tuple(readings), None, (), slowed=slowed, resting=mapped.resting)
         if let_go_s is not None and not whole:
             # The next try begins elsewhere, or is slower: this one has shown how far the device comes.
             mapped.come_to_rest()
             continue
         drive = _ended(mapped, drive, let_go_s, refused, silent=silent)
-        yield drive
+        if drive.refused is None or not drive.refused.accepted:
+            yield drive
         in_time = drive.end is None or not drive.end.was_late(drive.readings)
         if whole and in_time and drive.was_kept(drives.hold_s):
             return
@@ -179,16 +237,19 @@ def _kept_up(
 
 
 def _ended(
-    mapped: MappedDevice, drive: Drive, let_go_s: float | None, refused: Position | None, *, silent: bool
+    mapped: MappedDevice, drive: Drive, let_go_s: float | None, refused: Callable[[], Command] | None, *, silent: bool
 ) -> Drive:
     """End a drive by velocity 0, or let the device go; return it with what came after."""
-    end = mapped.drive({}) if let_go_s is None else None
+    end = mapped.drive({}, integers=True) if let_go_s is None else None
     last = end or drive.commands[-1]
     rests_at = last.answered + (let_go_s or 0.0) + mapped.drives.settle_s
-    after, answer = list[Reading](), None
+    answer: Command | None = None
+    after: list[Reading] = []
     if refused is not None and let_go_s is not None:
-        after = mapped.watch(last.answered + _REFUSED_AT * let_go_s)
-        answer = mapped.drive(refused)
+        for part in _REFUSED_AT:
+            after += mapped.watch(last.answered + part * let_go_s)
+            one = refused()
+            answer = one if answer is None or one.accepted else answer
     if silent:
         mapped.clock.sleep(rests_at - mapped.clock.now())
     due, speeds = rests_at + mapped.room.slowest_s, drive.wanted
@@ -205,6 +266,10 @@ def _ended(
         if len(counted) >= 2 * SEVERAL or seen_enough(after):
             break
         after.append(mapped.read())
+    if creeping([one for one in after if one.sent >= rests_at], mapped.motion, mapped.resting):
+        # It may come to rest yet.
+        after += mapped.watch(after[-1].sent + _SLOWS_S, seen_enough)
     if end is None:
         mapped.stop()
+    mapped.saw_rest(after)
     return replace(drive, end=end, after=tuple(after), refused=answer)

@@ -24,6 +24,7 @@ class Body:
     Attributes:
         moves: how many moves it has taken.
         takes_second: whether a device that takes one move at a time takes a second one all the same.
+        refuses_integers: whether it refuses numbers that are written without a fraction.
         state: what the last move says of itself.
         later: what it does later, by time.
     """
@@ -35,6 +36,7 @@ class Body:
     seed: int = 0
     moves: int = 0
     takes_second: bool = False
+    refuses_integers: bool = False
     state: str = "done"
     later: list[tuple[float, Callable[[float], None]]] = field(default_factory=list)
 
@@ -94,6 +96,9 @@ class Body:
         self.start = self.at(now)
         self.target, self.began, self.seconds, self.state = dict(self.start), now, 1e-3, "done"
         self.speeds, self.held_until = dict(speeds), now + hold_s
+
+    def refused(self, now: float) -> None:
+        """Take note of a velocity that was refused."""
 
     def halt(self, now: float) -> None:
         """Stop where it is."""

@@ -9,7 +9,6 @@ from body import Body
 
 from conformance.observe.clock import SimulatedClock
 from conformance.scenarios.motion import attempts, several
-from conformance.scenarios.motion.binding import JsonBinding
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.effort import Effort
@@ -51,13 +50,8 @@ class _Cut:
         self._client.cut_off()
 
 
-class _Binding(JsonBinding):
-    """The description's rules without a contract: what is no number is forbidden."""
-
+class _Binding(simulated.Binding):
     has_credentials = True
-
-    def forbids(self, _call, body):
-        return any(not isinstance(one, int | float) for one in body.values())
 
 
 def played(careless, sway=0.0, phase=0.0):

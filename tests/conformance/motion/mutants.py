@@ -5,7 +5,8 @@ Each mutant is a function that changes a body (body.py) in one way.
 # ruff: noqa: ARG001, ARG005 - effects of one kind have one signature
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from functools import partial
+from typing import Any, Final
 
 from body import Body, Position
 
@@ -385,6 +386,152 @@ def velocity_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
     yield "resumes-after-stop", _resumed
     yield "not-renewed", changed(deaf)
     yield "hold-short", changed(lambda _, speeds, hold_s: (speeds, 0.3 * hold_s))
+
+
+def _lapsing(every: int) -> Change:
+    """Return a mutant that drives on for long at every so manieth end of a hold time."""
+
+    def change(body: Body) -> None:
+        right, ended, turn = body.drive, [0], [0]
+
+        def drive(speeds: Position, hold_s: float, now: float) -> None:
+            turn[0] += 1
+            right(speeds, hold_s, now)
+            if any(speeds.values()):
+                body.later.append((now + hold_s - 1e-3, partial(end, turn[0], speeds)))
+
+        def end(began: int, speeds: Position, due: float) -> None:
+            if began == turn[0]:
+                ended[0] += 1
+                if ended[0] % every == 0:
+                    right(speeds, 10.0, due)
+
+        body.drive = drive  # type: ignore[method-assign]
+
+    return change
+
+
+_CREEP: Final = 0.02
+
+
+def _creeping_after_zero(body: Body) -> None:
+    right = body.drive
+
+    def drive(speeds: Position, hold_s: float, now: float) -> None:
+        still = not any(speeds.values())
+        right(dict.fromkeys(speeds, _CREEP) if still else speeds, 60.0 if still else hold_s, now)
+
+    body.drive = drive  # type: ignore[method-assign]
+
+
+def _creeping_after_hold(body: Body) -> None:
+    right, turn = body.drive, [0]
+
+    def drive(speeds: Position, hold_s: float, now: float) -> None:
+        turn[0] += 1
+        right(speeds, hold_s, now)
+        if any(speeds.values()):
+            body.later.append((now + hold_s, partial(creep, turn[0], speeds)))
+
+    def creep(began: int, speeds: Position, due: float) -> None:
+        if began == turn[0]:
+            right(dict.fromkeys(speeds, _CREEP), 60.0, due)
+
+    body.drive = drive  # type: ignore[method-assign]
+
+
+def _creeping_after_stop(body: Body) -> None:
+    right = body.halt
+
+    def halt(now: float) -> None:
+        moving = body.moving(now)
+        right(now)
+        if moving:
+            body.drive(dict.fromkeys(body.limits, _CREEP), 60.0, now)
+
+    body.halt = halt  # type: ignore[method-assign]
+
+
+def _zero(effect: Callable[[Body, Position, float, Callable[[Position, float, float], None]], None]) -> Change:
+    """Return a mutant of what velocity 0 does to a body that drives; the effect gets the velocity before."""
+
+    def change(body: Body) -> None:
+        right = body.drive
+
+        def drive(speeds: Position, hold_s: float, now: float) -> None:
+            before = dict(body.velocity(now))
+            if any(speeds.values()) or not any(before.values()):
+                right(speeds, hold_s, now)
+            else:
+                effect(body, before, now, right)
+
+        body.drive = drive  # type: ignore[method-assign]
+
+    return change
+
+
+def _resuming(body: Body, before: Position, now: float, right: Callable[[Position, float, float], None]) -> None:
+    right(dict.fromkeys(before, 0.0), 0.0, now)
+    body.later.append((now + 0.45, lambda due: right(before, 1.0, due)))
+
+
+def _after_refusal(effect: Callable[[Body, float], None]) -> Change:
+    """Return a mutant of what a refused velocity does to a body that drives."""
+
+    def change(body: Body) -> None:
+        body.refused = lambda now: effect(body, now) if any(body.velocity(now).values()) else None  # type: ignore[method-assign]
+
+    return change
+
+
+def finer_velocity_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
+    """Yield mutants that take some velocities wrongly, now and then, or come to rest slowly or not quite."""
+    first, second = axes
+
+    def changed(effect: Callable[[Body, Position, float], tuple[Position, float] | None]) -> Change:
+        def change(body: Body) -> None:
+            right = body.drive
+
+            def drive(speeds: Position, hold_s: float, now: float) -> None:
+                found = effect(body, speeds, hold_s)
+                if found is not None:
+                    right(*found, now)
+
+            body.drive = drive  # type: ignore[method-assign]
+
+        return change
+
+    def goes_on(when: Callable[[Position], bool]) -> Change:
+        return changed(lambda _, speeds, hold_s: (speeds, 60.0 if when(speeds) else hold_s))
+
+    def but(axis: str, value: Callable[[float], float]) -> Change:
+        return changed(lambda _, speeds, hold_s: ({**speeds, axis: value(speeds[axis])}, hold_s))
+
+    yield (
+        "velocity-deadband",
+        changed(lambda _, v, hold_s: ({a: x if abs(x) > 0.17 else 0.0 for a, x in v.items()}, hold_s)),
+    )
+    yield (
+        "velocity-half-when-both",
+        changed(lambda _, v, hold_s: ({a: x / 2 for a, x in v.items()} if all(v.values()) else v, hold_s)),
+    )
+    for axis in axes:
+        yield f"velocity-short-of-least:{axis}", but(axis, lambda x: max(x, -0.35))
+        yield f"velocity-forwards-only:{axis}", but(axis, lambda x: max(x, 0.0))
+    yield "watchdog-none-when-slow", goes_on(lambda v: 0 < max(map(abs, v.values())) < 0.35)
+    yield "watchdog-none-when-both", goes_on(lambda v: all(v.values()))
+    yield f"watchdog-none-back:{first}", goes_on(lambda v: v[first] < 0)
+    yield "watchdog-one-in-four", _lapsing(4)
+    yield "watchdog-one-in-two", _lapsing(2)
+    yield "velocity-stop-creeps-on", _creeping_after_zero
+    yield "watchdog-creeps-on", _creeping_after_hold
+    yield "stop-creeps-on", _creeping_after_stop
+    yield "velocity-stop-late", _zero(lambda body, v, now, right: right(v, 0.9, now))
+    yield "velocity-resumes", _zero(_resuming)
+    yield "refused-stops", _after_refusal(lambda body, now: body.drive(dict.fromkeys(axes, 0.0), 0.0, now))
+    yield "refused-renews", _after_refusal(lambda body, now: setattr(body, "held_until", now + 0.4))
+    yield "integers-refused", lambda body: setattr(body, "refuses_integers", True)
+    yield f"velocity-reversed-second:{second}", but(second, lambda x: -x)
 
 
 def agreement_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:

@@ -10,8 +10,9 @@ from pathlib import Path
 import careless
 from simulated import MUTANTS, RULES, cases_of, played
 
+from conformance.measures.samples import SEVERAL
 from conformance.rules.motion.judging import legs_of
-from conformance.scenarios.motion.trace import SEVERAL, Quiet, Switched, Told
+from conformance.scenarios.motion.trace import Quiet, Switched, Told
 
 # The mutant that shows what each requirement forbids.
 WRONG = {

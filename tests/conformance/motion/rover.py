@@ -154,10 +154,10 @@ class Rover:
             return 400, {"detail": "no JSON"}
         found = [wanted.get(name) for name in ("ahead", "left")] if isinstance(wanted, dict) else [None]
         speeds = [one for one in found if isinstance(one, int | float) and not isinstance(one, bool)]
-        if len(speeds) < len(LIMITS):
-            return 422, {"detail": "no velocity"}
-        if not all(abs(one) <= FASTEST for one in speeds):
-            return 422, {"detail": "too fast"}
+        integral = self.body.refuses_integers and all(isinstance(one, int) for one in speeds)
+        if len(speeds) < len(LIMITS) or integral or not all(abs(one) <= FASTEST for one in speeds):
+            self.body.refused(self.body.now())
+            return 422, {"detail": "no velocity, or too fast"}
         self.body.drive(dict(zip("xy", map(float, speeds), strict=True)), HOLD_S, self.body.now())
         return 200, {}
 

@@ -16,7 +16,7 @@ from rover import Rover
 from conformance.observe.clock import SimulatedClock
 from conformance.rules.motion import test_motion, test_motion_attempts, test_states, test_velocities
 from conformance.scenarios.motion import moves, several, states, velocities
-from conformance.scenarios.motion.binding import SoapBinding
+from conformance.scenarios.motion.binding import JsonBinding, SoapBinding
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.rule import Rule
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError
@@ -72,6 +72,15 @@ class Api:
         return Exchange(Request(method, f"http://device{path}", headers, body), Response(status, fields, octets, 2.0))
 
 
+class Binding(JsonBinding):
+    """The description's rules without a contract: what is no number is forbidden."""
+
+    has_credentials = False
+
+    def forbids(self, _call, body):
+        return any(not isinstance(one, int | float) for one in body.values())
+
+
 def one_after_another(rounds):
     """Send what several clients send at once: the simulated clock does not pass between them."""
     return [[to.send(one.method, one.target, headers=one.headers, body=one.body) for to, one in rounds[0]]]
@@ -91,7 +100,7 @@ def played(name, mutant=None, *, noise=0.0, seed=0, takes_s=lambda: 0.002, toml=
         mutant(body)
     motion = map_of(toml or DEVICES[name][2])
     api = Api(device(body), clock, takes_s)
-    binding = SoapBinding(api, dome.messages_of()) if name == "dome" else None
+    binding = SoapBinding(api, dome.messages_of()) if name == "dome" else Binding(api)
     mapped = MappedDevice(api, motion, clock, binding)
     # Making and reading XML takes most of the time of a camera's run.
     chosen = Effort(effort or ("quick" if name == "dome" else "standard"))

@@ -10,12 +10,12 @@ from simulated import Api, map_of
 
 from conformance.observe.clock import SimulatedClock
 from conformance.packs.table1.motion_map import motion_map_of
-from conformance.packs.table1.statement import load_robot_statement
+from conformance.papers_robot.statement import load_robot_statement
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.statement.motion_map import MotionMap
 
 _ROOT = Path(__file__).parents[3]
-_AREA = (67.3, 37.7, 69.3, 39.7)
+_AREA = (66.8, 37.2, 69.8, 40.2)
 
 
 def _statement(name="statement", **declared):

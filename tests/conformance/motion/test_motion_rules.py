@@ -4,6 +4,7 @@ import random
 import tomllib
 
 import msgspec
+import mutants
 import pytest
 from arm import MAP
 from careless import played as played_attempts
@@ -63,6 +64,26 @@ def test_mutants_by_rule_are_killed(name):
     survivors = [mutant for mutant, change in tried.items() if not _failed(name, change)[0]]
     assert len(MUTANTS[name]) >= 40
     assert len(survivors) <= 0.05 * len(tried), survivors
+
+
+@pytest.mark.parametrize(("name", "change"), list(mutants.finer_velocity_mutants(["x", "y"])))
+def test_a_velocity_that_is_taken_wrongly_now_and_then_or_not_quite_ended_is_found_at_quick(name, change):
+    failed = _failed("rover", change, effort="quick")[0]
+    assert failed & {f"motion/{one}" for one in ("velocity", "velocity-stop", "hold", "watchdog", "stop-lasts")}, name
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("name", ["rover", "arm"])
+def test_a_right_device_breaks_no_rule_at_quick(name, seed):
+    assert _failed(name, noise=0.004 if seed % 2 else 0.0, seed=seed, effort="quick")[0] == set()
+
+
+@pytest.mark.parametrize("tolerance", [0.02, 0.08, 0.14])
+def test_a_stop_is_seen_under_way_however_coarse_the_tolerance_is(tolerance):
+    toml = MAP.replace("tolerance = 0.02", f"tolerance = {tolerance}")
+    assert toml.count(f"tolerance = {tolerance}")
+    failed, judged = _failed("arm", toml=toml, effort="quick")
+    assert (failed, "motion/stop" in judged) == (set(), True)
 
 
 @pytest.mark.parametrize("seconds", [1, 2, 4, 9])

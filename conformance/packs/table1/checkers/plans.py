@@ -11,10 +11,11 @@ from typing import Any, Final
 from urllib.parse import parse_qsl, urlsplit
 
 from conformance.documents.representation import UnreadableError, local_name, parse_xml, read
+from conformance.measures.samples import FARTHEST
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, read_as
 from conformance.packs.table1.robot.plan import START_OFF, plan_of
-from conformance.packs.table1.robot.robot import FARTHEST, PLAN, POSE
+from conformance.packs.table1.robot.robot import PLAN, POSE
 from conformance.packs.table1.robot.state_over_soap import answered
 from conformance.packs.table1.statement import Statement
 from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange, Response

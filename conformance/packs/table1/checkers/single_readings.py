@@ -15,9 +15,10 @@ from typing import Any, Final, Generic, NamedTuple, TypeVar
 
 import msgspec
 
+from conformance.measures.samples import FARTHEST
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.geometry import Pose
-from conformance.packs.table1.robot.robot import FARTHEST, Velocity, is_near
+from conformance.packs.table1.robot.robot import Velocity, is_near
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
 from conformance.transport.exchange import Exchange
 from conformance.verdict.case import Case, case

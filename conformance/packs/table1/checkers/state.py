@@ -12,13 +12,14 @@ from statistics import median
 from typing import Any, Final
 
 from conformance.documents.json_shape import Shape
+from conformance.measures.samples import FARTHEST, SEVERAL
 from conformance.packs.table1.checkers.single_readings import BesideOdometry, OneSample
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.clock import Clock
 from conformance.packs.table1.robot.geometry import length_of
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST, VECTOR3, read_as
-from conformance.packs.table1.robot.robot import FARTHEST, LINEAR, POSE, VELOCITY, Velocity
-from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S, SEVERAL
+from conformance.packs.table1.robot.robot import LINEAR, POSE, VELOCITY, Velocity
+from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
 from conformance.transport.credentials import Credentials
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.case import Case, case

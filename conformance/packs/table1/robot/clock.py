@@ -4,6 +4,8 @@ from email.utils import parsedate_to_datetime
 from statistics import median
 from typing import Final
 
+from conformance.measures.samples import slope
+
 # The rate is told from readings at least so far apart, s: over 3 s, two late answers can make a right clock 10 % wrong.
 SPAN_S: Final = 5.0
 # Of all readings one in so long is kept, s; when there are too many, every other one of them.
@@ -64,13 +66,7 @@ class Clock:
         """
         if self.span_s < SPAN_S:
             return None
-        apart = self.span_s / 2
-        return median(
-            (later - earlier) / (there - here)
-            for index, (here, earlier) in enumerate(self._readings)
-            for there, later in self._readings[index + 1 :]
-            if there - here >= apart
-        )
+        return slope(self._readings)
 
     @property
     def fine_rate(self) -> float | None:

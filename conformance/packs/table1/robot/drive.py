@@ -7,13 +7,13 @@ from dataclasses import replace
 from http import HTTPStatus
 from typing import Final
 
+from conformance.measures.samples import SEVERAL
 from conformance.observe.clock import WALL_CLOCK
 from conformance.packs.table1.robot import drive_rules, windows
 from conformance.packs.table1.robot.drive_trace import ALL, Command, Reach, Sighting, Trace, Turn
 from conformance.packs.table1.robot.letting_go import COUNTED_ON_S, Way, certain_s
 from conformance.packs.table1.robot.renewing import Renewing, renewed
 from conformance.packs.table1.robot.robot import LINEAR, STILL, VELOCITY, Robot, Velocity
-from conformance.packs.table1.robot.windows import SEVERAL
 from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange

@@ -6,12 +6,13 @@ from collections.abc import Iterator, Sequence
 from http import HTTPStatus
 from typing import Any, Final
 
+from conformance.measures.samples import SEVERAL
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.drive_trace import Command, Reach, Trace
 from conformance.packs.table1.robot.message_shapes import TWIST, VECTOR3, read_as
 from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import Velocity, is_near
-from conformance.packs.table1.robot.windows import SEVERAL, middle, newest, shown, velocities
+from conformance.packs.table1.robot.windows import middle, newest, shown, velocities
 from conformance.scenarios.rule import NotTested, Outcome
 from conformance.transport.exchange import Exchange
 from conformance.verdict.case import Case

@@ -7,11 +7,12 @@ import itertools
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from conformance.measures.samples import FARTHEST, SEVERAL
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot import windows
 from conformance.packs.table1.robot.drive_trace import Turn
 from conformance.packs.table1.robot.geometry import wrapped
-from conformance.packs.table1.robot.robot import FARTHEST, STILL, Velocity, is_near
+from conformance.packs.table1.robot.robot import STILL, Velocity, is_near
 
 # Of a tolerance: by so much a velocity that holds may be off.
 _OFF: Final = 1.5
@@ -139,8 +140,8 @@ class LetGo:
     def is_decided(self, limits: Limits, ends: float) -> bool:
         """Return whether the robot rests, or several samples from after ``ends`` (s of the run's clock) can tell."""
         samples = windows.newest([turn for turn in self.turns if turn.at > ends])
-        lasts = self.turns[-1].at > ends + windows.SEVERAL * windows.LONGEST_SAMPLE_S
-        return self.rests(limits) or lasts or len(samples) >= windows.SEVERAL
+        lasts = self.turns[-1].at > ends + SEVERAL * windows.LONGEST_SAMPLE_S
+        return self.rests(limits) or lasts or len(samples) >= SEVERAL
 
     def early(self, limits: Limits) -> Turn | None:
         """Return the first reading in which the velocity ended before its hold time, or None.

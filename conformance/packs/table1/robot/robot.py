@@ -13,6 +13,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.documents.json_shape import Shape
 from conformance.documents.representation import projected
+from conformance.measures.samples import FARTHEST
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.observe.polling import Patience
 from conformance.packs.table1.limits import Limits
@@ -69,8 +70,6 @@ class Velocity(NamedTuple):
 STILL: Final = Velocity()
 
 
-# Of a sample's noise: one in fifteen thousand is farther off than this, if the noise is normal.
-FARTHEST: Final = 4.0
 # Odometry is no rarer than that where nothing is declared, Hz.
 _SELDOM_HZ: Final = 5.0
 

@@ -9,9 +9,10 @@ import msgspec
 from conformance.api.soap.service import SoapService
 from conformance.documents.json_shape import Shape
 from conformance.documents.representation import from_element
+from conformance.measures.samples import FARTHEST
 from conformance.packs.table1.robot.agreement import Slack, disagreement, stamp_of
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST
-from conformance.packs.table1.robot.robot import FARTHEST, GOAL_PATH, POSE, VELOCITY, Robot
+from conformance.packs.table1.robot.robot import GOAL_PATH, POSE, VELOCITY, Robot
 from conformance.packs.table1.robot.soap_services import ask, returned
 from conformance.transport.exchange import Exchange
 from conformance.verdict.case import Case

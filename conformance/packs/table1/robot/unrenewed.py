@@ -4,9 +4,10 @@ import math
 import random
 from typing import Final
 
+from conformance.measures.samples import FARTHEST
 from conformance.packs.table1.robot.abilities import ABOUT, AHEAD
 from conformance.packs.table1.robot.letting_go import Way
-from conformance.packs.table1.robot.robot import FARTHEST, Robot, Velocity
+from conformance.packs.table1.robot.robot import Robot, Velocity
 
 # Of a limit: a slow velocity. Or so many times what may be taken for rest, but never more than the last.
 _SLOW: Final = 0.1

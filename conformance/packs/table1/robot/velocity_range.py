@@ -2,9 +2,10 @@
 
 from typing import Final
 
+from conformance.measures.samples import FARTHEST
 from conformance.packs.table1.robot.abilities import ABOUT, AHEAD, handiest, turn_beside
 from conformance.packs.table1.robot.drive import Drive
-from conformance.packs.table1.robot.robot import FARTHEST, Robot, Velocity
+from conformance.packs.table1.robot.robot import Robot, Velocity
 
 # Where no limits are declared the robot may be slower than the figures that it is judged by.
 _UNDECLARED: Final = 0.6

@@ -5,15 +5,14 @@ several times; functions here count samples, told apart by their stamps. They ju
 """
 
 from collections.abc import Sequence
-from statistics import median
 from typing import Final
 
+from conformance.measures import samples as measures
+from conformance.measures.samples import SEVERAL
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.drive_trace import ALL, Turn
 from conformance.packs.table1.robot.robot import Velocity, is_near
 
-# So many samples tell: of three, one may be anything.
-SEVERAL: Final = 3
 # Where stamps do not tell: no robot's odometry is slower than this, so that a later reading is another sample, s.
 LONGEST_SAMPLE_S: Final = 0.25
 # What is still so far away, of what it was at first, has not come nearer.
@@ -46,7 +45,7 @@ def velocities(turns: Sequence[Turn]) -> list[Velocity]:
 
 def middle(readings: Sequence[Velocity]) -> Velocity:
     """Return the median of each component."""
-    return Velocity(*map(median, zip(*readings, strict=True)))
+    return Velocity(*measures.middle(readings))
 
 
 def part_of(velocity: Velocity, part: slice) -> Velocity:

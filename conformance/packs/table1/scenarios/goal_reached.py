@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
+from conformance.measures.samples import FARTHEST, SEVERAL
 from conformance.observe.polling import poll
 from conformance.packs.table1.robot import soap_services
 from conformance.packs.table1.robot.drive import Drive
@@ -18,8 +19,7 @@ from conformance.packs.table1.robot.goal_trace import GoalReached
 from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.message_shapes import ODOMETRY
 from conformance.packs.table1.robot.plan import ask, ask_over_soap, start_of
-from conformance.packs.table1.robot.robot import FARTHEST, POSE, Robot
-from conformance.packs.table1.robot.windows import SEVERAL
+from conformance.packs.table1.robot.robot import POSE, Robot
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange

@@ -9,6 +9,7 @@ from typing import Final
 
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
+from conformance.measures.samples import SEVERAL
 from conformance.packs.table1.robot import drive_rules
 from conformance.packs.table1.robot.abilities import ABOUT, AHEAD
 from conformance.packs.table1.robot.drive import Drive
@@ -22,7 +23,7 @@ from conformance.packs.table1.robot.soap_services import ask
 from conformance.packs.table1.robot.undisturbed import arc, renewed
 from conformance.packs.table1.robot.unrenewed import slow, unrenewed
 from conformance.packs.table1.robot.velocity_range import along_arc, both, fastest, handy, reach, slowest_along
-from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S, SEVERAL
+from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
 from conformance.packs.table1.scenarios.trace import Driven
 from conformance.scenarios.scenario import PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage

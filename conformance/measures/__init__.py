@@ -1,0 +1,1 @@
+"""Estimators: what several readings show together. Pure functions, which talk to no device and judge nothing."""

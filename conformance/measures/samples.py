@@ -1,0 +1,113 @@
+"""Medians, slopes and noise of several samples, of which no single one decides anything.
+
+A device publishes its state 5 to 100 times a second, with noise in each sample; a client may read it faster or slower.
+"""
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Sequence
+from statistics import median
+from typing import Final, NamedTuple, Protocol
+
+#: So many samples tell: of three, one may be anything.
+SEVERAL: Final = 3
+#: A response is late that takes so many times as long as one usually does.
+LATE: Final = 3
+# The standard deviation of normal noise, by the median distance from the median.
+_SIGMA: Final = 1.4826
+# Of a sample's noise: one in fifteen thousand is farther off than this, if the noise is normal.
+FARTHEST: Final = 4.0
+
+Sample = tuple[float, float]
+"""A time, s, and a value."""
+
+
+class Timed(Protocol):
+    """A reading: when it was requested, and when the response had arrived, s of the run's clock."""
+
+    @property
+    def sent(self) -> float:
+        """When it was requested."""
+
+    @property
+    def received(self) -> float:
+        """When the response had arrived."""
+
+
+def usual_s(readings: Sequence[Timed]) -> float:
+    """Return how long a reading takes, by the median, s."""
+    return median(one.received - one.sent for one in readings) if readings else 0.0
+
+
+def longest_s(readings: Sequence[Timed]) -> float:
+    """Return how long the slowest reading took, s: a loaded machine or link may delay anything else by as much."""
+    return max((one.received - one.sent for one in readings), default=0.0)
+
+
+def middle(values: Iterable[Sequence[float]]) -> tuple[float, ...]:
+    """Return the median of each component."""
+    return tuple(map(median, zip(*values, strict=True)))
+
+
+def slope(samples: Sequence[Sample]) -> float | None:
+    """Return the change per second; None of less than two moments.
+
+    The median over all pairs of samples at least half of the span apart (Theil-Sen estimator), so that neither a slow
+    response nor one jump changes it.
+    """
+    apart = (samples[-1][0] - samples[0][0]) / 2 if samples else 0.0
+    pairs = itertools.combinations(samples, 2) if apart > 0 else ()
+    slopes = [(later - first) / (there - here) for (here, first), (there, later) in pairs if there - here >= apart]
+    return median(slopes) if slopes else None
+
+
+class Noise(NamedTuple):
+    """What samples of a device at rest show: how far they are off zero, and the standard deviation of one."""
+
+    off: float
+    sigma: float
+
+    @classmethod
+    def of(cls, values: Sequence[float], declared: float = 0.0) -> "Noise":
+        """Return that of some samples; ``declared``: what the standard deviation is at least."""
+        if not values:
+            return cls(0.0, declared)
+        centre = median(values)
+        return cls(abs(centre), max(declared, _SIGMA * median(abs(one - centre) for one in values)))
+
+    def room(self, samples: Sequence[Sample]) -> float:
+        """Return how far the median of such samples may be off zero; those that repeat one value are one."""
+        distinct = 1 + sum(one[1] != other[1] for one, other in itertools.pairwise(samples))
+        return self.off + FARTHEST * self.sigma / math.sqrt(distinct)
+
+    def slope_room(self, samples: Sequence[Sample]) -> float:
+        """Return how fast such samples of something at rest may seem to move, per second."""
+        lapse_s = samples[-1][0] - samples[0][0]
+        return FARTHEST * self.sigma * math.sqrt(12 / len(samples)) / lapse_s if lapse_s > 0 else math.inf
+
+
+def goes_on(
+    samples: Sequence[Sample],
+    rate: Callable[[Sequence[Sample]], float | None],
+    most: Callable[[Sequence[Sample]], float],
+    parts: int = SEVERAL,
+) -> float:
+    """Return how fast something moves on and on, per second; 0 if it rests, comes to rest, or sways.
+
+    Args:
+        samples: of at least one second or so.
+        rate: returns the rate that some samples show; None: they do not show it.
+        most: returns the rate that such samples of something at rest may show.
+        parts: so many parts of the time must each show it, in one direction, and none of them less than half of it.
+    """
+    if len(samples) < parts * SEVERAL:
+        return 0.0
+    begin, length = samples[0][0], (samples[-1][0] - samples[0][0]) / parts
+    found: list[float] = []
+    for part in range(parts):
+        within = [one for one in samples if begin + part * length <= one[0] <= begin + (part + 1) * length]
+        seen = rate(within) if len(within) >= SEVERAL else None
+        if seen is None or abs(seen) <= most(within):
+            return 0.0
+        found.append(seen)
+    return min(found, key=abs) if min(found) * max(found) > 0 and abs(found[-1]) >= abs(found[0]) / 2 else 0.0

@@ -1,0 +1,72 @@
+"""Whether a device rests: by its velocity, and by where it is while time passes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from statistics import median
+from typing import Final
+
+from conformance.measures.samples import SEVERAL, Noise, Sample, goes_on, slope
+from conformance.scenarios.motion.trace import Reading, Resting
+from conformance.statement.motion_map import MotionMap
+
+#: A device that is watched for less than that is not seen to creep, s.
+CREEPS_S: Final = 1.0
+# Where the map does not declare how fast a device may seem to move at rest: these shares of its tolerances.
+_OF_SPEED: Final = 0.1
+_OF_POSITION: Final = 0.2
+
+
+def at_rest(readings: Sequence[Reading], motion: MotionMap) -> Resting:
+    """Return what readings of a device at rest show, or at least the noise that its map declares."""
+    axes = {
+        name: Noise.of([one.values[name] for one in readings if one.values], axis.noise)
+        for name, axis in motion.state.axes.items()
+    }
+    declared = motion.velocity.axes if motion.velocity else {}
+    speeds = {
+        name: Noise.of([one.speeds[name] for one in readings if one.speeds], declared[name].noise)
+        for name in motion.speeds
+    }
+    return Resting(axes, speeds)
+
+
+def fastest(readings: Sequence[Reading], motion: MotionMap) -> str:
+    """Return a measured velocity that is not zero in some readings in a row; empty if there is none."""
+    seen = [one.speeds for one in readings if one.speeds]
+    for window in (seen[index : index + SEVERAL] for index in range(len(seen) - SEVERAL + 1)):
+        for name in window[0]:
+            speed = median(one[name] for one in window)
+            if abs(speed) > motion.speed_tolerance(name):
+                return f"{name} at {speed:.4g} per second"
+    return ""
+
+
+def creeping(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -> str:
+    """Return what moves on and on, however slowly; empty if nothing does, or readings do not show it."""
+    declared = motion.velocity.axes if motion.velocity else {}
+    for name, noise in resting.speeds.items():
+        most = declared[name].rest or _OF_SPEED * motion.speed_tolerance(name)
+        seen = [(one.sent, one.speeds[name]) for one in readings if one.speeds]
+        if speed := goes_on(seen, _middle, _beside(most, noise.room)):
+            return f"{name} at {speed:.3g} per second, on and on"
+    for name, noise in resting.axes.items():
+        most = motion.state.axes[name].rest or _OF_POSITION * motion.tolerance(name)
+        seen = [((one.sent + one.received) / 2, one.values[name]) for one in readings if one.values]
+        if speed := goes_on(seen, slope, _beside(most, noise.slope_room)):
+            return f"{name} by {speed:.3g} per second, on and on"
+    return ""
+
+
+def crept(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -> str:
+    """Return the same of the last readings, where they last long enough to tell."""
+    last = [one for one in readings if one.sent >= readings[-1].sent - 1.5 * CREEPS_S]
+    return creeping(last, motion, resting) if last and last[-1].sent - last[0].sent >= CREEPS_S else ""
+
+
+def _beside(most: float, room: Callable[[Sequence[Sample]], float]) -> Callable[[Sequence[Sample]], float]:
+    return lambda samples: most + room(samples)
+
+
+def _middle(samples: Sequence[Sample]) -> float:
+    return median(value for _, value in samples)
