@@ -30,8 +30,6 @@ SOAP: Final = "soap"
 #: What a web server does by itself, for a device of either kind.
 WEB_SERVER: Final = "web-server"
 _CLASSES: Final = ("description", "robustness", "http", WEB_SERVER)
-# The class `description` judges these of each operation, and tells what operations have in common once.
-_WITHOUT: Final = ("http/declared-status", "http/declared-body", "http/json-integers", "http/no-traceback")
 # Formats in which one value can be written.
 _DATA: Final = re.compile(r"[/+](?:x-)?(?:json|xml|yaml)\b")
 _NO_NAME: Final = re.compile(r"[^a-z0-9]+")
@@ -70,7 +68,6 @@ def write_described_pack(
         f"title = {basic_string(TITLE)}",
         "closed_answers = true",
         "described = true",
-        f"without = {json.dumps(list(_WITHOUT))}",
         *(f'\n[[class]]\nname = "{class_}"' for class_ in classes),
     ]
     write_atomically(folder / MANIFEST, "\n".join(lines) + "\n")

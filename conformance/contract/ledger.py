@@ -31,8 +31,8 @@ class Requirement:
         forbids: the kinds of causes that the requirement is about; it keeps the finding that other requirements share.
         aliases: ids that it had before, and ids of requirements that were merged into it. Checks and mutants may still
             name a part of it by such an id, and baselines and old results are read by them.
-        same_as: requirements of the generic suite that ask the same: where a contract has this one and not them, what
-            judges them judges this one.
+        same_as: requirements of the generic suite that ask the same: where a contract does not have them, what judges
+            them judges this one; a contract that has them does not have a generic one beside them.
         also: further classes that it binds: it is judged when one of them is claimed, and all of them fail with it.
         topic: what it is about, for readers; None: its class's topic.
         breaks: what breaks in practice when a device does not meet it, or None.

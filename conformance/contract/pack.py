@@ -272,6 +272,8 @@ class Contract:
             for id_, item in generic_ledger().items()
             if self._classes_of(item) and dropped.isdisjoint({id_, *item.aliases})
         }
+        # Of two that ask the same, the one that judges both is enough.
+        generic = {id_: item for id_, item in generic.items() if generic.keys().isdisjoint(item.same_as)}
         own: dict[str, Requirement] = {}
         path = self.directory / LEDGER
         if self.has_own_requirements:

@@ -118,3 +118,13 @@ def test_what_judges_one_that_asks_the_same_judges_the_contract_s_own():
     evidence = judge.evidence["http/no-traceback"]
     assert (evidence.cases, evidence.parts) == (1, {"http/no-traceback": 1})
     assert judge.counts(["robustness/no-internals"]) == {"robustness/no-internals": 1}
+
+
+def test_a_contract_has_one_of_two_generic_requirements_that_ask_the_same(tmp_path):
+    document = {"openapi": "3.1.0", "info": {"title": "Door", "version": "1"}, "paths": {}}
+    ledger = Contract.load(write_described_pack(tmp_path, document, document)).ledger
+    generic = generic_ledger()
+    twice = {id_ for id_, item in generic.items() if item.same_as}
+    assert {"http/declared-status", "http/declared-body"} <= twice
+    assert twice.isdisjoint(ledger)
+    assert {other for id_ in twice for other in generic[id_].same_as} <= ledger.keys()
