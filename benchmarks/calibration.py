@@ -23,10 +23,10 @@ from scipy import signal, stats
 from conformance.papers_robot.files import CONTRACT_DIR
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import SHORT_BLOCK_S, Load, Plan
-from loadtests.statistics.between_runs import IDLE_MACHINE
 from loadtests.statistics.comparisons import aa_interval, comparison
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Recorder
+from loadtests.statistics.rounds import IDLE_MACHINE
 
 RATE, LEVEL_NS, FAST, DRIFT, MEMORY_S = 200.0, 2_000_000, 0.2, 0.1, 2.0
 _STEP_S = 0.01

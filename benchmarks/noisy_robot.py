@@ -13,7 +13,7 @@ import time
 from socketserver import StreamRequestHandler, ThreadingTCPServer
 from threading import Lock
 
-from loadtests.measuring.priority import first_in_line
+from loadtests.measuring.machine import first_in_line
 
 LEVEL_S = 0.020  # beside which the transport's own 0.2 ms hardly dilute what is planted
 FAST, DRIFT, MEMORY_S = 0.2, 0.1, 2.0  # standard deviations on the logarithmic scale; how long the level remembers

@@ -19,10 +19,9 @@ import click
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.endings import as_parent, end_like_ctrl_c, end_with_parent, ending_signals, undisturbed
 from conformance.commandline.exit_codes import ExitCode
-from conformance.commandline.out_folder import FolderError, held
+from conformance.commandline.out_folder import FolderError, command_without_folders, held
 from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.commandline.terminal import inert
-from conformance.commandline.without_folders import command_without_folders
 from conformance.contract.toml_file import TomlFileError
 from conformance.papers_robot.statement import RobotStatement, load_robot_statement
 from conformance.papers_robot.thresholds import load_thresholds
@@ -32,10 +31,8 @@ from loadtests.described.device import DESCRIBED_ONLY, Named
 from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest, store
 from loadtests.result.files import with_unstopped
 from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES
-from loadtests.settings.cli_options import KNEE_SEARCHES, CliOptions
-from loadtests.settings.errors import SettingsError
-from loadtests.settings.option_types import COUNTS, RATES, SHARE
-from loadtests.settings.settings import STEP_S, Settings
+from loadtests.settings.cli_options import COUNTS, KNEE_SEARCHES, RATES, SHARE, CliOptions
+from loadtests.settings.settings import STEP_S, Settings, SettingsError
 from loadtests.settings.settle import (
     AGAINST_LOOKS,
     DEFAULT_AGAINST_S,

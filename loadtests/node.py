@@ -19,7 +19,7 @@ from conformance.transport.reach import Trust
 from loadtests.cli import DEFAULT_OUT, load
 from loadtests.clients.robot import as_http
 from loadtests.described.device import CREDENTIALS, secrets_of
-from loadtests.settings.errors import SettingsError
+from loadtests.settings.settings import SettingsError
 
 PORT = 5557
 LINGER_S = 600.0

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 from http import HTTPStatus
 
-from conformance.api.rest.accept import quality
+from conformance.api.rest.formats import quality
 from conformance.api.rest.statuses import CRASHES, is_cut_off
 from conformance.api.rest.validity import INVALID, VALID
 from conformance.checkers.occasion import METHODS, Occasion

@@ -16,9 +16,9 @@ from conformance.cli.summary import print_summary
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.out_folder import command_without_folders
 from conformance.commandline.result_command import CommandResult, FrontDoor, ResultCommand
 from conformance.commandline.terminal import inert
-from conformance.commandline.without_folders import command_without_folders
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.contract.places import places

@@ -16,7 +16,7 @@ from conformance.contract.generic import generic_classes
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
 from conformance.explaining.advice import FRAMEWORKS
-from conformance.explaining.naming import UnknownRequirementError, found, known, page_of
+from conformance.explaining.explanation import UnknownRequirementError, found, known, page_of
 
 if TYPE_CHECKING:
     from conformance.contract.ledger import Requirement

@@ -1,13 +1,16 @@
-"""The folder for a command's results: it takes files, leads nowhere else, and belongs to one run at a time."""
+"""The folder that a command writes its results to, and texts without this machine's folders."""
 
 import datetime as dt
 import json
 import os
+import re
 import secrets
+import shlex
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -102,3 +105,30 @@ def _owner(descriptor: int) -> str:
         return f"process {int(owner['pid'])} on {str(owner['host'])[:100]!r}, since {str(owner['since'])[:30]}"
     except (OSError, ValueError, KeyError, TypeError):
         return f"its file {LOCK_NAME} does not say which"
+
+
+#: The folders of an absolute path, wherever in a word it begins; addresses such as http://host/path are none.
+_FOLDERS = re.compile(r"(?<![\w:/.~-])(?:file://)?~?/(?:[^\s/]+/)*")
+
+
+def without_folders(word: str) -> str:
+    """Return a word with paths relative to the working directory; of a file elsewhere, only the name.
+
+    `--out=/home/me/tests/out/new` becomes `--out=out/new` in /home/me/tests, and `--out=new` in other folders.
+    """
+    here = re.escape(f"{Path.cwd().as_posix().rstrip('/')}/")
+    return _FOLDERS.sub("", re.sub(rf"(?<![\w:/.~-])(?:file://)?{here}(?=[^\s/])", "", word))
+
+
+def command_without_folders(words: Sequence[str], patterns: Sequence[str] = ()) -> str:
+    """Return the command that repeats a run.
+
+    Args:
+        words: the words after `roaas`.
+        patterns: options whose values are no files, but may look so: `--call /api/move`.
+    """
+    shown = (
+        word if before in patterns or word.partition("=")[0] in patterns else without_folders(word)
+        for before, word in pairwise(["roaas", *words])
+    )
+    return shlex.join(["roaas", *shown])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from importlib.util import find_spec
 from itertools import islice
@@ -13,7 +14,7 @@ from typing import Any
 
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed, resolved
 from conformance.documents.json_shape import shape_of
-from conformance.documents.openapi import methods_of
+from conformance.documents.openapi import Operation, methods_of, read_operations
 from conformance.documents.resources import PARAMETER
 from conformance.documents.schema_places import DATA
 from conformance.documents.schema_words import foreign_words, without_foreign_words
@@ -249,3 +250,33 @@ def _of_schema(place: str, schema: Schema, depth: int = 0) -> Iterator[tuple[str
     for name, part in properties.items() if isinstance(properties, dict) and depth < 4 else ():  # noqa: PLR2004 - levels
         if isinstance(part, dict):
             yield from _of_schema(f"{place} /{name}", part, depth + 1)
+
+
+def openapi_fault(document: Any) -> str:
+    """Return why a document is not a valid OpenAPI 3 description; empty if it is."""
+    if not isinstance(document, dict):
+        return "it is no object"
+    version = document.get("openapi")
+    if not isinstance(version, str) or not re.fullmatch(r"3\.[0-2]\.\d+", version):
+        return f"a description of version {version!r}"
+    error = next(iter(validator(version[:3]).iter_errors(document)), None)
+    if error is not None:
+        where = ".".join(str(part) for part in error.instance_path)
+        return f"a fault at {where or 'the root'}: {error.message[:200]}"
+    try:
+        operations = read_operations(document)
+    except UnresolvedError as unresolved:
+        return str(unresolved)
+    except (AttributeError, TypeError, KeyError, RecursionError) as broken:
+        return f"no description: {broken!r}"
+    return _path_fault(operations)
+
+
+def _path_fault(operations: Sequence[Operation]) -> str:
+    """Return a path parameter that is in a path but not described, or the reverse (OpenAPI 3.1, 4.8.8.2); or empty."""
+    for operation in operations:
+        used = set(PARAMETER.findall(operation.template))
+        described = {item.name for item in operation.parameter("path")}
+        if used != described:
+            return f"{operation.label} with the path parameters {sorted(used)} and {sorted(described)} described"
+    return ""

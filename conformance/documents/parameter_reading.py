@@ -19,8 +19,8 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json
 from conformance.documents.parameters import Parameter
 from conformance.documents.representation import discriminator_of, flat
-from conformance.documents.serialization import SEPARATORS
 from conformance.documents.value_formats import has_formats
+from conformance.documents.writing import SEPARATORS
 
 VALID, INVALID, UNCLEAR = "valid", "invalid", "unclear"
 # The grammar of numbers in paths and queries; integers have no fraction.

@@ -1,9 +1,11 @@
-"""Recognise tracebacks and other internals of a program in response bodies."""
+"""Recognise what no body should be: internals of a program, such as tracebacks, and JSON or XML that is malformed."""
 
 import html
 import re
 from urllib.parse import unquote, unquote_plus
 
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import is_json, is_xml
 from conformance.transport.exchange import Exchange, Request
 
 # As much of a body is looked through, octets.
@@ -69,3 +71,19 @@ def _sent(request: Request) -> str:
 
 def _plain(text: str) -> str:
     return _ESCAPED.sub(r"\1", html.unescape(unquote(text))).lower()
+
+
+def unreadable(media_type: str, body: bytes) -> str:
+    """Return why a JSON or XML body cannot be parsed; empty if it can, and for other media types."""
+    if is_json(media_type):
+        return read_json(body).unreadable
+    if not is_xml(media_type):
+        return ""
+    # Imported late: lxml costs a tenth of a second that --help need not pay.
+    from conformance.documents.xml import NotXmlError, parse  # noqa: PLC0415
+
+    try:
+        parse(body, doctype=True)
+    except NotXmlError as error:
+        return str(error)
+    return ""

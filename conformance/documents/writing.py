@@ -1,12 +1,14 @@
 """Write JSON and XML, also texts that no library would write."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
+from urllib.parse import quote, urlencode
 
 from lxml import etree
 
+from conformance.documents.parameters import Encoding
 from conformance.documents.xml import elements
 
 
@@ -79,3 +81,101 @@ def text_of(value: Any) -> str:
     if isinstance(value, list):
         return ",".join(text_of(item) for item in value)
     return str(value)
+
+
+#: What stands between items, where it is no comma; ``tabDelimited`` is tsv of Swagger 2.0.
+SEPARATORS = {"spaceDelimited": " ", "pipeDelimited": "|", "tabDelimited": "\t"}
+# Reserved characters that end no parameter in any server (RFC 3986 2.2).
+_RESERVED = "/?:@!$'()*,"
+# How a name is written between quotes (RFC 7578 2, WHATWG multipart/form-data).
+_IN_QUOTES = str.maketrans({'"': "%22", "\r": "%0D", "\n": "%0A"})
+_BOUNDARY = "roaas-7d1f0c"
+
+
+def path_text(value: Any, style: str = "simple", name: str = "", *, explode: bool = False) -> str:
+    """Return a path parameter's value, percent-encoded, in the styles simple, label and matrix."""
+    members = _members(value, "=" if explode else ",")
+    texts = [quote(text, safe=",=") if isinstance(value, dict) else quote(text, safe="") for text in members]
+    if style == "label":
+        return "." + ("." if explode else ",").join(texts)
+    if style == "matrix":
+        if explode and isinstance(value, dict):
+            return "".join(f";{text}" for text in texts)
+        many = isinstance(value, list) and explode
+        return "".join(f";{name}={text}" for text in texts) if many else f";{name}={','.join(texts)}"
+    return quote(SEPARATORS.get(style, ","), safe=",").join(texts)
+
+
+def query_pairs(name: str, value: Any, style: str = "form", *, explode: bool = True) -> list[tuple[str, str]]:
+    """Return the (name, text) pairs of a query parameter or cookie, not percent-encoded."""
+    if isinstance(value, dict):
+        if style == "deepObject":
+            return [(f"{name}[{key}]", _plain(item)) for key, item in value.items()]
+        if explode:
+            return [(key, _plain(item)) for key, item in value.items()]
+        between = SEPARATORS.get(style, ",")
+        return [(name, between.join(_members(value, between)))]
+    if isinstance(value, list):
+        if explode and style not in SEPARATORS:
+            return [(name, _plain(item)) for item in value]
+        return [(name, SEPARATORS.get(style, ",").join(map(_plain, value)))]
+    return [(name, _plain(value))]
+
+
+def query_text(pairs: list[tuple[str, str]], reserved: frozenset[str] = frozenset()) -> str:
+    """Return a query string, percent-encoded; reserved: names of parameters that keep reserved characters."""
+    return "&".join(
+        f"{quote(name, safe='')}={quote(text, safe=_RESERVED if name in reserved else ',')}" for name, text in pairs
+    )
+
+
+def header_text(value: Any, style: str = "simple", *, explode: bool = False) -> str:
+    """Return a header parameter's value (style simple, or one of Swagger 2.0)."""
+    return SEPARATORS.get(style, ",").join(_members(value, "=" if explode else ","))
+
+
+def form_body(value: dict[str, Any], encoding: Mapping[str, Encoding]) -> bytes:
+    """Return the members of an object as ``application/x-www-form-urlencoded``."""
+    pairs: list[tuple[str, str]] = []
+    for name, item in value.items():
+        how = encoding.get(name, Encoding())
+        if how.media_type.endswith("json"):
+            pairs.append((name, json_text(item)))
+        else:
+            pairs += query_pairs(name, item, how.style, explode=how.explode)
+    return urlencode(pairs).encode()
+
+
+def multipart_body(value: dict[str, Any], encoding: Mapping[str, Encoding] | None = None) -> tuple[str, bytes]:
+    """Return the Content-Type and the bytes of an object as ``multipart/form-data`` (RFC 7578).
+
+    A member of type bytes is sent as a file, an object as JSON, and each item of a list as a part of its own.
+    """
+    parts: list[bytes] = []
+    for name, item in value.items():
+        given = (encoding or {}).get(name, Encoding()).media_type
+        for one in item if isinstance(item, list) and not given.endswith("json") else [item]:
+            is_file = isinstance(one, bytes)
+            as_json = isinstance(one, dict | list) or given.endswith("json")
+            content = one if isinstance(one, bytes) else (json_text(one) if as_json else _plain(one)).encode()
+            usual = "application/octet-stream" if is_file else "application/json" if as_json else ""
+            media_type = given if given and "*" not in given else usual
+            head = f'Content-Disposition: form-data; name="{name.translate(_IN_QUOTES)}"'
+            head += '; filename="roaas.bin"' if is_file else ""
+            head += f"\r\nContent-Type: {media_type}" if media_type else ""
+            parts.append(f"--{_BOUNDARY}\r\n{head}\r\n\r\n".encode() + content + b"\r\n")
+    return f"multipart/form-data; boundary={_BOUNDARY}", b"".join(parts) + f"--{_BOUNDARY}--\r\n".encode()
+
+
+def _plain(value: Any) -> str:
+    """Return an item as text; what is no scalar becomes JSON, and null becomes empty."""
+    if value is None:
+        return ""
+    return json_text(value) if isinstance(value, dict | list) else text_of(value)
+
+
+def _members(value: Any, between: str) -> list[str]:
+    """Return the texts of an array's items or an object's members, or the text of a scalar."""
+    if isinstance(value, dict):
+        return [f"{key}{between}{_plain(item)}" for key, item in value.items()]
+    return [_plain(item) for item in value] if isinstance(value, list) else [_plain(value)]

@@ -17,8 +17,7 @@ from lxml import etree
 
 from conformance.commandline.device_options import advice
 from conformance.documents.addressing import addressing_action, is_http, wants_addressing
-from conformance.documents.wsdl_gaps import gaps
-from conformance.documents.wsdl_imports import Collected, Fetch, Locate, collect
+from conformance.documents.wsdl_imports import Collected, Fetch, Locate, collect, gaps
 from conformance.documents.xml_names import ENVELOPE, WSAM, WSAW, WSDL, WSDL_SOAP, XSD, clark
 from conformance.documents.xsd import SchemaError, Types
 from conformance.documents.xsd_assembly import SchemaDocument, rpc_wrapper

@@ -16,8 +16,8 @@ from conformance.api.rest.stops import stop_device
 from conformance.api.rest.variations import Kind
 from conformance.commandline.secrecy import SECRETS
 from conformance.contract.pack import Contract
-from conformance.documents.readable import unreadable
 from conformance.documents.resources import matching
+from conformance.documents.traceback import unreadable
 from conformance.scenarios.rule import Rule
 from conformance.scenarios.survey import Probe, Survey
 from conformance.statement.statement import empty_statement

@@ -9,7 +9,7 @@ from typing import Any
 from msgspec import to_builtins
 
 from conformance.commandline.atomic_write import write_json
-from conformance.commandline.without_folders import without_folders
+from conformance.commandline.out_folder import without_folders
 from conformance.contract.interfaces import Interface
 from conformance.documents.openapi import operations_of
 from conformance.engine.resending import written

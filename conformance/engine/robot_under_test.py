@@ -141,7 +141,7 @@ class RobotUnderTest:
 
     def _connect_soap(self) -> None:
         from conformance.api.soap.callable_services import SoapServices  # noqa: PLC0415 - as above
-        from conformance.api.soap.discovery import open_service  # noqa: PLC0415 - as above
+        from conformance.api.soap.service import open_service  # noqa: PLC0415 - as above
 
         where, contract = self.run.statement.endpoints, self.run.contract
         services = {}

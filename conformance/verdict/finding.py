@@ -7,7 +7,7 @@ from http import HTTPStatus
 from typing import NamedTuple
 
 from conformance.contract.classes import CauseKind
-from conformance.documents.readable import unreadable
+from conformance.documents.traceback import unreadable
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Unanswered
 
 _KINDS = {

@@ -3,9 +3,8 @@
 import re
 from typing import NamedTuple
 
-from loadtests.clients.described import Described
 from loadtests.clients.failures import Declared
-from loadtests.clients.robot import Robot
+from loadtests.clients.robot import Described, Robot
 
 _PARAMETER = re.compile(r"\\\{[^{}]*\\\}")
 

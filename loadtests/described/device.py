@@ -29,7 +29,7 @@ from conformance.transport.username_token import UsernameToken
 from conformance.verdict.run import Run
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Secrets
-from loadtests.settings.errors import SettingsError
+from loadtests.settings.settings import SettingsError
 
 if TYPE_CHECKING:
     from conformance.scenarios.described_messages import DescribedMessages

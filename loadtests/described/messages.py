@@ -12,11 +12,11 @@ from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import NoAnswerError, Request
 from conformance.transport.reach import is_same
 from conformance.transport.username_token import hidden
-from loadtests.clients.described import Described
 from loadtests.clients.failures import CallError, Reply
 from loadtests.clients.payloads import VARIANTS
+from loadtests.clients.robot import Described
 from loadtests.described.device import Device
-from loadtests.settings.errors import SettingsError
+from loadtests.settings.settings import SettingsError
 
 #: So many messages of an operation that acts are tried at most, until the device accepts one.
 _TRIED = 4

@@ -11,7 +11,7 @@ from loadtests.clients.robot import Robot
 from loadtests.described.device import Device
 from loadtests.described.operations import chosen, named_alike, wanted_of
 from loadtests.described.requests import robot_of
-from loadtests.settings.errors import SettingsError
+from loadtests.settings.settings import SettingsError
 
 _HOW = 'declare it in the statement, as in [load.pairs] pose = { rest = "GET /robot/pose/", soap = "GetPose" }'
 _ALONE = "to measure one interface alone, add --interface rest or --interface soap"

@@ -8,12 +8,11 @@ from conformance.api.rest.variations import Kind, Variation
 from conformance.documents.openapi import Operation, operations_of
 from conformance.scenarios.scenario import PartialTraceError
 from conformance.scenarios.survey import Probe, Surveyor, order_of
-from loadtests.clients.described import Described
 from loadtests.clients.failures import CallError
-from loadtests.clients.robot import Robot
+from loadtests.clients.robot import Described, Robot
 from loadtests.described.device import Device
 from loadtests.described.messages import bytes_of, described_message
-from loadtests.settings.errors import SettingsError
+from loadtests.settings.settings import SettingsError
 
 _STREAM = "its response does not end, as that of a stream"
 _FIRST, _LAST = 200, 399  # statuses that are no errors (RFC 9110 section 15)

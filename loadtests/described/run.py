@@ -8,17 +8,14 @@ from conformance.documents.description import is_url
 from conformance.papers_robot.statement import Load, RobotStatement
 from conformance.target.describing import is_wsdl
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
-from loadtests.described.operations import named_alike
+from loadtests.described.operations import callable_robot, named_alike, scenario_of
 from loadtests.described.pairs import Choice
-from loadtests.described.scenario import callable_robot, scenario_of
 from loadtests.described.stopping import Stopping
 from loadtests.described.streams import streams_to_hear
 from loadtests.schedule.plan import step_operation
 from loadtests.settings.cli_options import CliOptions
-from loadtests.settings.errors import SettingsError
-from loadtests.settings.settings import Selection, Settings
+from loadtests.settings.settings import Selection, Settings, SettingsError, Target
 from loadtests.settings.settle import settle
-from loadtests.settings.target import Target
 
 _PAPERS_ONLY = (
     "publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint", "rosbridge", "end_to_end",

@@ -20,7 +20,7 @@ from conformance.verdict.run import Run
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Robot
 from loadtests.described.device import Device
-from loadtests.settings.errors import SettingsError
+from loadtests.settings.settings import SettingsError
 
 
 class Stopping:

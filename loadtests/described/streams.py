@@ -10,14 +10,13 @@ from jsonpath.exceptions import JSONPointerError
 from conformance.api.rest.values import Values
 from conformance.documents.openapi import Operation
 from conformance.scenarios.survey import Surveyor
-from loadtests.clients.described import Stream
 from loadtests.clients.endpoint import EndpointError
+from loadtests.clients.robot import Stream
 from loadtests.clients.rosbridge import bridge_endpoint
 from loadtests.described.device import Device
 from loadtests.described.operations import chosen
 from loadtests.described.requests import octets_of
-from loadtests.settings.errors import SettingsError
-from loadtests.settings.settings import Streams
+from loadtests.settings.settings import SettingsError, Streams
 
 
 def streams_to_hear(device: Device, options: Mapping[str, Any]) -> Streams:

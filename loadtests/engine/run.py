@@ -20,11 +20,10 @@ from loadtests.measuring.executor import REPORT_S, LocalExecutor, busiest
 from loadtests.measuring.metrics import Collector, serve
 from loadtests.measuring.pauses import after_pauses
 from loadtests.measuring.preflight import preflight, reach
-from loadtests.measuring.restart import start_anew
 from loadtests.measuring.rising_load import RisingLoad
-from loadtests.measuring.robot_process import RobotProcess
+from loadtests.measuring.robot_process import RobotProcess, start_anew
 from loadtests.measuring.streams import hear
-from loadtests.result.outcome import Carried, Outcome, RunAborted
+from loadtests.result.files import Carried, Outcome, RunAborted
 from loadtests.schedule.plan import QUICK_ANSWER_S, SHORT_BLOCK_S, Plan
 from loadtests.settings.settings import Settings
 from ros_probe.process import ProbeError

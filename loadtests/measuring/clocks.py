@@ -1,4 +1,4 @@
-"""Compare workers' clocks with the master's, by messages over the channel between them.
+"""What clocks differ by: the robot's by its HTTP responses, workers' by messages over their channel to the master.
 
 An exchange gives the offset as in NTP (RFC 5905, section 8), with one time of the worker instead of two, because the
 worker responds at once: the worker's clock minus the middle between sending and receiving. Of several exchanges the one
@@ -6,13 +6,18 @@ with the shortest round trip counts, because it waited least in queues; its erro
 are CLOCK_MONOTONIC, in ns, which no administrator sets.
 """
 
+import math
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
+from email.utils import parsedate_to_datetime
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 import gevent
+
+from loadtests.measuring.stamps import Stamp
+from loadtests.statistics.end_to_end import Offset
 
 #: How many exchanges a reading chooses from, and how long they may take in all.
 EXCHANGES = 8
@@ -133,3 +138,41 @@ def answer_clock(runner: Any) -> None:
         runner.send_message(_MESSAGE, {"sent": msg.data["sent"], "worker": time.monotonic_ns()})
 
     runner.register_message(_MESSAGE, on_asked)
+
+
+#: `Date` has whole seconds, and is "at any time during message origination" (RFC 9110 section 6.6.1): servers that
+#: write it beforehand, such as uvicorn, keep it for a second.
+_DATE_S = 1.0
+_KEPT_S = 1.0
+
+
+@dataclass
+class RobotClock:
+    """The bounds that responses have shown so far; all moments are Unix time by our clock."""
+
+    low_s: float = -math.inf
+    high_s: float = math.inf
+
+    def data(self, stamp: Stamp, received_s: float) -> None:
+        """Take the stamp of data."""
+        self.low_s = max(self.low_s, stamp.seconds - stamp.digit_s - received_s)
+
+    def told(self, stamp: Stamp, sent_s: float, received_s: float) -> None:
+        """Take the time at which the robot made a response, as the response tells it."""
+        self.data(stamp, received_s)
+        self.high_s = min(self.high_s, stamp.seconds + stamp.digit_s - sent_s)
+
+    def dated(self, date: bytes | None, sent_s: float, received_s: float) -> None:
+        """Take a response's `Date`, if it has one."""
+        try:
+            seconds = parsedate_to_datetime((date or b"").decode("latin-1")).timestamp()
+        except ValueError:
+            return
+        self.low_s = max(self.low_s, seconds - received_s)
+        self.high_s = min(self.high_s, seconds + _DATE_S + _KEPT_S - sent_s)
+
+    @property
+    def offset(self) -> Offset | None:
+        """Return the offset; None where it is not known, or where its bounds contradict one another."""
+        known = math.isfinite(self.low_s) and math.isfinite(self.high_s) and self.low_s <= self.high_s
+        return Offset(self.low_s, self.high_s) if known else None

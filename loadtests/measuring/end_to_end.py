@@ -5,8 +5,10 @@ reports when each arrived. The probe shares the generator's clock: both run on o
 baseline is publishing with rclpy, without any web service.
 """
 
+import json
+import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 
 import gevent
@@ -16,11 +18,42 @@ from conformance.papers_robot.delivery import COURIER, EXAMPLE, MESSAGE_FIELDS
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import CallError
 from loadtests.clients.payloads import BUILDERS, Values
-from loadtests.clients.probe import Probe
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import Bridge, bridge_requests
 from loadtests.clients.wire import Connection, Request, now_ns
 from loadtests.settings.settings import EndToEnd
+from ros_probe.process import RosProcess, SilentError
+
+
+class Probe(RosProcess):
+    """A process on the ROS graph, in the role `listen` or `publish`; call `await_ready` first."""
+
+    def __init__(self, role: str, domain_id: int, topic: str) -> None:
+        super().__init__(role, "--delivery-topic", topic, domain_id=domain_id)
+
+    def publish(self, values: tuple[float, ...]) -> int:
+        """Publish a delivery; returns when that began (CLOCK_MONOTONIC, ns).
+
+        Raises:
+            ProbeError: it has ended.
+        """
+        return int(self.ask(json.dumps([float(value).hex() for value in values]))["sent_ns"])
+
+    def arrival_ns(self, values: tuple[float, ...], within_s: float) -> int | None:
+        """Return the time at which a listener received a delivery with these values; None if it does not come in time.
+
+        Raises:
+            ProbeError: the probe's process has ended.
+        """
+        wanted = [float(value).hex() for value in values]
+        until = time.monotonic() + within_s
+        with suppress(SilentError):
+            while True:
+                ((at_ns, *heard),) = self.told(max(0.0, until - time.monotonic()))["deliveries"]
+                if heard == wanted:
+                    return int(at_ns)
+        return None
+
 
 #: A delivery that has not arrived by then is lost.
 LOST_S = 2.0

@@ -20,8 +20,7 @@ from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import WorkerClock
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.scenario import ScenarioSession
-from loadtests.measuring.sessions import new_session
-from loadtests.measuring.user_session import Session
+from loadtests.measuring.user_session import Session, new_session
 from loadtests.schedule.plan import Plan
 from loadtests.settings.settings import Scenario
 from loadtests.statistics.recorder import Recorder

@@ -24,13 +24,12 @@ from websockets.frames import Frame, Opcode
 from websockets.http11 import Response
 from websockets.uri import parse_uri
 
-from loadtests.clients.described import Stream
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import CallError, connect_error, shown
-from loadtests.clients.robot import Robot
+from loadtests.clients.robot import Robot, Stream
 from loadtests.clients.rosbridge import bridge_endpoint
 from loadtests.clients.wire import now_ns
-from loadtests.measuring.robot_clock import RobotClock
+from loadtests.measuring.clocks import RobotClock
 from loadtests.measuring.robot_process import is_here, same_machine
 from loadtests.measuring.stamps import stamp_of
 from loadtests.settings.settings import Settings, Streams

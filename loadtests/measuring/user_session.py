@@ -11,11 +11,13 @@ from loadtests.clients.library import LIBRARY, Sent, read_document
 from loadtests.clients.payloads import VARIANTS
 from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
-from loadtests.measuring.priority import first_in_line, leaves_the_robot_room
+from loadtests.measuring.machine import first_in_line, leaves_the_robot_room
 from loadtests.measuring.recording import AFTER_ERROR_S, NS, Recording
+from loadtests.measuring.scenario import ScenarioSession
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.pacer import Arrival, Pacer
 from loadtests.schedule.plan import BOTH, Plan
+from loadtests.settings.settings import Scenario
 
 _SIDES = ("rest", "soap")
 
@@ -131,3 +133,22 @@ def _documents(robot: Robot, operations: tuple[str, ...]) -> dict[str, Any]:
             parsed[wsdl] = parsed.get(wsdl) or read_document(wsdl, robot)
             documents[name] = parsed[wsdl]
     return documents
+
+
+def new_session(
+    environment: Any,
+    robots: Sequence[Robot],
+    operations: tuple[str, ...],
+    seed: int,
+    *,
+    library: bool,
+    scenario: Scenario | None,
+) -> Session | ScenarioSession:
+    """Return a process's users; the arguments are those of `Session` and `ScenarioSession`.
+
+    Raises:
+        GeneratorError: the scenario cannot be used.
+    """
+    if scenario is None:
+        return Session(environment, robots, operations, seed, library=library)
+    return ScenarioSession(environment, robots[0], operations, scenario)

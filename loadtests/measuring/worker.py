@@ -29,8 +29,7 @@ from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import REPORT_S, new_environment
 from loadtests.measuring.left_behind import LeftBehind
 from loadtests.measuring.scenario import ScenarioSession
-from loadtests.measuring.sessions import new_session
-from loadtests.measuring.user_session import Session
+from loadtests.measuring.user_session import Session, new_session
 from loadtests.schedule.plan import Plan
 from loadtests.settings.settings import Scenario
 

@@ -2,44 +2,134 @@
 
 import os
 from datetime import datetime
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.out_folder import without_folders
 from conformance.commandline.secrecy import SECRETS
+from loadtests.clients.library import LIBRARY
+from loadtests.clients.payloads import CATALOGUE
 from loadtests.measuring.end_to_end import LOST_S
 from loadtests.measuring.environment import describe
+from loadtests.measuring.executor import Member
 from loadtests.measuring.machine import Moment, conditions
 from loadtests.measuring.pauses import PAUSE_S, Paused
 from loadtests.measuring.preflight import Findings
 from loadtests.measuring.robot_process import same_machine
-from loadtests.result.files import FORMAT
-from loadtests.result.outcome import Outcome, RunAborted
-from loadtests.result.plan_words import plan_words
-from loadtests.result.processes import process_figures
+from loadtests.result.files import FORMAT, Outcome, RunAborted
 from loadtests.schedule.arrivals import arrivals_due
 from loadtests.schedule.plan import Plan, step_operation
+from loadtests.schedule.segment import GAP_S
 from loadtests.settings.settings import Settings
-from loadtests.statistics import (
-    end_to_end,
-    figures,
-    modes,
-    over_time,
-    service_levels,
-    steps,
-    streams,
-    threshold,
-    verdict,
-)
+from loadtests.statistics import end_to_end, figures, modes, over_time, service_levels, steps, streams, verdict
 from loadtests.statistics.against import EXIT_CODES, Against, against
-from loadtests.statistics.between_runs import between_runs
-from loadtests.statistics.clock_offset import SHARED
 from loadtests.statistics.comparisons import AaControl, aa_controls, further_interfaces, soap_over_rest
+from loadtests.statistics.end_to_end import SHARED
 from loadtests.statistics.headline import Found, headline
 from loadtests.statistics.intervals import order_interval_ms
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Recorder
+from loadtests.statistics.rounds import between_runs
+
+
+def process_figures(members: list[Member]) -> tuple[list[dict[str, Any]], list[str]]:
+    """Return an entry for each process, and remarks on those that did not do their share."""
+    found, remarks = [], []
+    for member in members:
+        lost = member.state == "lost"
+        missing = 0 if not lost else None if member.share is None else max(0, member.share - member.accounted)
+        remarks += _remarks(member, missing)
+        found.append(
+            {
+                "id": member.id,
+                "host": member.host,
+                "pid": member.pid,
+                "state": member.state,
+                "requests": member.requests,
+                "cpu_share": figures.rounded(member.cpu_share),
+                "joined_at_s": figures.rounded(member.joined_at_s),
+                "lost_at_s": figures.rounded(member.lost_at_s),
+                "last_report_s": figures.rounded(member.last_report_s),
+                "arrivals_lost": missing,
+                "clock": member.clock.figures() if member.clock is not None else None,
+            }
+        )
+    return found, remarks
+
+
+def _remarks(member: Member, missing: int | None) -> list[str]:
+    """Return remarks on one process."""
+    name, said = f"worker {member.id} ({member.host})", []
+    if member.state == "lost":
+        arrivals = "" if missing is None else f", {missing} of its arrivals were not sent or not reported"
+        said.append(
+            f"{name} was lost {member.lost_at_s or 0.0:.1f} s into the run: "
+            f"{member.requests} of its requests are in the result{arrivals}"
+        )
+    if member.state == "late":
+        said.append(
+            f"{name} joined {member.joined_at_s or 0.0:.1f} s into the run, after the schedule had been distributed: "
+            "it took no part"
+        )
+    clock = member.clock
+    if clock is not None and not clock.shared and clock.uncertainty_ns > GAP_S * 1e9:
+        said.append(
+            f"{name}: its clock is known to {clock.uncertainty_ns / 1e6:.1f} ms only, more than the gap of "
+            f"{GAP_S * 1e3:g} ms between blocks, so that it may still send over one interface while others "
+            "send over the next"
+        )
+    return said
+
+
+CLIENT_WORDS = {
+    "wire": "our own HTTP/1.1 client on gevent and llhttp, the same for both interfaces; requests are built "
+    "beforehand and each is sent once",
+    "zeep": "what an ordinary user's program calls: zeep over SOAP, the requests library over REST",
+}
+_SCENARIO = (
+    "our own HTTP/1.1 client on gevent and llhttp; requests are built when the scenario sends them, each is sent once"
+)
+
+
+def plan_words(settings: Settings, plan: Plan, pacing: str, parts: int) -> dict[str, Any]:
+    """Return the `plan` of latency.json; an undecided comparison had several parts of the plan's length."""
+    load, after, called = plan.load, settings.steps, plan.offered("rest", "wire")
+    return {
+        "model": "open" if plan.open_model else "closed",
+        "arrivals": load.arrivals if plan.open_model else None,
+        "rate": load.rate,
+        "users": load.users,
+        "duration_s": load.duration_s * parts,
+        "warmup_s": load.warmup_s,
+        "block_s": round(plan.block_s, 6),
+        "gap_s": 0.0 if plan.scenario else GAP_S,
+        "blocks": plan.blocks * parts,
+        "seed": load.seed,
+        "timeout_s": plan.timeout_s,
+        "operations": [plan.operations[number] for number in called] if plan.scenario else list(plan.operations),
+        "interfaces": list(plan.interfaces),
+        "clients": {name: _SCENARIO if plan.scenario else CLIENT_WORDS[name] for name in plan.clients},
+        "zeep_rate": load.rate if plan.open_model and LIBRARY in plan.clients else None,
+        "repeats": settings.repeats.number,
+        "restart_command": without_folders(settings.repeats.restart_command or "") or None,
+        "methods": {
+            name: CATALOGUE[name].element for name in plan.operations if not settings.description and name in CATALOGUE
+        },
+        "weights": dict(zip(plan.operations, plan.weights, strict=True)) if plan.weights else {},
+        "description": settings.description and without_folders(settings.description),
+        "scenario": settings.scenario
+        and {"file": Path(settings.scenario.file).name, "sha256": settings.scenario.sha256},
+        "processes": plan.workers,
+        "connections": plan.connections,
+        "pacing": pacing,
+        "connection_steps": list(after.connections),
+        "limits": {"max_rate": settings.limits.max_rate, "max_duration_s": settings.limits.max_duration_s},
+        "step_rates": list(after.rates),
+        "step_s": after.step_s if after.rates else None,
+    }
 
 
 def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[int, dict[str, Any]]:
@@ -66,7 +156,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         else [*_undecided(settings, generator), *verdict.says_nothing(comparisons), *_silent(outcome)]
     )
     workers, losses = process_figures(executor.members if executor else [])
-    judged = [] if aborted else threshold.judge(measured, settings.thresholds)
+    judged = [] if aborted else verdict.judge(measured, settings.thresholds)
     controls = aa_controls(measured)
     compared = _against(outcome, measured, controls)
     levels = [] if aborted else service_levels.levels(measured, settings.slo)

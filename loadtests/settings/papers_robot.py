@@ -14,9 +14,7 @@ from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import bridge_endpoint
 from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES, OPERATIONS
 from loadtests.settings.cli_options import CliOptions
-from loadtests.settings.errors import SettingsError
-from loadtests.settings.settings import Selection
-from loadtests.settings.target import Target
+from loadtests.settings.settings import Selection, SettingsError, Target
 
 
 def papers_robot(options: CliOptions, statement: RobotStatement) -> Target:

@@ -5,13 +5,12 @@ from typing import Any
 import msgspec
 
 from loadtests.schedule.plan import SeriesName
-from loadtests.statistics.between_runs import Interval
 from loadtests.statistics.figures import named, rounded, rounded_interval, rounds_of
 from loadtests.statistics.histogram import SHARES
 from loadtests.statistics.intervals import LEAST_ROUNDS, Compared, compare, pooled_interval, samples_for_point
 from loadtests.statistics.judgement import Judgement, judge
 from loadtests.statistics.measured import Measured, Side
-from loadtests.statistics.rounds import Unit
+from loadtests.statistics.rounds import Interval, Unit
 
 BASE = "rest"
 WEB_SERVICES = (BASE, "soap")

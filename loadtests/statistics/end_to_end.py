@@ -6,7 +6,7 @@ that loses its slow deliveries is not fast.
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -76,3 +76,23 @@ def _over(times: Journey, base: Journey) -> dict[str, Any]:
         "ratio": rounded(median) if math.isfinite(median) else None,
         "ci95": rounded_interval(bounds) if all(map(math.isfinite, bounds)) else None,
     }
+
+
+class Offset(NamedTuple):
+    """Bounds on the robot's clock less ours, in s."""
+
+    low_s: float
+    high_s: float
+
+    @property
+    def middle_s(self) -> float:
+        """Return the middle."""
+        return (self.low_s + self.high_s) / 2
+
+    @property
+    def error_s(self) -> float:
+        """Return by how much the middle may be wrong."""
+        return (self.high_s - self.low_s) / 2
+
+
+SHARED = Offset(0.0, 0.0)

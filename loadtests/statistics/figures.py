@@ -5,11 +5,11 @@ from typing import Any
 import msgspec
 
 from loadtests.schedule.plan import SeriesName
-from loadtests.statistics.between_runs import Interval
 from loadtests.statistics.histogram import SHARES, Histogram
 from loadtests.statistics.intervals import Replicates, figure_interval_ms, samples_for_point
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Cell
+from loadtests.statistics.rounds import Interval
 
 _WITH_INTERVAL = ("p50", "p99")
 _DIGITS = 6  # nanoseconds

@@ -14,9 +14,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special
 
-from loadtests.statistics.between_runs import LEAST_REPEATS, Interval, widened_difference, widened_ratio
 from loadtests.statistics.histogram import SHARES, Floats, Histogram, Ints
-from loadtests.statistics.rounds import Rounds, Sample, Unit, in_rounds
+from loadtests.statistics.rounds import (
+    LEAST_REPEATS,
+    Interval,
+    Rounds,
+    Sample,
+    Unit,
+    in_rounds,
+    widened_difference,
+    widened_ratio,
+)
 
 RESAMPLES = 2000
 LEAST_ROUNDS = 6

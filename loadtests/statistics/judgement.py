@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from loadtests.statistics.between_runs import Interval
+from loadtests.statistics.rounds import Interval
 
 Verdict = Literal["differs", "bounded", "noise", "none"]
 #: An interval that includes both twice as long and half as long is inconclusive.

@@ -16,10 +16,10 @@ from scipy import special
 from conformance.statement.load import ServiceLevel
 from loadtests.schedule.plan import SeriesName
 from loadtests.schedule.rotation import share as share_of_requests
-from loadtests.statistics.between_runs import Interval
 from loadtests.statistics.figures import quantiles, rounded, rounded_interval
 from loadtests.statistics.histogram import SHARES, Floats, Histogram, edges_us
 from loadtests.statistics.measured import Block, Measured, counted
+from loadtests.statistics.rounds import Interval
 
 KEPT, BROKEN, NOT_KNOWN = "kept", "broken", "not known"
 _PHASES = ("duel", "aa")

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from loadtests.statistics.clock_offset import Offset
+from loadtests.statistics.end_to_end import Offset
 from loadtests.statistics.figures import rounded
 from loadtests.statistics.histogram import SHARES
 from loadtests.statistics.intervals import samples_for_point

@@ -6,8 +6,7 @@ GitHub shows ten errors and ten warnings of a step and silently drops the rest.
 from collections.abc import Mapping
 from typing import Any
 
-from reports.formats.cases import MESSAGE, Case, Outcome, cases, worst_first
-from reports.formats.places import places_of
+from reports.formats.cases import MESSAGE, Case, Outcome, cases, places_of, worst_first
 from reports.pages.untrusted import on_a_line
 
 MOST = 10

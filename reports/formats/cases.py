@@ -197,3 +197,39 @@ def _response(response: Mapping[str, Any] | None) -> Iterator[str]:
 def _cut(text: str, limit: int, octets: int | None = None) -> str:
     part = beginning(text, limit, octets)
     return f"{part.text}\n… {part.omitted} of {part.total} {part.unit} are not shown" if part.cut else part.text
+
+
+_UNKNOWN = "requirements.toml"
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A line of a file.
+
+    Attributes:
+        file: path of the file relative to the directory in which the run was started, with `/`.
+        line: number of the line, counted from 1.
+    """
+
+    file: str
+    line: int
+
+
+def places_of(result: Mapping[str, Any], case: Case) -> list[Place]:
+    """Return the lines where the vendor claims the case's class and where the contract defines the requirement.
+
+    The list has at least one place; a place that result.json does not know is left out.
+    """
+    return list(_places(result, case))
+
+
+def _places(result: Mapping[str, Any], case: Case) -> Iterator[Place]:
+    known = result.get("places", {})
+    statement, ledger = known.get("statement"), known.get("ledger")
+    if statement:
+        yield Place(statement["file"], statement["classes"].get(case.class_name, statement["line"]))
+    stated = [one for one in (ledger, known.get("generic_ledger")) if one and case.name in one["lines"]]
+    if stated:
+        yield Place(stated[0]["file"], stated[0]["lines"][case.name])
+    elif not statement:
+        yield Place(ledger["file"] if ledger else _UNKNOWN, 1)

@@ -13,8 +13,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from reports.formats.cases import MESSAGE, Case, Outcome, cases
-from reports.formats.places import places_of
+from reports.formats.cases import MESSAGE, Case, Outcome, cases, places_of
 from reports.pages.untrusted import excerpt, visible
 
 _SPEC = "0.0.0"

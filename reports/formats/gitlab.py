@@ -8,8 +8,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from reports.formats.cases import MESSAGE, Case, Outcome, cases, worst_first
-from reports.formats.places import places_of
+from reports.formats.cases import MESSAGE, Case, Outcome, cases, places_of, worst_first
 from reports.pages.untrusted import excerpt
 
 _SEVERITIES = {Outcome.FAILED: "critical", Outcome.ERROR: "major", Outcome.ACCEPTED: "minor", Outcome.WARNING: "minor"}

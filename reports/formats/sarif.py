@@ -13,8 +13,7 @@ from typing import Any
 from urllib.parse import quote
 
 from reports.certificate.page import certificate
-from reports.formats.cases import MESSAGE, STOP, Case, Outcome, cases, worst_first
-from reports.formats.places import Place, places_of
+from reports.formats.cases import MESSAGE, STOP, Case, Outcome, Place, cases, places_of, worst_first
 from reports.formats.source_pages import page_of
 from reports.pages.untrusted import excerpt, visible
 

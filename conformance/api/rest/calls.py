@@ -14,8 +14,7 @@ from conformance.api.rest.validity import require_valid
 from conformance.documents.json_schema import Schema
 from conformance.documents.openapi import SAFE, Operation, is_json
 from conformance.documents.parameters import Parameter
-from conformance.documents.serialization import path_text, query_pairs, query_text
-from conformance.documents.writing import json_text, text_of, xml_bytes
+from conformance.documents.writing import json_text, path_text, query_pairs, query_text, text_of, xml_bytes
 from conformance.transport.exchange import Exchange
 
 JSON = "application/json"

@@ -11,15 +11,16 @@ from conformance.api.rest.values import Values
 from conformance.documents.field_reading import is_binary
 from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.documents.parameters import Parameter
-from conformance.documents.serialization import (
+from conformance.documents.writing import (
     form_body,
     header_text,
+    json_text,
     multipart_body,
     path_text,
     query_pairs,
     query_text,
+    xml_bytes,
 )
-from conformance.documents.writing import json_text, xml_bytes
 from conformance.transport.exchange import Outgoing
 
 FORM: Final = "application/x-www-form-urlencoded"

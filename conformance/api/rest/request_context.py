@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from conformance.api.rest.accept import accept_of, quality
+from conformance.api.rest.formats import accept_of, quality
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation
 from conformance.documents.resources import is_normal, matching

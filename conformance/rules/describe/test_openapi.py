@@ -11,9 +11,9 @@ from conformance.api.rest.description import Described, described_by_openapi, di
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.kept_exchanges import KeptExchanges, contradiction
 from conformance.api.rest.presence import judge_there
+from conformance.documents.description_faults import openapi_fault
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import operations_of
-from conformance.documents.openapi_validity import openapi_fault
 from conformance.rules.told_once import without_numbers
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange

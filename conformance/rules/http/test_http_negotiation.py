@@ -3,8 +3,8 @@
 import pytest
 
 from conformance.api.expectation import expect
-from conformance.api.rest.accept import quality
 from conformance.api.rest.applicable import answered
+from conformance.api.rest.formats import quality
 from conformance.api.rest.interface import RestInterface
 from conformance.verdict.evidence import Judge
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import pytest
 
 from conformance.api.expectation import expect
-from conformance.api.rest.accept import quality
 from conformance.api.rest.applicable import answered
 from conformance.api.rest.calls import Call
+from conformance.api.rest.formats import quality
 from conformance.api.rest.interface import RestInterface
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge

@@ -7,8 +7,7 @@ from click.testing import CliRunner
 
 from conformance.contract.pack import Contract
 from conformance.explaining.advice import FRAMEWORKS, sources_of, topic_of, topics
-from conformance.explaining.explanation import explained
-from conformance.explaining.naming import known
+from conformance.explaining.explanation import explained, known
 from roaas import main
 
 CONTRACT = Contract.load()

@@ -1,6 +1,6 @@
 import pytest
 
-from conformance.commandline.without_folders import command_without_folders, without_folders
+from conformance.commandline.out_folder import command_without_folders, without_folders
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from conformance.documents.field_reading import multipart_verdict, query_verdict
 from conformance.documents.openapi import Body
 from conformance.documents.parameter_reading import decoded_path, judged
 from conformance.documents.parameters import Encoding, Parameter
-from conformance.documents.serialization import header_text, multipart_body, path_text, query_pairs, query_text
+from conformance.documents.writing import header_text, multipart_body, path_text, query_pairs, query_text
 
 _WHOLE = {"type": "integer", "minimum": 0}
 _LIST = {"type": "array", "items": _WHOLE, "minItems": 1, "maxItems": 3}

@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.documents.serialization import header_text, multipart_body, path_text, query_pairs, query_text
+from conformance.documents.writing import header_text, multipart_body, path_text, query_pairs, query_text
 
 _LIST, _OBJECT = ["blue", "black"], {"R": 100, "G": 200}
 

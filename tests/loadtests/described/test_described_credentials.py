@@ -17,7 +17,7 @@ from loadtests.described.device import CREDENTIALS, Device, Named, secrets_of
 from loadtests.described.operations import chosen
 from loadtests.described.requests import robot_of
 from loadtests.measuring.preflight import preflight
-from loadtests.settings.errors import SettingsError
+from loadtests.settings.settings import SettingsError
 
 NAMES = [("GET /state", "rest", "wire")]
 

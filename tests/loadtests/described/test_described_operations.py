@@ -16,9 +16,7 @@ from loadtests.described.operations import chosen, named_alike
 from loadtests.described.requests import robot_of
 from loadtests.described.streams import streams_to_hear
 from loadtests.schedule.rotation import rotation, turns_of_all
-from loadtests.settings.errors import SettingsError
-from loadtests.settings.settings import Selection
-from loadtests.settings.target import Target
+from loadtests.settings.settings import Selection, SettingsError, Target
 
 NONE = dict.fromkeys([*DESCRIBED_ONLY, *run._PAPERS_ONLY, "rest", "timeout_s", "token_file", "ca_file"])  # noqa: SLF001
 OPTIONS = {**NONE, "overlays": (), "allow": (), "never": (), "allow_motion": False}

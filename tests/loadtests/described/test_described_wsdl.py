@@ -16,7 +16,7 @@ from loadtests.described.pairs import Choice
 from loadtests.described.requests import robot_of
 from loadtests.measuring.equivalence import values_difference
 from loadtests.measuring.preflight import preflight
-from loadtests.settings.errors import SettingsError
+from loadtests.settings.settings import SettingsError
 
 NONE = dict.fromkeys([*DESCRIBED_ONLY, *run._PAPERS_ONLY, "rest", "timeout_s", "token_file", "ca_file"])  # noqa: SLF001
 OPTIONS = {**NONE, "overlays": (), "allow": (), "never": (), "allow_motion": False, "interfaces": ()}

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from loadtests.measuring.priority import first_in_line, leaves_the_robot_room
+from loadtests.measuring.machine import first_in_line, leaves_the_robot_room
 from loadtests.schedule.plan import Load, Plan
 
 PLAN = Plan(("pose",), ("rest",), ("wire",), Load(200.0, None, 1.0, 0.0, "constant", 1), 1.0, 1, 1)

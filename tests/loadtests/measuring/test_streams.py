@@ -8,13 +8,12 @@ import pytest
 from jsonpath import JSONPointer
 from websockets.sync.server import serve
 
-from loadtests.clients.described import Described, Stream
-from loadtests.clients.robot import Robot
-from loadtests.measuring.robot_clock import RobotClock
+from loadtests.clients.robot import Described, Robot, Stream
+from loadtests.measuring.clocks import RobotClock
 from loadtests.measuring.stamps import Stamp, stamp_of
 from loadtests.measuring.streams import listen
 from loadtests.settings.settings import Streams
-from loadtests.statistics.clock_offset import SHARED, Offset
+from loadtests.statistics.end_to_end import SHARED, Offset
 from loadtests.statistics.streams import stream_figures
 
 

@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from loadtests.clients.wire import now_ns
-from loadtests.measuring.priority import first_in_line
+from loadtests.measuring.machine import first_in_line
 from loadtests.schedule.alarm import make_alarm
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.pacer import Pacer

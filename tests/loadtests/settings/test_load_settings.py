@@ -11,8 +11,7 @@ from conformance.papers_robot.thresholds import ThresholdsError, load_thresholds
 from conformance.statement.endpoints import Endpoints
 from loadtests.cli import load
 from loadtests.settings.cli_options import CliOptions
-from loadtests.settings.errors import SettingsError
-from loadtests.settings.settings import Settings
+from loadtests.settings.settings import Settings, SettingsError
 from loadtests.settings.settle import MOTION_RATE, settle
 
 REST = {"rest": "http://robot:7003"}

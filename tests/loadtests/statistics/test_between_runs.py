@@ -5,16 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from loadtests.statistics.between_runs import (
+from loadtests.statistics.histogram import Histogram
+from loadtests.statistics.intervals import compare
+from loadtests.statistics.rounds import (
     BUSY_MACHINE,
     IDLE_MACHINE,
+    Unit,
     between_runs,
     widened_difference,
     widened_ratio,
 )
-from loadtests.statistics.histogram import Histogram
-from loadtests.statistics.intervals import compare
-from loadtests.statistics.rounds import Unit
 
 
 def test_variances_add_on_the_logarithmic_scale():

@@ -25,7 +25,7 @@ from loadtests.statistics.measured import Measured
 from loadtests.statistics.over_time import time_series
 from loadtests.statistics.recorder import Recorder
 from loadtests.statistics.rounds import Sample, Unit, in_rounds
-from loadtests.statistics.threshold import judge
+from loadtests.statistics.verdict import judge
 
 
 def block(values_ms):

@@ -4,8 +4,8 @@ import pytest
 
 from conformance.api.rest.description import described_by_openapi, described_by_wadl, differences
 from conformance.contract.pack import Contract
+from conformance.documents.description_faults import openapi_fault
 from conformance.documents.openapi import operations_of
-from conformance.documents.openapi_validity import openapi_fault
 from conformance.documents.representation import UnreadableError
 
 CONTRACT = Contract.load()

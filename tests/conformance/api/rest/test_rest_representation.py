@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from conformance.api.rest.accept import quality
+from conformance.api.rest.formats import quality
 from conformance.contract.pack import Contract
 from conformance.documents.json_shape import shape_of
 from conformance.documents.json_text import read_json

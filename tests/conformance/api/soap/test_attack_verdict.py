@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.api.soap.attack_verdict import attack_verdict
+from conformance.api.soap.attack_runner import attack_verdict
 from conformance.api.soap.attacks import IGNORED_SLOT, MARK, VALUE_SLOT, Attack, Template, attacks
 from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
 
