@@ -48,6 +48,27 @@ def soap(*operations: str) -> Where:
     return where
 
 
+def containing(where: Where, pattern: bytes, least: int = 1) -> Where:
+    """Return a condition for requests of ``where`` whose body has a pattern so often at least; 0: not at all."""
+    compiled = re.compile(pattern)
+
+    def holds(request: Request) -> bool:
+        found = len(compiled.findall(request.body)) if where(request) else -1
+        return found >= least if least else found == 0
+
+    return holds
+
+
+def larger(where: Where, octets: int) -> Where:
+    """Return a condition for requests of ``where`` whose body is larger."""
+    return lambda request: where(request) and len(request.body) > octets
+
+
+def with_field(where: Where, name: str, pattern: str) -> Where:
+    """Return a condition for requests of ``where`` whose header field, which may be empty, has a pattern."""
+    return lambda request: where(request) and bool(re.search(pattern, request.field(name) or ""))
+
+
 def posted(request: Request) -> bool:
     """Return whether a request is a SOAP POST, whatever its body."""
     return request.side == "soap" and request.method == "POST"
@@ -71,6 +92,11 @@ def status(*values: int) -> When:
 def refusal(response: Response) -> bool:
     """Return whether the status is 4xx."""
     return response.status in _REFUSED
+
+
+def failure(response: Response) -> bool:
+    """Return whether the status is 4xx or 5xx."""
+    return response.status >= _REFUSED.start
 
 
 def anything(_answer: Response) -> bool:
@@ -146,6 +172,11 @@ def instead(where: Where, response: Callable[[Request], Response]) -> Make:
 def always(change: Change) -> Make:
     """Return a change that remembers nothing, for any run."""
     return lambda: change
+
+
+def replied(response: Callable[[Request], Response]) -> Change:
+    """Return a change that answers each request without forwarding it to the device."""
+    return lambda request, _: response(request)
 
 
 def hanging_up(where: Where) -> Make:

@@ -4,6 +4,7 @@ They are for ``Row.json``, ``changes.values`` and ``changes.inputs``. An edit of
 KeyError, IndexError or TypeError; ``changes.guarded`` catches them for values that a client sends.
 """
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -71,3 +72,28 @@ def scaled(factor: float) -> Callable[[float], float]:
 def plus(by: float) -> Callable[[float], float]:
     """Return a function that adds ``by`` to a number."""
     return lambda number: number + by
+
+
+def sliced(*bounds: int | None) -> Callable[[Any], Any]:
+    """Return a function that returns a slice of a list."""
+    return lambda items: items[slice(*bounds)]
+
+
+def first_twice(items: list[Any]) -> list[Any]:
+    """Return a list with its first item twice."""
+    return [*items, *items[:1]]
+
+
+def wrapped(name: str) -> Callable[[Any], Any]:
+    """Return a function that puts a value into an object."""
+    return lambda value: {name: value}
+
+
+def each_with(**members: Any) -> Callable[[Any], Any]:
+    """Return a function that sets members of each object in a list."""
+    return lambda items: [{**item, **members} for item in items]
+
+
+def replaced(pattern: str, by: str) -> Callable[[str], str]:
+    """Return a function that replaces a pattern in a text."""
+    return lambda text: re.sub(pattern, by, text)

@@ -176,24 +176,9 @@ class _Exhausted:
 _mutant("attack-file-leaked", "external-entity", "The file of an external entity appears in the fault.").made(
     _quoting(lambda body: [url for _, url in _EXTERNAL.findall(body)])
 )
-_mutant("attack-expansion-fine", "expansion", "Exponentially expanding entities return a normal response.").rewritten(
-    _posting(lambda body: body.count(b"<!ENTITY") > 2), _undeclared
-)
 _mutant(
     "attack-quadratic-fine", "quadratic", "A long entity that is used many times returns a normal response."
 ).rewritten(_posting(lambda body: 0 < body.count(b"<!ENTITY") <= 2 and body.count(b"&") > 50), _undeclared)
-_mutant("attack-attributes-fine", "attributes", "Thousands of attributes return 200.").instead(
-    _posting(lambda body: body.count(b'="') > 5000), _DONE
-)
-_mutant("attack-long-name-fine", "long-name", "An element name of a million characters returns 200.").instead(
-    _posting(lambda body: bool(re.search(rb"<[\w:.-]{5000,}", body))), _DONE
-)
-_mutant("attack-size-fine", "size", "A message over 10 MiB returns 200.").instead(
-    _posting(lambda body: len(body) > _LARGE), _DONE
-)
-_mutant("attack-bomb-unpacked", "compressed", "A compressed message of any size is unpacked.").instead(
-    lambda request: posted(request) and bool(request.field("Content-Encoding")), _DONE
-)
 _mutant("attack-instruction-fine", "processing-instruction", "Processing instructions are ignored.").rewritten(
     posted, lambda request: setattr(request, "body", _INSTRUCTION.sub(b"", request.body))
 )

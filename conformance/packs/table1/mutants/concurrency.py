@@ -6,18 +6,16 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from conformance.mutation.changes import Make, Where, inputs, parsed, plain, posted, problem, rest, soap
+from conformance.mutation.changes import Make, Where, inputs, parsed, plain, problem, rest, soap
 from conformance.mutation.messages import Change, Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.crowd import COMPANY_S, Crowd, when_crowded
-from conformance.packs.table1.mutants.paths import GOAL, TNS, VELOCITY, deliveries
+from conformance.packs.table1.mutants.paths import GOAL, TNS, VELOCITY
 from conformance.packs.table1.mutants.soap_responses import enveloped
 
 MUTANTS = Table()
-_order = MUTANTS.of_class("soap-delivery", "soap")
 _resource = MUTANTS.of_class("rest-resources", "rest")
 _mutant = MUTANTS.of_class("http", "rest")
-_message = MUTANTS.of_class("equivalence", "both", observer=True)
 
 # How long an answer waits for another one to be mixed up with, s.
 _MEETS_S: Final = 0.05
@@ -187,30 +185,6 @@ _EMPTY = plain(204)
 _SOAP_DELIVERY = soap("ExecuteDeliveryRequest")
 _ACCEPTED = enveloped(f'<t:ExecuteDeliveryRequestResponse xmlns:t="{TNS}"/>')
 
-_mutant(
-    "http-pipelining-backwards",
-    "web-server/pipelining",
-    "Of two pipelined requests, the robot answers the second first.",
-    backwards=True,
-)(lambda request, forward: forward(request))
-_message(
-    "clients-delivery-lost", "delivery-concurrent", "A REST delivery during another one returns 204 and is lost."
-).made(when_crowded(deliveries, lambda request, _: _EMPTY(request)))
-_message("clients-delivery-lost-seldom", "delivery-concurrent", "Every 50th concurrent REST delivery is lost.").made(
-    when_crowded(deliveries, lambda request, _: _EMPTY(request), 50)
-)
-_message(
-    "clients-soap-delivery-lost", "delivery-concurrent", "A SOAP delivery during another one succeeds and is lost."
-).made(when_crowded(_SOAP_DELIVERY, lambda request, _: _ACCEPTED(request)))
 _resource(
     "clients-goal-new-to-all", "goal-concurrent", "Every client that sends the same new goal concurrently gets 201."
 ).made(when_crowded(_PUT_GOAL, lambda request, forward: _created(forward(request))))
-_resource("clients-goal-conflict", "goal-concurrent", "Two clients that send the same goal concurrently get 409.").made(
-    when_crowded(_PUT_GOAL, lambda request, _: problem(409, "goal_id.id: in use")(request), 2)
-)
-_resource("clients-velocity-lost", "concurrent-puts", "Concurrent velocity commands are lost.").made(
-    when_crowded(_PUT_VELOCITY, lambda request, _: _EMPTY(request))
-)
-_order("soap-small-messages", "size", "A message over 32 KiB returns 413.").instead(
-    lambda request: posted(request) and len(request.body) > _SMALL, problem(413, "too large")
-)

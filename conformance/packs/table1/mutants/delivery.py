@@ -79,17 +79,3 @@ class OnlyOnce:
 _mutant("delivery-coffee-unknown", "put", "PUT of a coffee (code 4) returns 404.").instead(
     lambda request: deliveries(request) and request.path.split("/")[_CODE] == "4", problem(404, "code: 4 is not known")
 )
-_mutant("delivery-list-oldest-first", "list-newest-first", "The list of deliveries has the oldest first.").json(
-    _LIST, lambda entries: entries[::-1]
-)
-_mutant("delivery-list-all-soap", "list-values", "The list says of each delivery that it came over SOAP.").json(
-    _LIST, lambda entries: [{**entry, "interface": "soap"} for entry in entries]
-)
-_mutant(
-    "delivery-list-states",
-    "list",
-    "The entries of the list of deliveries have a state that the contract does not have.",
-).json(_LIST, lambda entries: [{**entry, "state": "lost"} for entry in entries])
-_mutant("delivery-wants-no-body", "put-body", "The robot refuses a delivery with a request body.").instead(
-    lambda request: deliveries(request) and bool(request.body), problem(415, "a body is not expected")
-)

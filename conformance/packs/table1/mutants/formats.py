@@ -115,17 +115,8 @@ _mutant("format-charset-wrong", "charset", "XML and text responses in UTF-8 decl
 _mutant(
     "format-named-twice", "http/field-once", "Responses have two Content-Type headers with different media types."
 ).altered(_GET, lambda answer: answer.fields.append(("Content-Type", "text/html")))
-_mutant("format-large-xml", "xml-input", "XML bodies over 32 KiB return 413.").instead(
-    lambda request: _xml_put(request) and len(request.body) > _SMALL, problem(413, "too large")
-)
 _mutant(
     "format-xml-velocity-unsigned",
     "rest-resources/velocity-converges",
     "A velocity that is sent as XML is obeyed without its signs.",
 ).made(secretly(lambda request: _xml_put(request) and request.path == VELOCITY, _unsigned))
-_mutant(
-    "format-problems-in-json", "problem-xml", "Errors of GET are JSON although the client accepts only XML."
-).altered(_GET, _json_problem, lambda response: response.status >= 400)
-_mutant(
-    "format-problems-of-input-in-json", "problem-xml", "Errors of PUT are JSON although the client accepts only XML."
-).altered(_PUT, _json_problem, lambda response: response.status >= 400)

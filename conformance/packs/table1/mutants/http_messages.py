@@ -5,19 +5,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from conformance.mutation.changes import (
-    JSON,
-    Make,
-    Where,
-    altered,
-    hanging_up,
-    instead,
-    parsed,
-    plain,
-    problem,
-    rest,
-    values,
-)
+from conformance.mutation.changes import JSON, Make, Where, altered, instead, parsed, plain, problem, rest, values
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.packs.table1.mutants.paths import POSE, RESOURCES
@@ -156,11 +144,6 @@ def _page(response: Response) -> None:
     response.put("Content-Type", "text/html")
 
 
-_mutant(
-    "http-large-body-closes",
-    "content-too-large-answered",
-    "Bodies over 10 MiB close the connection without a response.",
-).made(hanging_up(lambda request: request.side == "rest" and len(request.body) > 10 * 1024 * 1024))
 _mutant("http-large-field-crash", "web-server/header-too-large", "A header of 128 KiB returns 500.").instead(
     lambda request: _ANY(request) and any(len(value) > 60_000 for _, value in request.fields), problem(500, "oops")
 )
@@ -184,20 +167,6 @@ _mutant(
 )(_hosts(lambda hosts: len(hosts) > 1 and len(set(hosts)) == 1))
 _mutant("http-problem-other-status", "problem-status", "The status member of problem details is wrong.").made(
     _problems(lambda value: value.update(status=400 if value["status"] != 400 else 422))
-)
-_mutant("http-problem-vague", "problem-detail", "The detail of problem details is always 'invalid input'.").made(
-    _problems(lambda value: value.update(detail="invalid input"), _INPUT)
-)
-_mutant(
-    "http-problem-vague-of-xml", "problem-detail", "The detail for an invalid XML body is always 'invalid input'."
-).made(
-    _problems(
-        lambda value: value.update(detail="invalid input"),
-        lambda request: _INPUT(request) and request.media_type.endswith("xml"),
-    )
-)
-_mutant("http-problem-mute", "problem-detail", "Problem details have no detail.").made(
-    _problems(lambda value: value.pop("detail", None) and None)
 )
 _mutant("http-traceback", "no-traceback", "The detail of problem details contains a traceback.").made(
     _problems(lambda value: value.update(detail=value["detail"] + "\n" + _TRACE), _INPUT)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from conformance.mutation.changes import JSON, anything, page, problem, rest, status, success
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
-from conformance.packs.table1.mutants.paths import GOAL, RESOURCES, SERVICES
+from conformance.packs.table1.mutants.paths import GOAL, RESOURCES
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("http", "rest")
@@ -100,9 +100,6 @@ def _not_found(request: Request, forward: Forward) -> Response:
     return response
 
 
-_mutant("http-wrapped", "declared-body", "Lists are wrapped in an object.").json(
-    rest("GET", SERVICES), lambda items: {"services": items}
-)
 _mutant("http-post-reads", "method-not-allowed", "POST is handled like GET.")(
     lambda request, forward: forward(
         request.copy(method="GET") if _ANY(request) and request.method == "POST" else request
@@ -128,9 +125,6 @@ _mutant("http-slash-served", "trailing-slash", "The robot serves paths without t
         if _missing_slash(request)
         else request
     )
-)
-_mutant("http-accepts-anything", "not-acceptable", "The robot ignores Accept.").rewritten(
-    _GET, lambda request: request.put("Accept", JSON)
 )
 _mutant("http-date-zone", "date-format", "Date ends with -0000 instead of GMT.").altered(
     _ANY, lambda response: response.put("Date", (response.field("Date") or "").replace("GMT", "-0000")), anything

@@ -8,7 +8,7 @@ from typing import Any
 from conformance.mutation.changes import SOAP, Make, parsed, posted, problem, rest, success, unwanted
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
-from conformance.packs.table1.mutants.paths import DELIVERIES, GOAL, LINEAR, POSE, TNS, VELOCITY, deliveries
+from conformance.packs.table1.mutants.paths import DELIVERIES, GOAL, POSE, TNS, VELOCITY, deliveries
 from conformance.packs.table1.mutants.soap_responses import enveloped
 
 MUTANTS = Table()
@@ -139,22 +139,6 @@ def _other_media_type(request: Request, forward: Forward) -> Response:
         fields = [pair for pair in request.fields if pair[0].lower() != "content-type"]
         forward(request.copy(fields=[*fields, ("Content-Type", "text/xml; charset=utf-8")]))
     return response
-
-
-_mutant(
-    "input-velocity-refused-and-driven",
-    "velocity-refused",
-    "An invalid velocity returns an error, and the robot drives.",
-).made(after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2)))
-_mutant("http-406-and-driven", "http/not-acceptable-undone", "A velocity returns 406, and the robot drives.").made(
-    after_refusal(rest("PUT", VELOCITY, LINEAR), lambda request, forward: drive(request, forward, 0.2), {406})
-)
-_mutant("http-406-and-goal", "http/not-acceptable-undone", "A goal returns 406, and the robot has a goal.").made(
-    after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5), {406})
-)
-_mutant(
-    "input-goal-refused-and-taken", "goal-refused", "An invalid goal returns an error, and the robot has a goal."
-).made(after_refusal(rest("PUT", GOAL), lambda request, forward: goal_ahead(request, forward, 0.5)))
 
 
 @_mutant(

@@ -125,9 +125,6 @@ _mutant("odometry-in-degrees", "velocity-odometry", "The odometry's turning rate
 _mutant("pose-clock-milliseconds", "pose-clock", "The stamp's nanosec counts milliseconds.").json(
     _AT, field(_NANOSEC, lambda nanosec: nanosec // 10**6)
 )
-_mutant("pose-short-covariance", "pose-type", "The pose's covariance has 35 values.").json(
-    _AT, field("pose.covariance", lambda numbers: numbers[:35])
-)
 _mutant("pose-numbers-as-text", "pose-type", "In one pose of 50, x is a string.").json(_AT, field(_X, str), nth=50)
 _mutant("pose-quaternion-long", "pose-quaternion", "The orientation quaternion is 1 % too long.").json(
     _AT, field(_ORIENTATION, lambda q: {axis: 1.01 * part for axis, part in q.items()})

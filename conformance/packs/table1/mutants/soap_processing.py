@@ -11,7 +11,7 @@ from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import xml
 from conformance.packs.table1.mutants.paths import TNS
-from conformance.packs.table1.mutants.soap_responses import coded, fault, is_fault
+from conformance.packs.table1.mutants.soap_responses import coded, is_fault
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("soap-basic-profile", "soap")
@@ -126,26 +126,6 @@ def _unknown(request: Request) -> bool:
 _NOTHING = f'<t:NothingResponse xmlns:t="{TNS}"/>'
 
 
-_mutant(
-    "bp-bare-envelope", "soap-delivery/syntax", "An Envelope with an attribute of another namespace returns a fault."
-).instead(
-    lambda request: posted(request) and bool(re.search(rb"Envelope [^>]*:Id=", request.body)),
-    fault("Client", "an attribute that is not known"),
-)
-_mutant("bp-wants-types", "R1017", "A request without xsi:type returns a fault.").instead(
-    lambda request: _ACT(request) and b"XMLSchema-instance" not in request.body, fault("Client", "xsi:type is missing")
-)
 _mutant("bp-ignores-mandatory", "R1027", "The robot ignores mandatory header blocks.")(
     lambda request, forward: forward(without_headers(request) if _mandatory(request) else request)
-)
-_mutant("bp-no-empty-action", "R1109", "An empty SOAPAction returns a fault.").instead(
-    lambda request: posted(request) and len(request.field("SOAPAction") or "") == 2,
-    fault("Client", "The given SOAPAction does not match an operation."),
-)
-_mutant("bp-no-byte-order-mark", "R4001", "A byte order mark returns a fault.").instead(
-    lambda request: posted(request) and request.body.startswith(b"\xef\xbb\xbf"),
-    fault("Client", "content is not allowed in prolog"),
-)
-_mutant("bp-no-utf-16", "utf-16", "A message in UTF-16 returns a fault.").instead(
-    lambda request: posted(request) and request.body[:2] in {b"\xff\xfe", b"\xfe\xff"}, fault("Client", "not UTF-8")
 )

@@ -68,15 +68,6 @@ def _first_part(request: Request) -> None:
     request.body = request.body[:8192]
 
 
-_mutant("bp-type-case", "media-type-case", "A Content-Type with a capital letter returns 415.").instead(
-    lambda request: posted(request) and not (request.field("Content-Type") or "").startswith("text/xml"),
-    problem(415, "text/xml, please"),
-)
-_mutant("bp-quoted-charset", "charset-forms", "A charset in quotation marks returns 415.").instead(
-    lambda request: posted(request) and '"' in (request.field("Content-Type") or ""), problem(415, "text/xml, please")
-)
-
-
 @_mutant(
     "bp-token-refused-and-made",
     "authentication",
