@@ -1,7 +1,8 @@
 """Scenarios: functions that operate a device and return a trace, without judging it."""
 
 import inspect
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -75,6 +76,15 @@ class PartialTraceError(Exception):
     def __init__(self, trace: Any) -> None:
         super().__init__("the scenario broke off")
         self.trace = trace
+
+
+@contextmanager
+def partial_trace(trace: Callable[[], Any]) -> Iterator[None]:
+    """Raise PartialTraceError with what was recorded so far where the block is aborted."""
+    try:
+        yield
+    except Exception as error:
+        raise PartialTraceError(trace()) from error
 
 
 @dataclass

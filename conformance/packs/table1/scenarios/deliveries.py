@@ -14,7 +14,7 @@ from conformance.packs.table1.robot.delivery_sender import DeliverySender, Order
 from conformance.packs.table1.robot.delivery_trace import Deliveries
 from conformance.packs.table1.robot.probe import ProbeError, RosProbe
 from conformance.papers_robot.delivery import COFFEE, COURIER
-from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
+from conformance.scenarios.scenario import NotPossibleError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.verdict.effort import Effort
 from conformance.verdict.explorer import Explorer
@@ -63,7 +63,7 @@ def deliveries(
         if sender.lost < _ENOUGH:
             sender.send(orders)
 
-    try:
+    with partial_trace(sender.trace):
         # A robot that reads only some of these digits still reads a number: it takes another delivery.
         digits = (Delivery(COURIER, *(1234.5678 + 100 * n + place for place in range(6))) for n in range(_STYLES))
         send([_order("soap", delivery) for delivery in digits])
@@ -72,8 +72,6 @@ def deliveries(
         for turn in range(effort.cases(8)):
             if sender.lost < _ENOUGH:
                 sender.send_together(_crowd(turn))
-    except Exception as error:
-        raise PartialTraceError(sender.trace()) from error
     return sender.trace()
 
 

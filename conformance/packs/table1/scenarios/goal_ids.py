@@ -12,7 +12,7 @@ from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.scenarios.goal_life import put_new
 from conformance.packs.table1.scenarios.plans import is_refused
-from conformance.scenarios.scenario import PartialTraceError, scenario
+from conformance.scenarios.scenario import partial_trace, scenario
 from conformance.scenarios.stage import Need
 from conformance.verdict.evidence import RefutedError
 from conformance.verdict.explorer import Explorer
@@ -56,7 +56,7 @@ def goal_ids(robot: Robot, explore: Explorer) -> tuple[Put, ...]:
         if puts[-1].exchange.response.status not in NEW:
             raise RefutedError  # so that a simpler id is looked for with the same response
 
-    try:
+    with partial_trace(lambda: tuple(puts)):
         # Also with little effort: as octets it is twice as long.
         explore(st.just("\u00e9" * _LONGEST), put, cases=1)
         for id_ in _ALIKE:
@@ -64,8 +64,6 @@ def goal_ids(robot: Robot, explore: Explorer) -> tuple[Put, ...]:
         explore(st.one_of(st.sampled_from(_KNOWN), st.text(_CHARACTERS, min_size=1, max_size=_LONGEST)), put, cases=40)
         robot.delete_goal()
         await_none(robot)
-    except Exception as error:
-        raise PartialTraceError(tuple(puts)) from error
     return tuple(puts)
 
 
@@ -94,10 +92,8 @@ def goal_poses(robot: Robot, explore: Explorer) -> tuple[GoalRead, ...]:
 
     lengths = st.sampled_from((1.0, 1.0005, 0.9995))
     cases = st.tuples(st.integers(0, 1), st.floats(-0.1, 0.1), st.floats(-3.1, 3.1), lengths)
-    try:
+    with partial_trace(lambda: tuple(reads)):
         explore(cases, put, cases=20)
         robot.delete_goal()
         await_none(robot)
-    except Exception as error:
-        raise PartialTraceError(tuple(reads)) from error
     return tuple(reads)

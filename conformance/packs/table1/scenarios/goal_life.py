@@ -23,7 +23,7 @@ from conformance.packs.table1.robot.goals import choose_goals, meanwhile
 from conformance.packs.table1.robot.robot import JSON_BODY, LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.standstill import Standstill, watch_rest
 from conformance.packs.table1.robot.standstill_trace import Rest
-from conformance.scenarios.scenario import PartialTraceError, scenario
+from conformance.scenarios.scenario import partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange
 
@@ -44,10 +44,8 @@ _AFTER: Final = "the goal was cancelled"
 def goal_life(robot: Robot, standstill: Standstill) -> GoalLife:
     """Do all that clients do with a goal, put another in its place, and cancel that."""
     player = _Player(robot)
-    try:
+    with partial_trace(lambda: player.life):
         player.play(standstill)
-    except Exception as error:
-        raise PartialTraceError(player.life) from error
     return player.life
 
 

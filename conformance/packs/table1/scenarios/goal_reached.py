@@ -20,7 +20,7 @@ from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.message_shapes import ODOMETRY
 from conformance.packs.table1.robot.plan import ask, ask_over_soap, start_of
 from conformance.packs.table1.robot.robot import POSE, Robot
-from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
+from conformance.scenarios.scenario import NotPossibleError, partial_trace, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
@@ -79,13 +79,11 @@ def _sent(robot: Robot, subscribers: SoapService | None, effort: Effort, seed: i
     if subscribers is not None:
         soap_services.ask(subscribers, "GetGoal")  # what is kept from now is seen when the goal has ended
     way = _Way(robot, subscribers, Drive(robot), trace)
-    try:
+    with partial_trace(lambda: way.recorded):
         way.drive_to(there, here)
         motion = robot.statement.motion
         turns = effort.name != "quick" and robot.actuated(5) and motion.turns_on_the_spot
         way.look_back(here, before, body, turns=turns)
-    except Exception as error:
-        raise PartialTraceError(way.recorded) from error
     return way.recorded
 
 

@@ -12,7 +12,7 @@ from conformance.packs.table1.robot.invalid_bodies import elsewhere, invalid_bod
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.robot import GOAL_PATH, Robot
 from conformance.packs.table1.scenarios.plans import is_refused
-from conformance.scenarios.scenario import PartialTraceError, scenario
+from conformance.scenarios.scenario import partial_trace, scenario
 from conformance.scenarios.stage import Need
 from conformance.transport.exchange import Exchange
 
@@ -49,11 +49,9 @@ def invalid_goals(api: RestInterface, robot: Robot) -> tuple[InvalidGoal, ...]:
     bodies += [(what, JSON, body_of(body)) for what, body in _invalid_goals(near, frame)]
     bodies = api.run.effort.alternatives(bodies, 8)
     sent: list[InvalidGoal] = []
-    try:
+    with partial_trace(lambda: tuple(sent)):
         _send_without(robot, bodies, sent)
         _send_elsewhere(robot, body_of(goal_body(near, frame, "not to be followed either")), sent)
-    except Exception as error:
-        raise PartialTraceError(tuple(sent)) from error
     return tuple(sent)
 
 

@@ -11,7 +11,7 @@ from conformance.packs.table1.robot.robot import LINEAR, STILL, VELOCITY, Robot
 from conformance.packs.table1.robot.standstill import Standstill, read_rest
 from conformance.packs.table1.robot.standstill_trace import Rest
 from conformance.packs.table1.robot.stopping import bring_to_rest
-from conformance.scenarios.scenario import PartialTraceError, scenario
+from conformance.scenarios.scenario import partial_trace, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
 
@@ -22,10 +22,8 @@ _AFTER: Final = "invalid velocities"
 def invalid_velocities(api: RestInterface, robot: Robot, standstill: Standstill) -> tuple[Rest, ...]:
     """Send invalid velocities, at rest."""
     rests: list[Rest] = []
-    try:
+    with partial_trace(lambda: tuple(rests)):
         _send(api, robot, rests)
-    except Exception as error:
-        raise PartialTraceError(tuple(rests)) from error
     repeat = partial(_repeat, api, robot)
     standstill.attempted("strict-input/velocity-refused", _AFTER, repeat, seconds=robot.limits.settle_s)
     return tuple(rests)

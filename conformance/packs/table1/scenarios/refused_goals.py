@@ -9,7 +9,7 @@ from conformance.packs.table1.robot.goal import NEW, REPEATED, await_none, goal_
 from conformance.packs.table1.robot.goal_trace import FarGoal, RefusedGoals, SpecialGoal
 from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.robot import Robot
-from conformance.scenarios.scenario import PartialTraceError, scenario
+from conformance.scenarios.scenario import partial_trace, scenario
 from conformance.scenarios.stage import Need
 
 # A robot may look for a way, and try its recoveries, before it ends the goal (contract.md#goals), s.
@@ -25,10 +25,8 @@ def refused_goals(robot: Robot) -> RefusedGoals:
     """Put goals outside the map, in unknown frames, and with quaternions of many lengths."""
     (near,) = choose_goals(robot, 1.0, 1)
     player = _Player(robot)
-    try:
+    with partial_trace(lambda: player.goals):
         player.play(near)
-    except Exception as error:
-        raise PartialTraceError(player.goals) from error
     return player.goals
 
 

@@ -15,7 +15,7 @@ from conformance.packs.table1.robot.standstill import Standstill, read_rest, wat
 from conformance.packs.table1.robot.standstill_trace import Rest
 from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.packs.table1.scenarios.plans import is_refused
-from conformance.scenarios.scenario import PartialTraceError, scenario
+from conformance.scenarios.scenario import partial_trace, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
@@ -69,10 +69,8 @@ class RefusedVelocities:
 def refused_velocities(robot: Robot, effort: Effort, standstill: Standstill) -> RefusedVelocities:
     """Send velocities beyond the limits and in components that are not actuated, on both resources, at rest."""
     player = _Player(robot, effort)
-    try:
+    with partial_trace(lambda: player.trace):
         player.play()
-    except Exception as error:
-        raise PartialTraceError(player.trace) from error
     repeat = partial(_repeat, robot, effort)
     standstill.attempted("safety/refused-keeps", _AFTER, repeat, seconds=robot.limits.settle_s)
     return player.trace

@@ -8,50 +8,37 @@ from typing import Final
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_trace import Batch, Deliveries, Sent
 from conformance.packs.table1.scenarios.deliveries import deliveries, deliveries_last, deliveries_later
-from conformance.scenarios.rule import Outcome, rule
+from conformance.scenarios.rule import Outcome, Rule, rule
 from conformance.verdict.case import Case
 
 # How a delivery was sent that must make two messages, and their interfaces.
 _TWO: Final = {"same": ["rest", "soap"], "twice": ["rest", "rest"]}
 # The robot may have other clients: messages that the suite did not cause are a failure only in so many batches.
 _OFTEN: Final = 2
-_ALWAYS: Final = (deliveries, deliveries_later, deliveries_last)
 
 
-@rule("equivalence/delivery-rest", on=_ALWAYS)
-def delivery_rest(trace: Deliveries) -> Iterator[Outcome]:
-    """Judge that a delivery accepted over REST arrives once, with identical values."""
-    return _arrives_once(trace, "rest")
+def _arriving(requirement: str, how: str, says: str) -> Rule:
+    """Return the rule that each delivery that was sent in one way arrives once."""
+
+    def judge(trace: Deliveries) -> Iterator[Outcome]:
+        return _arrives_once(trace, how)
+
+    judge.__doc__ = f"Judge that {says}."
+    return rule(f"equivalence/{requirement}", on=(deliveries, deliveries_later, deliveries_last))(judge)
 
 
-@rule("equivalence/delivery-soap", on=_ALWAYS)
-def delivery_soap(trace: Deliveries) -> Iterator[Outcome]:
-    """Judge that a delivery accepted over SOAP arrives once, with identical values."""
-    return _arrives_once(trace, "soap")
-
-
-@rule("equivalence/coffee-soap", on=_ALWAYS)
-def coffee_soap(trace: Deliveries) -> Iterator[Outcome]:
-    """Judge that a coffee request accepted over SOAP arrives once, with identical values and code 4."""
-    return _arrives_once(trace, "coffee")
-
-
-@rule("equivalence/delivery-same", on=_ALWAYS)
-def delivery_same(trace: Deliveries) -> Iterator[Outcome]:
-    """Judge that the same delivery over REST and over SOAP makes two identical messages."""
-    return _arrives_once(trace, "same")
-
-
-@rule("equivalence/delivery-repeated", on=_ALWAYS)
-def delivery_repeated(trace: Deliveries) -> Iterator[Outcome]:
-    """Judge that a repeated PUT makes another message."""
-    return _arrives_once(trace, "twice")
-
-
-@rule("equivalence/delivery-concurrent", on=_ALWAYS)
-def delivery_concurrent(trace: Deliveries) -> Iterator[Outcome]:
-    """Judge that each of several deliveries accepted at once arrives once, with identical values."""
-    return _arrives_once(trace, "together")
+delivery_rest = _arriving("delivery-rest", "rest", "a delivery accepted over REST arrives once, with identical values")
+delivery_soap = _arriving("delivery-soap", "soap", "a delivery accepted over SOAP arrives once, with identical values")
+coffee_soap = _arriving(
+    "coffee-soap", "coffee", "a coffee request accepted over SOAP arrives once, with identical values and code 4"
+)
+delivery_same = _arriving(
+    "delivery-same", "same", "the same delivery over REST and over SOAP makes two identical messages"
+)
+delivery_repeated = _arriving("delivery-repeated", "twice", "a repeated PUT makes another message")
+delivery_concurrent = _arriving(
+    "delivery-concurrent", "together", "each of several deliveries accepted at once arrives once, with identical values"
+)
 
 
 @rule("equivalence/delivery-order", on=(deliveries,))
