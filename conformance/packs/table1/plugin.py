@@ -137,7 +137,7 @@ class Device(device.Device):
 
     def questions(self, api: device.Rest) -> Iterable[device.Question]:
         """Return plans to several poses, whose responses can be told apart."""
-        from conformance.packs.table1.robot.plan_questions import plan_questions  # noqa: PLC0415 - see the class
+        from conformance.packs.table1.robot.plan import plan_questions  # noqa: PLC0415 - see the class
 
         return plan_questions(api)
 

@@ -1,4 +1,4 @@
-"""Authentication over SOAP: a message without valid credentials is refused."""
+"""Messages without valid credentials are refused; and what provokes the responses that checkers of SOAP judge."""
 
 from contextlib import closing
 from dataclasses import replace
@@ -7,10 +7,15 @@ import pytest
 
 from conformance.api.expectation import expect
 from conformance.api.soap.callable_services import SoapServices, callable_services
+from conformance.api.soap.calls import call
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.service import MEDIA_TYPE
 from conformance.api.soap.valid_messages import quiet_example
+from conformance.checkers.soap import PASSIVE
+from conformance.documents.xml_names import clark
+from conformance.documents.xml_node import Node
 from conformance.transport.client import HttpClient
+from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 _ID = "soap-basic-profile/authentication"
@@ -40,3 +45,18 @@ def test_messages_without_credentials(soap: SoapServices, judge: Judge) -> None:
                     fresh=True,
                 )
                 expect(judge, _ID, exchange).status(401, when=f"the credentials are {what}")
+
+
+_STRANGE = Node(clark("urn:example:strange", "no_such_operation"))
+
+
+@pytest.mark.phase("reach")
+@pytest.mark.requirement(*PASSIVE)
+def test_every_answer_is_watched(soap: SoapServices, effort: Effort) -> None:
+    """Provoke a fault, and call each operation without arguments; the observer judges every response of the run."""
+    for service in callable_services(soap, *PASSIVE):
+        for _ in range(effort.cases(10)):
+            call(service, _STRANGE)
+            for operation in service.contract.operations if service is soap.subscribers else ():
+                if operation.request:
+                    call(service, Node(operation.request))
