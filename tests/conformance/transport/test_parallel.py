@@ -45,7 +45,7 @@ def test_each_request_has_its_answer_and_all_are_there_at_once(client):
     rounds = [[(client, Outgoing("GET", f"/{turn}/{number}")) for number in range(CLIENTS)] for turn in range(3)]
     attempts = send_together(rounds)
     assert [[item.response.body.decode() for item in turn] for turn in attempts] == [
-        [item.path for item in turn] for turn in rounds
+        [item.target for _, item in turn] for turn in rounds
     ]
     assert len(client.connection.listeners[0].exchanges) == client.connection.sent == 3 * CLIENTS
 
