@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Final, NamedTuple
 
+from conformance.api.rest.statuses import CRASHES
 from conformance.checkers.occasion import METHODS, Occasion
 from conformance.documents.json_shape import shape_of
 from conformance.documents.json_text import read_json
@@ -13,8 +14,8 @@ from conformance.documents.resources import Resource, resource_at, resources_of
 from conformance.transport.exchange import SAFE_METHODS
 from conformance.verdict.case import Case
 
-# Statuses that say nothing of the resource.
-_NOT_NOW: Final = frozenset({401, 403, 429, 503})
+# Statuses that say nothing of the resource; a crash, whatever the method, is a finding of its own.
+_NOT_NOW: Final = frozenset({401, 403, 429, 503}) | CRASHES
 # By these a device says that it has no HEAD; by those, that it has no such resource.
 _NO_HEAD: Final = frozenset({404, 405, 501})
 _NO_RESOURCE: Final = frozenset({400, 404, 410, 422})

@@ -93,8 +93,8 @@ READERS = {
         "registry build {}/result --keys {}/keys --out {}/site": (1, 2),
         "report {}/result": (0, 2),
     },
-    "result/traces.json.gz": {"judge {}/result": (0, 2), "report {}/result": (0,)},
-    "result/history.jsonl.gz": {"judge {}/result": (1, 2), "report {}/result": (0,)},
+    "result/traces.json.gz": {"judge {}/result": (0, 2)},
+    "result/history.jsonl.gz": {"judge {}/result": (1, 2)},
     "result/description/openapi.json": {"diff {}/result {}/result": (2,), "replay {}/result": (2, 4)},
     "result/description/pack.toml": {"replay {}/result": (2, 4)},
 }  # fmt: skip
@@ -126,6 +126,16 @@ def test_a_file_that_is_none(well_made, tmp_path, place, what):
         assert SECRET not in done.output
         assert done.exit_code == 0 or len(done.output) < 4000
     assert _tree(tmp_path) == before
+
+
+@pytest.mark.parametrize("place", ["result/traces.json.gz", "result/history.jsonl.gz"])
+def test_pages_need_neither_traces_nor_history(well_made, tmp_path, place):
+    """Whatever is in their place."""
+    sent = well_made.sent(tmp_path / "sent")
+    for what in (a_pipe, endless):
+        (sent / place).unlink(missing_ok=True)
+        what(sent / place)
+        check(run("report {}/result", sent), 0)
 
 
 def test_a_command_in_a_process_of_its_own(well_made, tmp_path):

@@ -129,7 +129,7 @@ def test_a_device_that_does_not_know_if_match_is_not_blamed(tmp_path):
     [
         ("head", [one("HEAD /tubes 200"), _READ, one("HEAD /tubes/1 404"), _READ]),
         ("head", [_READ, one("HEAD /tubes/1 405"), _READ, one("HEAD /tubes 200")]),
-        ("head", [_READ, one("HEAD /tubes/1 500"), _READ]),
+        ("head", [_READ, one("HEAD /tubes/1 406"), _READ]),
         ("head", [_FIRST, one("HEAD /tubes?limit=1 400"), _FIRST]),
         ("head", [_TAG_A, one(_HEAD, etag='"b"'), _TAG_A]),
         ("head", [one("HEAD /tubes 200", etag='"x"'), _TAG_A, one(_HEAD), _TAG_A]),
@@ -164,6 +164,12 @@ def test_faults_are_found_wherever_they_come(tmp_path, requirement, exchanges):
     assert _broken(tmp_path, exchanges) == {
         f"description/{requirement}" if requirement != "length" else "http/head-length"
     }
+
+
+@pytest.mark.parametrize("status", [500, 502, 504])
+def test_a_head_that_crashes_is_a_crash_alone(tmp_path, status):
+    found = _all(tmp_path, [_READ, one(f"HEAD /tubes/1 {status}"), _READ])
+    assert (set(found) & {"description/head", "robustness/no-server-error"}) == {"robustness/no-server-error"}
 
 
 def test_a_declared_405_is_judged_by_its_schema(tmp_path):
