@@ -1,5 +1,6 @@
 """Fixtures for every room's tests, such as a ROS domain of one's own, and the order in which processes share tests."""
 
+import gc
 import os
 import signal
 from collections import Counter
@@ -29,6 +30,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     if "PYTEST_XDIST_WORKER" in os.environ:
         tests = Counter(item.path for item in items)
         items.sort(key=lambda item: (item.path.parent.name not in _OF_COMMANDS, -tests[item.path], item.path))
+
+
+def pytest_collection_finish() -> None:
+    """Look seldom for garbage in circles, and never among modules and tests, which live as long as the process."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(50_000, 50)
 
 
 _FIRST_DOMAIN_ID = 40
