@@ -1,5 +1,6 @@
 """A stop that a device refuses matters if the run has moved the device since it was last stopped, and only then."""
 
+import time
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -37,6 +38,7 @@ class Belt:
         resting, moving: status of its stop while it rests, and while it moves.
         go: status of the request that moves it.
         sent: what the run sends.
+        moves: whether it moves although it refuses that.
         may_move: whether the belt may still move at the end.
     """
 
@@ -45,6 +47,7 @@ class Belt:
     moving: int = 200
     go: int = 200
     sent: tuple[str, ...] = ("POST /go",)
+    moves: bool = False
     may_move: bool = False
 
 
@@ -55,6 +58,8 @@ BELTS = (
     Belt("nothing moves it, and its stop is out of order", 503, sent=()),
     Belt("it refuses to move", 409, go=409),
     Belt("it is locked", 403, go=423),
+    Belt("it says no and moves", 409, moving=409, go=409, moves=True, may_move=True),
+    Belt("it says no and moves until it is stopped", 409, go=422, moves=True),
     Belt("the run stops it", 409, sent=("POST /go", "POST /stop")),
     Belt("it moves", 409),
     Belt("it moves again after a stop", 409, sent=("POST /go", "POST /stop", "POST /go")),
@@ -71,11 +76,11 @@ def test_a_refused_stop_is_told_if_the_run_has_moved_the_device(belt, tmp_path):
     moves = False
 
     async def state(_):
-        return web.json_response({})
+        return web.json_response({"belt": {"position": time.monotonic() if moves else 0.0, "uptime": time.monotonic()}})
 
     async def go(_):
         nonlocal moves
-        moves |= not 400 <= belt.go < 500
+        moves |= belt.moves or not 400 <= belt.go < 500
         return error(belt.go, "no") if belt.go >= 400 else web.json_response({})
 
     async def stop(_):

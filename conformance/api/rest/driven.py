@@ -41,6 +41,8 @@ class Driven(Listener):
         self._contract, self._base_url = contract, base_url
         #: How many requests may have moved the device since it was last stopped.
         self.moves = 0
+        #: How many requests to move it the device has refused since then: a broken one may have moved all the same.
+        self.refused = 0
         stops = [operation for operation in operations_of(contract) if operation.stop]
         # One that names nothing stops all that moves, if there is no other.
         self._stops_all = len(stops) == 1 and not [*_places(stops[0])]
@@ -69,9 +71,10 @@ class Driven(Listener):
         request = exchange.request
         called = self._called(request.method, request.url)
         if called is not None and called.stop and exchange.response.ok and self._stops_all:
-            self.moves = 0
-        elif exchange.response.status in _REFUSED and self.moves:
-            self.moves -= self._may_move(request.method, called)
+            self.moves = self.refused = 0
+        elif exchange.response.status in _REFUSED and self.moves and self._may_move(request.method, called):
+            self.moves -= 1
+            self.refused += 1
         if exchange.response.status not in _REFUSED:
             self._note(request.method, request.url, request.body, taken=True)
             return

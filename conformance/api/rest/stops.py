@@ -14,11 +14,15 @@ from functools import partial
 from http import HTTPStatus
 from typing import Any, Final
 
+from conformance.api.call_rules import words_of
+from conformance.api.rest.applicable import allowed
 from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.statuses import REFUSALS
 from conformance.api.rest.values import Values
-from conformance.documents.openapi import Operation, operations_of
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation, is_json, operations_of
+from conformance.documents.representation import flattened
 from conformance.transport.client import HttpClient, is_drafting
 from conformance.transport.exchange import Exchange, Listener, NoAnswerError, NotPermittedError
 from conformance.transport.passage import Heard
@@ -32,6 +36,26 @@ _DEADLINE_S: Final = 2.0
 _ANSWERS: Final = 4
 # All requests of one try for what the description marks, s.
 _LONGEST_S: Final = 5.0
+# As many operations are read to see whether it moves; words in the names of what says so, and of places.
+_READS: Final = 8
+_MOVING: Final = frozenset({"moving", "driving"})
+_PLACES: Final = frozenset(
+    {
+        "position",
+        "pose",
+        "x",
+        "y",
+        "z",
+        "yaw",
+        "theta",
+        "heading",
+        "angle",
+        "angles",
+        "odometer",
+        "distance",
+        "travelled",
+    }
+)
 _Way = Callable[[], str]
 # What the stop names is over.
 _OVER: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
@@ -137,9 +161,31 @@ def _stop_as_marked(api: RestInterface) -> str:
     if api.driven is None or is_drafting():
         return problem
     if not problem:
-        api.driven.moves = 0
+        api.driven.moves = api.driven.refused = 0
     # What was not moved since it was stopped needs no stop, and many devices answer 404 or 409 to one then.
-    return problem if api.driven.moves else ""
+    return problem if api.driven.moves or (problem and api.driven.refused and _is_moving(api)) else ""
+
+
+def _is_moving(api: RestInterface) -> bool:
+    """Return whether reads show that the device moves: it says so, or is in two places one after the other."""
+    reads = [one for one in operations_of(api.run.contract) if one.method == "GET" and not one.parameter("path")]
+    seen: list[dict[str, Any]] = []
+    for turn in range(2):
+        time.sleep(turn * _AGAIN_S)
+        seen.append({})
+        for operation in [one for one in reads if allowed(api, one) and one.label not in api.streams][:_READS]:
+            request = written(operation, usual_inputs(operation, api.values or Values())[0])
+            with suppress(NoAnswerError, NotPermittedError):
+                answer = api.client.send("GET", request.target, headers=request.headers, timeout_s=_DEADLINE_S).response
+                value = read_json(answer.body).value if answer.ok and is_json(answer.media_type) else None
+                seen[-1] |= {f"{operation.label} {place}": one for place, one in flattened(value).items()}
+    first, last = seen
+    words = {place: words_of(place.rpartition(" ")[2]) for place in last}
+    is_said = any(words[place] & _MOVING and one is True for place, one in last.items())
+    return is_said or any(
+        words[place] & _PLACES and isinstance(one, int | float) and first.get(place, one) != one
+        for place, one in last.items()
+    )
 
 
 def _naming(inputs: Inputs, values: Iterable[tuple[str, str, Any]]) -> Inputs:
