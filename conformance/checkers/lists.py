@@ -57,7 +57,7 @@ class Lists:
         listing = listing_of(operation) if operation is not None and operation.method == "GET" else None
         if listing is None or occasion.request.method != "GET" or not occasion.context.usual:
             return
-        page, sent = page_of(occasion.response), listing.sent(occasion.context.target)
+        page, sent = page_of(occasion.response, operation), listing.sent(occasion.context.target)
         if page is None or sent is None:
             return
         yield from self._limit(occasion, listing, page, sent)

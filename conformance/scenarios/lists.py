@@ -131,7 +131,9 @@ def vary_lists(api: RestInterface, values: Values) -> None:
                 reader.refused()
                 filters, doubted = {one.name for one in listing.filters.values()}, list[dict[str, Any]]()
                 for query in _queries(listing, page, _VALUES.get(api.run.effort.name, _MOST_VALUES)):
-                    found = page_of(reader.read(query).response) if time.monotonic() < until else None
+                    found = (
+                        page_of(reader.read(query).response, listing.operation) if time.monotonic() < until else None
+                    )
                     if found is not None and query.keys() <= filters and found.items and _is_doubted(listing, found):
                         doubted.append(query)
                 _settled(reader, doubted)
@@ -173,7 +175,10 @@ class Reader:
         # A device may answer on a new connection in another way.
         is_odd = len(query or {}) % 2 == 1
         found, limit = self.api.send(written(self.listing.operation, inputs), fresh=is_odd), self.listing.limit
-        page, most = page_of(found.response), inputs.query.get(limit.name) if limit is not None else None
+        page, most = (
+            page_of(found.response, self.listing.operation),
+            inputs.query.get(limit.name) if limit is not None else None,
+        )
         if limit is not None and page is not None and isinstance(most, int) and 0 < most < len(page.items):
             # A device that raises the limit shows as many items for the raised one.
             raised = inputs.having("query", limit.name, len(page.items))
@@ -188,7 +193,7 @@ class Reader:
     def part(self, query: dict[str, Any] | None = None) -> tuple[Exchange, Page] | None:
         """Return a request as `read` sends it and the list in its response; None if there is none."""
         exchange = self.read(query)
-        page = page_of(exchange.response)
+        page = page_of(exchange.response, self.listing.operation)
         return None if page is None else (exchange, replace(page, by=self.by))
 
     def page(self) -> Page | None:
@@ -205,7 +210,11 @@ def _settled(reader: Reader, doubted: list[dict[str, Any]]) -> None:
         doubted: queries by which a total was not the number of items.
     """
     listing, first = reader.listing, reader.api.first.get(reader.listing.operation.label)
-    before, now, query = page_of(first.response) if first is not None else None, reader.page(), dict[str, Any]()
+    before, now, query = (
+        page_of(first.response, listing.operation) if first is not None else None,
+        reader.page(),
+        dict[str, Any](),
+    )
     if now is not None and listing.limit is not None and 0 < listing.most({}) <= len(now.items):
         most = max(now.totals.values(), default=0) + _FEWEST
         query = {listing.limit.name: most} if fitting(listing.limit, most) else {}

@@ -66,7 +66,7 @@ def read_whole(writer: Writer, lister: Operation, item: Operation, path: str) ->
     """
     exchange, found, is_whole = writer.send(lister, path), list[Any](), False
     for number in range(1, _PAGES + 1):
-        page = page_of(exchange.response)
+        page = page_of(exchange.response, lister)
         if page is None or (number > 1 and page.items and page.items[0] in found):
             break
         found += page.items
@@ -126,7 +126,7 @@ def read_items(writer: Writer) -> None:
             continue
         writer.api.run.limit.check()
         with suppress(NoAnswerError):  # the survey tells what breaks a connection
-            page = page_of(writer.send(lister).response)
+            page = page_of(writer.send(lister).response, lister)
             ids = [identified(one, item)[1] for one in page.items if isinstance(one, dict)] if page is not None else []
             ids = [one for one in ids if one is not None]
             chosen = dict.fromkeys(ids[index] for index in (0, len(ids) // 2, -1)) if ids else {}

@@ -13,10 +13,10 @@ from conformance.api.rest.samples import fits
 from conformance.documents.field_reading import pairs_of
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import Operation, is_json
+from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.documents.parameter_reading import VALID, decoded_query, judged
 from conformance.documents.parameters import Parameter, plain_name
-from conformance.documents.representation import flat
+from conformance.documents.representation import UnreadableError, flat, read
 from conformance.transport.exchange import Response
 
 # Plain names of parameters, and of members that stand beside a list. Of names for the number of items, the second group
@@ -228,15 +228,13 @@ def _found(value: Any, depth: int) -> tuple[tuple[str, ...], list[Any]] | None:
     return None
 
 
-def page_of(response: Response) -> Page | None:
-    """Return the list in a successful JSON response, or None."""
-    if not response.ok or not response.body or response.cut or not is_json(response.media_type):
-        return None
-    text = read_json(response.body)
-    found = None if text.malformed else _found(text.value, 0)
+def page_of(response: Response, operation: Operation | None = None) -> Page | None:
+    """Return the list in a successful JSON response, or in an XML one by the operation's schema for it, or None."""
+    value: Any = _value_of(response, operation) if response.ok and response.body and not response.cut else None
+    found = _found(value, 0)
     if found is None:
         return None
-    around, inner = [], text.value
+    around, inner = [], value
     for name in found[0]:
         around.append({key: one for key, one in inner.items() if key != name})
         inner = inner[name]
@@ -256,10 +254,26 @@ def page_of(response: Response) -> Page | None:
     return Page(tuple(found[1]), totals, goes_on, tuple(around))
 
 
+def _value_of(response: Response, operation: Operation | None) -> Any:
+    """Return the content of a response as a JSON value; None where it cannot be read."""
+    if is_json(response.media_type):
+        text = read_json(response.body)
+        return None if text.malformed else text.value
+    schema = (operation.declared(response.status) or {}).get(response.media_type) if operation is not None else None
+    if schema is None or not is_xml(response.media_type):
+        return None
+    try:
+        return read(response.media_type, response.body, schema)
+    except UnreadableError:
+        return None  # other checks tell what is wrong with the document
+
+
 @lru_cache(maxsize=1024)
 def listing_of(operation: Operation) -> Listing | None:
     """Return what the parameters of a GET do to its list; None where it has no declared list of objects or values."""
-    item = _item_of(operation.shape, 0)
+    success = [one for status, one in operation.responses.items() if status.startswith("2")]
+    in_xml = (schema for content in success for name, schema in content.items() if is_xml(name))
+    item = _item_of(operation.shape or next(in_xml, None), 0)
     query = {_plain(one.name): one for one in operation.parameter("query")}
     # One thing that has a list among its members is no list, unless it can be read in parts.
     is_thing = operation.template.rstrip("/").endswith("}") and query.keys().isdisjoint((*_LIMITS, *_OFFSETS, *_PAGES))

@@ -173,6 +173,45 @@ def test_a_list_is_found_in_its_envelope(envelope, tmp_path):
     assert Seen(tmp_path, [_whole("limit")], ENVELOPES[envelope]).read(VALVES, limit=1).broken == {LIMIT}
 
 
+_XML_ITEM = {
+    "type": "object",
+    "xml": {"name": "valve"},
+    "properties": {"id": _MEMBERS["id"], "state": _MEMBERS["state"]},
+}
+_XML_LISTS = {
+    "plain": ({"type": "array", "items": _XML_ITEM, "xml": {"name": "valves"}}, "<valves>{}</valves>"),
+    "wrapped": (
+        {"type": "object", "xml": {"name": "answer"}, "properties": {
+            "total": {"type": "integer"}, "valves": {"type": "array", "items": _XML_ITEM, "xml": {"wrapped": True}},
+        }},
+        "<answer><total>4</total><valves>{}</valves></answer>",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("style", _XML_LISTS)
+@pytest.mark.parametrize(("count", "blamed"), [(2, set()), (4, {LIMIT, FILTER})])
+def test_a_list_in_xml_is_judged_by_the_names_of_its_schema(style, count, blamed, tmp_path):
+    schema, text = _XML_LISTS[style]
+    get = {
+        "responses": {"200": answers(schema, "application/xml")},
+        "parameters": [_whole("limit"), _text("state", enum=_STATES)],
+    }
+    document = described({"/valves": {"get": get}}, "3.1.0")
+    checkers = RestCheckers(Contract.load(write_described_pack(tmp_path, document, document)), BASE)
+    rows = [
+        f"<valve><id>{number}</id><state>{state}</state></valve>"
+        for number, state in enumerate(["open"] * 3 + ["closed"])
+    ]
+    broken = set()
+    for target, shown in (("/valves", rows), ("/valves?limit=2&state=open", rows[:count])):
+        content = text.format("".join(shown)).encode()
+        answer = Response(200, (("Content-Type", "application/xml"),), content, 1.0, received_s=1.0)
+        exchange = Exchange(Request("GET", BASE + target, (("Host", "device:8000"),)), answer)
+        broken |= {one.requirement for one in checkers(exchange) if not one.holds}
+    assert {one for one in broken if one.startswith("description/list-")} == blamed
+
+
 @pytest.mark.parametrize(
     ("parameter", "query", "keep", "blamed"),
     [
