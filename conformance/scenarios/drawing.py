@@ -39,9 +39,9 @@ def drawn(
     valid = list(islice(valid_variations(operation, usual, values), _CASES))
     if not operation.safe:
         valid = together(operation, usual, valid)
-        whole = [one for one in valid if one.parts]
-        alone = effort.draw([one for one in valid if not one.parts], _ACTING, f"{seed}/valid {operation.label}")
-        valid = [*whole[:_ACTING], *alone]
+        whole = [one for one in valid if one.parts or one.place.startswith("body /")][:_ACTING]
+        others = [one for one in valid if one not in whole]
+        valid = [*whole, *effort.draw(others, _ACTING, f"{seed}/valid {operation.label}")]
     groups = {
         "valid": [*valid, *unknown_variations(operation, usual)],
         "invalid": list(islice(invalid_variations(operation, usual), _CASES)),
