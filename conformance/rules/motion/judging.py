@@ -9,7 +9,7 @@ from statistics import median
 
 from conformance.measures.samples import LATE, SEVERAL, longest_s, usual_s
 from conformance.scenarios.motion import moves, several
-from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading, middle_of
+from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading, Resting, middle_of
 from conformance.scenarios.rule import NotTested, Outcome
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.case import Case
@@ -164,6 +164,16 @@ def measured(readings: list[Reading], name: str, motion: MotionMap) -> float | N
         if later - first >= half_s
     ]
     return median(slopes) / speed.scale
+
+
+def noise_of(readings: Sequence[Reading], name: str, motion: MotionMap, resting: Resting) -> float:
+    """Return how far off a velocity may be for the noise of some readings alone, in units per second."""
+    speed = motion.velocity.axes[name] if motion.velocity else None
+    if speed is not None and speed.of in resting.axes:
+        places = [(one.sent, one.values[speed.of]) for one in readings if one.values]
+        return resting.axes[speed.of].slope_room(places) / speed.scale
+    found = [(one.sent, one.speeds[name]) for one in readings if one.speeds]
+    return resting.speeds[name].room(found) if name in resting.speeds else 0.0
 
 
 def named(position: dict[str, float]) -> str:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 
 from conformance.measures.samples import SEVERAL, longest_s
-from conformance.rules.motion.judging import at, driven, is_each_late, measured, must_rest_from, off, went_on
+from conformance.rules.motion.judging import at, driven, is_each_late, measured, must_rest_from, noise_of, off, went_on
 from conformance.scenarios.motion.resting import crept, fastest
 from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.motion.velocities import let_go, velocities
@@ -123,8 +124,9 @@ def hold(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
             found = measured(within, name, motion) if wanted else None
             if found is not None:
                 seen.add(name)
+                room = noise_of(within, name, motion, drive.resting)
                 yield Case(
-                    found * wanted > 0 and abs(found) >= _STILL_DRIVES * abs(wanted),
+                    math.copysign(1, wanted) * found >= _STILL_DRIVES * abs(wanted) - room,
                     last.exchange,
                     f"{name} still driven {end - last.sent:.2g} s after the last command ({drive.named})",
                     observed=f"{found:.4g} in place of {wanted:.4g} per second",

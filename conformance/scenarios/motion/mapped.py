@@ -138,16 +138,14 @@ class MappedDevice:
         exchange = self.send(self.binding.made(call, None))
         return exchange, self.binding.content(exchange.response.body)
 
-    def send(self, made: Outgoing, *, authorized: bool = True, timeout_s: float | None = None) -> Exchange:
-        """Send a request.
+    def send(self, made: Outgoing, **how: Any) -> Exchange:
+        """Send a request; ``how``: arguments of HttpClient.send().
 
         Raises:
             NoAnswerError: there is no response.
         """
         sent = self.clock.now()
-        exchange = self.api.client.send(
-            made.method, made.target, headers=made.headers, body=made.body, authorized=authorized, timeout_s=timeout_s
-        )
+        exchange = self.api.client.send(made.method, made.target, headers=made.headers, body=made.body, **how)
         self.room.slowest_s = max(self.room.slowest_s, self.clock.now() - sent)
         return exchange
 
@@ -183,11 +181,9 @@ class MappedDevice:
         self.rests = False
         return self.binding.made(*self.call_of(given, values), authorized=authorized)
 
-    def _sent(
-        self, made: Outgoing, targets: Position, timeout_s: float | None = None, *, authorized: bool = True
-    ) -> Command:
+    def _sent(self, made: Outgoing, targets: Position, **how: Any) -> Command:
         sent = self.clock.now()
-        exchange = self.send(made, timeout_s=timeout_s, authorized=authorized)
+        exchange = self.send(made, **how)
         return Command(sent, self.clock.now(), targets, exchange)
 
     def goto(self, targets: Mapping[str, float], ends: Mapping[str, float] | None = None) -> Command:
@@ -201,8 +197,16 @@ class MappedDevice:
             self.note(command.exchange)
         return command
 
-    def drive(self, speeds: Mapping[str, Any], *, integers: bool = False, authorized: bool = True) -> Command:
-        """Command velocities; those without a value are 0. ``integers``: write whole numbers without a fraction.
+    def drive(
+        self, speeds: Mapping[str, Any], *, integers: bool = False, authorized: bool = True, fresh: bool = False
+    ) -> Command:
+        """Command velocities; those without a value are 0.
+
+        Args:
+            speeds: by name.
+            integers: write whole numbers without a fraction.
+            authorized: send the credentials.
+            fresh: send it on a connection that is closed afterwards.
 
         Raises:
             NoAnswerError: there is no response.
@@ -210,7 +214,7 @@ class MappedDevice:
         wanted = {**dict.fromkeys(self.drives.axes, 0.0), **speeds}
         written = {name: int(one) if integers and one == int(one) else one for name, one in wanted.items()}
         made = self.request_of(self.drives, written, authorized=authorized)
-        return self._sent(made, wanted, authorized=authorized)
+        return self._sent(made, wanted, authorized=authorized, fresh=fresh)
 
     def note(self, exchange: Exchange) -> None:
         """Keep the response to an accepted move, if it can be read: a stop may name its id."""

@@ -15,7 +15,6 @@ from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import MappedDevice, Position
 from conformance.scenarios.motion.moves import TRIES, beyond, recorded
 from conformance.scenarios.motion.resting import creeping
-from conformance.scenarios.motion.room import MEASURABLE
 from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
 from conformance.scenarios.stage import Need, Stage
@@ -28,6 +27,8 @@ MEASURED_S: Final = 0.5
 # Of the limit: a slow velocity, and the slowest.
 _SLOW: Final = 0.4
 _SLOWEST: Final = 0.1
+# So many times its tolerance a velocity is at least, to be told from rest.
+_TOLD: Final = 1.5
 # A slow drive lasts longer than the hold time, up to this, so that a renewed command is seen to last, s.
 _LONGEST_HOLD_S: Final = 2.0
 # After these parts of the hold time commands that must be refused follow the last one: after the first the device is
@@ -67,7 +68,7 @@ def _planned(mapped: MappedDevice, *, quick: bool) -> Iterator[tuple[Position, b
         yield from (({name: limit}, False) for limit in ends)
         slow = ends[-1:] if quick else ends
         yield from (({name: _SLOW * limit}, True) for limit in slow if not (quick and several))
-    yield from ((speeds, not number) for number, speeds in enumerate(several[:2] if quick else several))
+    yield from ((speeds, not number) for number, speeds in enumerate(several[:1] if quick else several))
 
 
 def _at_once(mapped: MappedDevice) -> Iterator[Position]:
@@ -80,7 +81,7 @@ def _at_once(mapped: MappedDevice) -> Iterator[Position]:
 
 def _slowest(mapped: MappedDevice, name: str, limit: float) -> Position:
     """Return a velocity that is just fast enough to be told from rest."""
-    least = MEASURABLE * mapped.motion.speed_tolerance(name)
+    least = _TOLD * mapped.motion.speed_tolerance(name)
     return {name: math.copysign(min(max(_SLOWEST * abs(limit), least), _SLOW * abs(limit)), limit)}
 
 
@@ -106,7 +107,7 @@ def let_go(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Drive, ...]:
     """Command a velocity, and then nothing any more, as when the client vanishes or the network breaks.
 
     A watchdog may work after every other command, for some directions or sizes of a velocity alone, only while somebody
-    reads, or until a command is refused. At quick the seed says which of them are tried.
+    reads, until a command is refused, or while its connection is open. At quick the seed says which of them are tried.
     """
     hold_s = mapped.drives.hold_s
     if hold_s is None:
@@ -122,8 +123,7 @@ def _let_go(mapped: MappedDevice, hold_s: float, chance: random.Random, *, quick
     others = list(_at_once(mapped))
     chance.shuffle(others)
     slowest = [_slowest(mapped, name, chance.choice(ends[name])) for name in ends]
-    chance.shuffle(slowest)
-    others = [*others[:2], *slowest[:1]] if quick else [*limits, *others, *slowest]
+    others = [*others[:2], *slowest[:2]] if quick else [*limits, *others, *slowest]
     refusals = list(_refusals(mapped))
     chance.shuffle(refusals)
     for made, speeds in enumerate([*limits, *others]):
@@ -185,7 +185,7 @@ def _drives(
         speeds: what is commanded.
         ends: what the device must take instead.
         let_go_s: its hold time, if nothing is sent after the drive; None: velocity 0 is.
-        more: how often the velocity is sent once more at the end.
+        more: how often the velocity is sent once more at the end, on a connection of its own.
         longer: whether the drive outlasts the hold time.
         refused: sends what the device must refuse after the last command; None: nothing is sent.
         silent: whether nothing is read until the device must rest.
@@ -202,7 +202,7 @@ def _drives(
             raise NotPossibleError(f"the limits leave no room for {what}")
         slowed = "".join(f", slowed to {made[name]:.2g} for room" for name in made if made[name] != speeds[name])
         commands, readings, whole = _kept_up(mapped, made, lasts_s, rests_s)
-        commands += [mapped.drive(made) for _ in range(more if whole else 0)]
+        commands += [mapped.drive(made, fresh=True) for _ in range(more if whole else 0)]
         wanted = {**dict.fromkeys(drives.axes, 0.0), **made, **(ends or {})}
         drive = Drive(what, wanted, tuple(commands), tuple(readings), None, (), slowed=slowed, resting=mapped.resting)
         if let_go_s is not None and not whole:
