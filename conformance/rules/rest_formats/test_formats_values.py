@@ -36,7 +36,7 @@ def _say_lacking(api: RestInterface, media_type: str, *ids: str) -> None:
             api.run.judge.unclaimed(id_, f"the contract has no responses as {media_type}")
 
 
-@pytest.mark.phase("resting")
+@pytest.mark.phase("settling")
 @pytest.mark.requirement(
     "rest-formats/xml", "rest-formats/xml-root", "rest-formats/text", "rest-formats/charset", "rest-formats/vary"
 )

@@ -61,7 +61,7 @@ def plans_from_robot(robot: Robot, explore: Explorer) -> PlansFromRobot:
     return PlansFromRobot(tuple(reads))
 
 
-@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.RESTING)
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.SETTLING)
 def plans_from_start(robot: Robot, explore: Explorer) -> PlansFromStart:
     """Request plans from a start in the request, also without the parameters that have a default."""
     starts = reachable(robot, _here(robot), max(1.0, robot.statement.motion.radius_m), 3)
@@ -134,7 +134,7 @@ def _in_frame(robot: Robot, frame: str, begin: Pose, *, known: bool) -> FramePla
     return FramePlan(frame, begin, goal, exchange, problem, plan, moved_m)
 
 
-@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.RESTING)
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.SETTLING)
 def plans_outside(robot: Robot) -> tuple[Exchange, ...]:
     """Request plans to poses outside every map."""
     return tuple(robot.get(query(x=x, y=y)) for x, y in _NO_MAP)

@@ -13,7 +13,7 @@ from conformance.api.rest.validity import INVALID, VALID, validity
 from conformance.api.soap.callable_services import SoapServices
 from conformance.documents.json_text import read_json
 from conformance.observe.polling import poll_for
-from conformance.packs.table1.robot.deliveries_seen import DeliveryObserver, NoObserverError, observer_of
+from conformance.packs.table1.robot.deliveries_seen import QUIET_S, DeliveryObserver, NoObserverError, observer_of
 from conformance.packs.table1.robot.delivery import Delivery, put_delivery
 from conformance.packs.table1.robot.delivery_sender import DeliverySender
 from conformance.packs.table1.robot.delivery_trace import key_of
@@ -194,7 +194,8 @@ class _Player:
             for sender in senders:
                 sender.watch(0.0)  # what arrived so far is the batches' own
             observer = senders[0].observer if senders else observer_of(self.api, probe)
-            observer.mark()
+            if not senders:
+                observer.mark()
         except (NoObserverError, ProbeError) as error:
             self.trace = replace(self.trace, unseen=str(error))
             return None
@@ -203,25 +204,30 @@ class _Player:
     @contextmanager
     def ordering(self, observer: DeliveryObserver) -> Iterator[None]:
         """Send the requests, and a valid delivery over each interface directly after; again if more have arrived."""
+        clock = self.robot.clock
         for turn in range(_TWICE):
+            if turn:
+                observer.mark()
             chosen = [one for one in self._chosen() if one.acts]
             last = [self._send(one) for one in chosen][-1:]
             orders = list(self._orders(10_000 * (turn + 1), chosen)) if chosen else []
+            until = clock.now() + QUIET_S
             try:
                 if turn == 0:
                     yield
             finally:
-                found = self._arrived(observer, orders, last[0]) if orders else ()
+                left_s = max(0.0, until - clock.now())
+                found = self._arrived(observer, orders, last[0], left_s) if orders else ()
             if not found:
                 return
 
     def _arrived(
-        self, observer: DeliveryObserver, orders: list[tuple[Delivery, Exchange]], last: Exchange
+        self, observer: DeliveryObserver, orders: list[tuple[Delivery, Exchange]], last: Exchange, left_s: float
     ) -> tuple[Delivery, ...]:
         """Record what has arrived after the last refused request; return what nobody ordered."""
         accepted = tuple((delivery, exchange) for delivery, exchange in orders if exchange.response.ok)
         try:
-            seen = tuple(one.delivery for one in observer.collect(len(accepted)))
+            seen = tuple(one.delivery for one in observer.collect(len(accepted), left_s))
         except (NoObserverError, ProbeError) as error:
             self.trace = replace(self.trace, unseen=str(error))
             return ()
