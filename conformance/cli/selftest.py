@@ -18,11 +18,12 @@ from conformance.commandline.terminal import inert
 from conformance.contract.locating import ContractError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from conformance.contract.pack import Contract
     from conformance.mutation.mutant import Mutant
     from conformance.mutation.self_test import GoodDevice, SelfTest
+    from conformance.selftest.against import Table
     from conformance.selftest.report import Report
 
 # How many mutants `--short` judges where the pack does not name them.
@@ -85,6 +86,21 @@ _SHORT = 15
 @click.option("--call", "allow", multiple=True, metavar="PATTERN", help="With --api: as in roaas certify; repeatable.")
 @click.option("--never", multiple=True, metavar="PATTERN", help="With --api: as in roaas certify; repeatable.")
 @click.option("--seed", type=int, default=0, help="Seed of the mutants' runs, and of the sample of generated ones.")
+@click.option(
+    "--against",
+    multiple=True,
+    type=click.Path(exists=True, path_type=Path),
+    metavar="FILE",
+    help="Compare with earlier results (selftest.json) or a yardstick, gzipped or not; repeatable. Exit code 1 then "
+    "means that something is worse.",
+)
+@click.option(
+    "--results",
+    multiple=True,
+    type=click.Path(exists=True, path_type=Path),
+    metavar="FILE",
+    help="With --against: compare these results, and run nothing; repeatable.",
+)
 @click.option("--list", "listed", is_flag=True, help="List the mutants, and run nothing.")
 @click.option(
     "--out",
@@ -99,6 +115,11 @@ def selftest(context: click.Context, /, **options: Any) -> None:
     Each mutant is a good device behind a proxy with one named change. Exit code: 0 all killed and no false positive;
     1 otherwise; 2 usage; 3 a device does not start; 130 interrupted.
     """
+    if options["results"]:
+        if not options["against"]:
+            raise click.UsageError("--results are compared with those of --against: give both")
+        sys.exit(int(_is_worse(loaded(options["pack"]), _read(options["against"]), options["results"])))
+    options["before"] = _read(options["against"]) if options["against"] else None
     if options["generated"] and options["adversary"]:
         raise click.UsageError("--generated and --adversary are two kinds of sample: give one of them")
     if options["api"]:
@@ -112,6 +133,29 @@ def selftest(context: click.Context, /, **options: Any) -> None:
             _by_hand(contract, options)
     except ContractError as error:
         raise click.UsageError(str(error)) from error
+
+
+def _read(paths: Iterable[Path]) -> dict[str, Table]:
+    """Return what stored results show.
+
+    Raises:
+        click.UsageError: a file cannot be read.
+    """
+    from conformance.selftest.against import read  # noqa: PLC0415 - see _by_hand()
+
+    try:
+        return read(paths)
+    except (OSError, ValueError) as error:
+        raise click.UsageError(inert(str(error))) from error
+
+
+def _is_worse(contract: Contract, before: dict[str, Table], results: Iterable[Path]) -> bool:
+    """Print what is worse in later results than in earlier ones; return whether anything is."""
+    from conformance.selftest.against import lost  # noqa: PLC0415 - see _by_hand()
+
+    said = lost(before, _read(results), contract.renamed)
+    click.echo("\n".join([*map(inert, said), f"{len(said)} differences to the worse" if said else "nothing is worse"]))
+    return bool(said)
 
 
 def _by_hand(contract: Contract, options: dict[str, Any]) -> None:
@@ -231,7 +275,10 @@ def _finish(report: Report, run: Callable[[], None], options: dict[str, Any]) ->
         where = inert(str(options["out"]))
         click.echo(f"error: the result could not be written to {where}: {inert(str(error))}", err=True)
         sys.exit(ExitCode.INTERRUPTED if interrupted else ExitCode.INCONCLUSIVE)
-    sys.exit(ExitCode.INTERRUPTED if interrupted else ExitCode.PASSED if report.holds else ExitCode.FAILED)
+    holds = report.holds
+    if options["before"] is not None:
+        holds = not _is_worse(report.contract, options["before"], [options["out"] / "selftest.json"])
+    sys.exit(ExitCode.INTERRUPTED if interrupted else ExitCode.PASSED if holds else ExitCode.FAILED)
 
 
 def _run(report: Report, chosen: list[Mutant], options: dict[str, Any]) -> None:

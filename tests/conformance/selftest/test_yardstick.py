@@ -1,13 +1,13 @@
 """The yardstick finds each mutant that is noticed less surely than before, and each good device newly blamed."""
 
 import json
-import sys
-from pathlib import Path
 
 import pytest
-from processes import ended
+from click.testing import CliRunner
 
-_SCRIPT = Path(__file__).parents[3] / "benchmarks" / "yardstick.py"
+from conformance.selftest.against import read, stored
+from roaas import main
+
 # An id that was merged into another one, as the ledger's aliases say.
 _OLD, _NEW = "rest-formats/specific-range", "rest-formats/q-values"
 _BEFORE = {"surely": ["http/allow", "http/head"], "merged": [_OLD], "now and then": ["http/allow"], "never": []}
@@ -25,14 +25,14 @@ def run_of(folder, name, mutants, blamed=(), by_rule=("http/date",)):
 
 
 def compared(folder, *runs):
-    return ended(sys.executable, _SCRIPT, "compare", *runs, "--yardstick", folder / "yardstick.gz")
+    words = [word for run in runs for word in ("--results", str(run))]
+    return CliRunner().invoke(main, ["selftest", "--against", str(folder / "yardstick.gz"), *words])
 
 
 @pytest.fixture
 def yardstick(tmp_path):
     runs = [run_of(tmp_path, f"before{turn}", _BEFORE | {"now and then": ["http/allow"] * turn}) for turn in (0, 1)]
-    done = ended(sys.executable, _SCRIPT, "gather", *runs, "--yardstick", tmp_path / "yardstick.gz", check=True)
-    assert "4 mutants" in done.stdout
+    (tmp_path / "yardstick.gz").write_bytes(stored(read(runs)))
     return tmp_path
 
 
@@ -48,22 +48,37 @@ def yardstick(tmp_path):
 )
 def test_each_loss_is_found(yardstick, after, more, said):
     done = compared(yardstick, run_of(yardstick, "after", _BEFORE | after, **more))
-    assert said in done.stdout
-    assert done.returncode == 1
+    assert said in done.output
+    assert done.exit_code == 1
 
 
 def test_a_loss_in_one_of_several_runs_is_one(yardstick):
     runs = [run_of(yardstick, f"after{turn}", _BEFORE | ({"surely": []} if turn else {})) for turn in (0, 1)]
-    assert compared(yardstick, *runs).returncode == 1
+    assert compared(yardstick, *runs).exit_code == 1
 
 
 def test_the_same_merged_or_more_is_no_loss(yardstick):
     after = _BEFORE | {"merged": [_NEW], "now and then": [], "never": ["http/allow"]}
     done = compared(yardstick, run_of(yardstick, "after", after))
-    assert (done.returncode, done.stdout) == (0, "nothing is lost\n")
+    assert (done.exit_code, done.output) == (0, "nothing is worse\n")
 
 
-def test_a_file_of_another_kind_is_told(yardstick):
-    (yardstick / "other.json").write_text("[]")
+def test_what_was_noticed_now_and_then_may_be_missed_by_chance(yardstick):
+    runs = [run_of(yardstick, f"after{turn}", _BEFORE | {"now and then": []}) for turn in range(5)]
+    assert compared(yardstick, *runs[:4]).exit_code == 0
+    done = compared(yardstick, *runs)
+    assert "now and then: noticed in 0 of 5 runs, and in 1 of 2 before" in done.output
+    assert done.exit_code == 1
+
+
+def test_single_results_are_compared_too(yardstick):
+    before, after = run_of(yardstick, "one", _BEFORE), run_of(yardstick, "other", _BEFORE | {"surely": []})
+    words = ["selftest", "--against", str(before), "--results", str(after)]
+    assert CliRunner().invoke(main, words).exit_code == 1
+
+
+@pytest.mark.parametrize("content", ["[]", "{}", "{", '{"format": "roaas-yardstick/1", "mutants": {"a": 1}}'])
+def test_a_file_of_another_kind_is_told(yardstick, content):
+    (yardstick / "other.json").write_text(content)
     done = compared(yardstick, yardstick / "other.json")
-    assert (done.returncode, "Traceback" in done.stderr) == (2, False)
+    assert (done.exit_code, "Traceback" in done.output) == (2, False)
