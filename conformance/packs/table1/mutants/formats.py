@@ -100,9 +100,6 @@ def _json_problem(response: Response) -> None:
 _mutant("format-xml-root", "xml-root", "The root element of XML responses is always <response>.").altered(
     _GET, tree(lambda root: setattr(root, "tag", "response")), _XML
 )
-_mutant("format-xml-stray", "xml", "In XML responses text stands between the fields.").altered(
-    _GET, tree(lambda root: setattr(root, "text", "ok")), _XML
-)
 _mutant("format-q-ignored", "q-values", "The robot ignores quality values in Accept.").rewritten(
     _GET, _accept(lambda given: re.sub(r"\s*;\s*q=0?\.[0-9]+", "", given))
 )

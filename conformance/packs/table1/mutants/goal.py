@@ -111,9 +111,6 @@ def _turned(by: float) -> Callable[[Any], None]:
     return edit
 
 
-_mutant("goal-outcome-untold", "goal-outcome", "The 404 after a goal does not say how the goal ended.").json(
-    _GET, lambda told: told.pop("last_goal", None), status(404)
-)
 _mutant("goal-outcome-always-success", "goal-outcome", "A cancelled goal is reported as succeeded.").json(
     _GET, lambda told: told.get("last_goal", {"status": {}})["status"].update(code=4), status(404)
 )

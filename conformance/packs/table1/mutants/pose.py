@@ -1,4 +1,4 @@
-"""Mutants that return a wrong pose, stamp or odometry."""
+"""Mutants that return wrong poses and plans."""
 
 import copy
 import math
@@ -11,7 +11,7 @@ from conformance.mutation.changes import JSON, parsed, problem, rest, values
 from conformance.mutation.fields import field
 from conformance.mutation.messages import Forward, Request, Response
 from conformance.mutation.table import Table
-from conformance.packs.table1.mutants.paths import LINEAR, POSE, VELOCITY
+from conformance.packs.table1.mutants.paths import LINEAR, PLAN, POSE, VELOCITY
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("rest-resources", "rest")
@@ -119,9 +119,6 @@ class _NotYet:
         return forward(request)
 
 
-_mutant("odometry-in-degrees", "velocity-odometry", "The odometry's turning rate is in degrees per second.").json(
-    _AT, field("twist.twist.angular.z", math.degrees)
-)
 _mutant("pose-clock-milliseconds", "pose-clock", "The stamp's nanosec counts milliseconds.").json(
     _AT, field(_NANOSEC, lambda nanosec: nanosec // 10**6)
 )
@@ -129,9 +126,57 @@ _mutant("pose-numbers-as-text", "pose-type", "In one pose of 50, x is a string."
 _mutant("pose-quaternion-long", "pose-quaternion", "The orientation quaternion is 1 % too long.").json(
     _AT, field(_ORIENTATION, lambda q: {axis: 1.01 * part for axis, part in q.items()})
 )
-_mutant("pose-quaternion-zero", "pose-quaternion", "The orientation quaternion is four zeros.").json(
-    _AT, field(_ORIENTATION, dict.fromkeys("xyzw", 0.0))
-)
 _mutant("pose-clockwise", "pose-rotation", "The heading has the wrong sign: it counts clockwise.").json(
     _AT, field(_ORIENTATION, turned(operator.neg))
+)
+
+
+_EMPTY = b'{"plan":{"header":{"stamp":{"sec":1,"nanosec":0},"frame_id":"map"},"poses":[]}}'
+_GET, _POSES = rest("GET", PLAN), "plan.poses"
+
+
+def _moved(pose: Any, x: float, y: float) -> Any:
+    at = pose["pose"]["position"]
+    return {**pose, "pose": {**pose["pose"], "position": {**at, "x": at["x"] + x, "y": at["y"] + y}}}
+
+
+def _detour(poses: list[Any]) -> list[Any]:
+    middle = len(poses) // 2
+    return [*poses[:middle], _moved(poses[middle], 25.0, -25.0), *poses[middle:]]
+
+
+def _aside(value: Any) -> None:
+    path = value["plan"]
+    if path["header"]["frame_id"] == "odom":
+        path["poses"] = [_moved(pose, 1.5, -1.0) for pose in path["poses"]]
+
+
+def _no_start(given: dict[str, str]) -> None:
+    for name in ("start_x", "start_y", "start_yaw"):
+        given.pop(name, None)
+
+
+def _quarter(given: dict[str, str]) -> None:
+    given.setdefault("yaw", "1.5707963")
+
+
+def _frame(value: Any) -> None:
+    for pose in value["plan"]["poses"][1:]:
+        pose["header"]["frame_id"] = "base_link"
+
+
+_mutant("plan-heading-ignored", "plan-yaw", "The last pose of a plan has a heading that is 1 rad off.").json(
+    _GET, field("plan.poses.-1.pose.orientation", turned(lambda yaw: yaw + 1.0))
+)
+_mutant("plan-without-stamps", "plan-type", "Poses of a plan have no header.").json(
+    _GET, field(_POSES, lambda poses: [{"pose": one["pose"]} for one in poses])
+)
+_mutant("plan-from-elsewhere", "plan-start", "A plan begins 60 cm from the robot.").json(
+    _GET, field(_POSES, lambda poses: [_moved(poses[0], -0.36, 0.48), *poses])
+)
+_mutant("plan-falls-short", "plan-end", "A plan ends 50 cm before the requested pose.").json(
+    _GET, field(_POSES, lambda poses: [*poses[:-1], _moved(poses[-1], 0.3, 0.4)])
+)
+_mutant("plan-no-exponents", "plan-numbers", "The robot refuses a query with an exponent such as e+00.").instead(
+    lambda request: _GET(request) and "e%2B" in request.query, problem(422, "x: no number")
 )

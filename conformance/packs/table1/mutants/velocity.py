@@ -1,7 +1,6 @@
 """Mutants that drive at another velocity than commanded, or return a wrong velocity."""
 
 import json
-import operator
 import time
 from collections.abc import Callable
 from typing import Any
@@ -157,9 +156,6 @@ _mutant(
 ).json(_GET, lambda twist: twist.update(_STILL))
 _mutant("velocity-lost", "velocity-converges", "PUT of a velocity returns a success without any effect.").made(
     _driven(lambda twist: twist.update(_STILL))
-)
-_mutant("velocity-reversed", "velocity-converges", "The robot turns in the opposite direction.").made(
-    _driven(field("angular.z", operator.neg))
 )
 _mutant("velocity-forwards-only", "velocity-range", "The robot accepts backward velocities and stands still.").made(
     secretly(_beyond(0.0), inputs(field("linear.x", lambda x: max(0.0, x))))
