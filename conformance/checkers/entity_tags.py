@@ -12,6 +12,7 @@ from conformance.transport.exchange import SAFE_METHODS, Response
 from conformance.verdict.case import Case
 
 _TAG: Final = re.compile(r'(?:W/)?"[^"]*"')
+_LIST: Final = re.compile(rf"\s*{_TAG.pattern}(?:\s*,\s*{_TAG.pattern})*\s*")
 _GONE: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 _CONDITIONS: Final = frozenset({"if-match", "if-none-match", "if-modified-since", "if-unmodified-since", "range"})
 _TAGS, _MATCH = "description/entity-tag", "description/if-match"
@@ -60,7 +61,11 @@ class EntityTags:
         request, answer = occasion.request, occasion.response
         if request.raw is not None or answer.cut:
             return
-        asked = {name.lower(): value for name, value in request.headers if name.lower() in _CONDITIONS}
+        asked = dict[str, str]()
+        for name, value in request.headers:
+            if name.lower() in _CONDITIONS:
+                # Several fields of one name are one list (RFC 9110 5.3).
+                asked[name.lower()] = f"{asked[name.lower()]}, {value}" if name.lower() in asked else value
         if request.method not in SAFE_METHODS:
             yield from self._write(occasion, asked.get("if-match"))
         elif request.method == "GET" and "range" not in asked:
@@ -144,7 +149,7 @@ class EntityTags:
             self._waiting.clear()
             if answer.ok and occasion.request.method in {"PUT", "PATCH"}:
                 self._wrote[url] = occasion
-        if wanted is None or wanted.strip() == "*" or now is None or not _TAG.findall(wanted):
+        if wanted is None or wanted.strip() == "*" or now is None or not _LIST.fullmatch(wanted):
             return
         tag = now.header("etag") or ""
         matches = tag.removeprefix("W/") in {one.removeprefix("W/") for one in _TAG.findall(wanted)}

@@ -52,3 +52,15 @@ def drawn(
         standard //= SLOW_SHARE if operation.label in slow else 1
         own, common = ([one for one in variations if one.is_common is is_common] for is_common in (False, True))
         yield effort.draw_first(own, common, standard, f"{seed}/{name} {operation.label}")
+
+
+def order_of(operation: Operation) -> tuple[int, int]:
+    """Return the rank of an operation: what lists things comes before what needs their ids, DELETE comes last."""
+    ranks = {"GET": 0, "HEAD": 0, "OPTIONS": 0, "POST": 2, "PUT": 3, "PATCH": 3, "DELETE": 5}
+    rank = ranks.get(operation.method, 4)
+    return (rank + 1 if rank == 0 and operation.parameter("path") else rank), len(operation.parameter("path"))
+
+
+def has_input(operation: Operation) -> bool:
+    """Return whether an operation takes a query or a body."""
+    return bool(operation.parameter("query") or operation.bodies)

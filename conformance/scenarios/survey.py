@@ -23,7 +23,8 @@ from conformance.api.rest.variations import UNKNOWN, Kind, Variation
 from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.documents.patterns import SlowPatternError
 from conformance.documents.resources import known_path
-from conformance.scenarios.drawing import SLOW_SHARE, drawn
+from conformance.scenarios.drawing import SLOW_SHARE, drawn, has_input, order_of
+from conformance.scenarios.reaching import CONFLICT, WANTS_CONDITION, Reaching
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import (
@@ -164,7 +165,7 @@ class Survey:
         A declared 404, or one for an identifier in the path, says that something else is not there. So does a 404 for
         values in query or body, if others were accepted, or if a path that nobody describes is answered otherwise.
         """
-        if _has_input(operation) and any(one.ok for one in self.of(operation.label)):
+        if has_input(operation) and any(one.ok for one in self.of(operation.label)):
             return False
         named = bool(operation.parameter("path") or {"404", "4XX", "4xx"} & operation.responses.keys())
         absent = _NOT_THERE - {_NOT_FOUND} if named else _NOT_THERE
@@ -173,10 +174,6 @@ class Survey:
         if unknown is not None and any(one.exchange and _differ(one.exchange, unknown) for one in usual):
             return False
         return bool(usual) and all(one.status in absent for one in usual)
-
-
-def _has_input(operation: Operation) -> bool:
-    return bool(operation.parameter("query") or operation.bodies)
 
 
 def _differ(one: Exchange, other: Exchange) -> bool:
@@ -203,6 +200,10 @@ class Surveyor:
     given_up: set[str] = field(default_factory=set)
     elsewhere: dict[str, Exchange] = field(default_factory=dict)
 
+    @cached_property
+    def _reaching(self) -> Reaching:
+        return Reaching(self.api, self.values)
+
     @property
     def trace(self) -> Survey:
         """What was recorded so far."""
@@ -222,7 +223,8 @@ class Surveyor:
         Raises:
             PartialTraceError: the device does not respond any more.
         """
-        request = request or written(operation, variation.inputs)
+        by_inputs = request is None
+        request = request or self._reaching.request(operation, variation)
         probe, losses = self._described(operation, variation, request), self.api.run.losses
         try:
             # A device may treat the first request on a connection in another way than those after it.
@@ -238,7 +240,7 @@ class Surveyor:
             probe = replace(probe, unanswered=none.unanswered)
             goes_on = self.api.alive()
             if self.api.run.losses == losses:
-                self.record(probe)
+                self.probes.append(probe)
             else:
                 # The loss is a finding of its own, and what was lost once is not risked again.
                 self.given_up.add(operation.label)
@@ -247,7 +249,15 @@ class Surveyor:
                 raise PartialTraceError(self.trace) from none
             return probe
         doubted = exchange.response.status in _DOUBTED and variation.kind in _ACCEPTED and self._is_single(operation)
-        self.record(replace(probe, exchange=exchange, invents=probe.invents or doubted))
+        if doubted and by_inputs and self._reaching.finds_new(operation, self.usual[operation.label]):
+            return self.send(operation, variation, fresh=fresh)
+        self.probes.append(replace(probe, exchange=exchange, invents=probe.invents or doubted))
+        self._note(operation, request, exchange)
+        return self.probes[-1]
+
+    def _note(self, operation: Operation, request: Outgoing, exchange: Exchange) -> None:
+        """Remember what a response says for later requests."""
+        status = exchange.response.status
         if exchange.response.cut:
             # An endless response says nothing new the second time, and costs its time each time.
             self.given_up.add(operation.label)
@@ -255,9 +265,10 @@ class Surveyor:
         if exchange.response.ok:
             self.values.learn(operation, exchange)
             self.values.accepted(operation, request)
-        elif exchange.response.status in REFUSALS:
-            self.api.refused.setdefault((exchange.response.status, operation.label), request)
-        return self.probes[-1]
+        elif status in REFUSALS:
+            self.api.refused.setdefault((status, operation.label), request)
+        if not operation.safe and status not in REFUSALS - WANTS_CONDITION:
+            self._reaching.acted()
 
     def _is_single(self, operation: Operation) -> bool:
         """Return whether a creation that succeeded is refused the second time, as where names are unique."""
@@ -300,13 +311,9 @@ class Surveyor:
         finally:
             self.api.is_recorded = False
 
-    def record(self, probe: Probe) -> None:
-        """Add a probe to the survey."""
-        self.probes.append(probe)
-
     def look_elsewhere(self, operation: Operation) -> None:
         """Where an operation's usual requests were all answered 404, get a path beside it that is not described."""
-        if not _has_input(operation):
+        if not has_input(operation):
             return
         usual = [one for one in self.probes if one.kind is Kind.USUAL and one.operation == operation.label]
         if not usual or any(one.status != _NOT_FOUND for one in usual):
@@ -318,8 +325,7 @@ class Surveyor:
 
     def begin(self, operation: Operation) -> None:
         """Find a valid request that the device accepts, and keep it as the usual one."""
-        tried = usual_inputs(operation, self.values)
-        for inputs in tried[:4]:
+        for inputs in self._candidates(operation):
             self.usual.setdefault(operation.label, inputs)
             probe = self.send(operation, Variation(Kind.USUAL, "", "", inputs))
             self.api.usual_status[operation.label] = probe.status
@@ -330,6 +336,16 @@ class Surveyor:
                 return
             if operation.label in self.given_up:
                 return
+
+    def _candidates(self, operation: Operation) -> Iterator[Inputs]:
+        """Yield inputs of the usual request, at last with what the device asked for: a condition, or what is new."""
+        tried, statuses = usual_inputs(operation, self.values)[:4], self.api.usual_status
+        yield from tried
+        if statuses.get(operation.label) in WANTS_CONDITION and not operation.safe:
+            self._reaching.wants_tag.add(operation.label)
+            yield tried[0]
+        if statuses.get(operation.label) == CONFLICT and self._reaching.finds_new(operation, tried[0]):
+            yield usual_inputs(operation, self.values)[0]
 
     def cut_short(self, what: str) -> None:
         """Count a request that time did not allow."""
@@ -380,7 +396,7 @@ class Surveyor:
                     continue
                 sent = self.send(operation, one)
                 for part in one.parts if sent.ok else ():
-                    self.record(replace(sent, kind=part.kind, says=part.says, place=part.place))
+                    self.probes.append(replace(sent, kind=part.kind, says=part.says, place=part.place))
                 for part in one.parts[:parts] if sent.status in REFUSALS else ():
                     parts -= 1
                     self.send(operation, part)
@@ -388,8 +404,9 @@ class Surveyor:
             left -= time.monotonic() - began
             yield
         if is_json(usual.media_type) and operation.label not in self.given_up:
-            request = written(operation, usual).having_type(f"{usual.media_type}; charset=utf-8")
-            self.send(operation, Variation(Kind.OPTIONAL, "with a charset", CHARSET, usual), request)
+            shown = Variation(Kind.OPTIONAL, "with a charset", CHARSET, usual)
+            request = self._reaching.request(operation, shown).having_type(f"{usual.media_type}; charset=utf-8")
+            self.send(operation, shown, request)
         self.send(operation, Variation(Kind.AGAIN, "", "", usual))
 
     def create_and_delete(self, operations: Sequence[Operation]) -> None:
@@ -453,13 +470,6 @@ def _is_near(template: str, other: str) -> bool:
     return other.startswith(f"{template}/") or (bool(above) and f"{other}/".startswith(f"{above}/"))
 
 
-def order_of(operation: Operation) -> tuple[int, int]:
-    """Return the rank of an operation: what lists things comes before what needs their ids, DELETE comes last."""
-    ranks = {"GET": 0, "HEAD": 0, "OPTIONS": 0, "POST": 2, "PUT": 3, "PATCH": 3, "DELETE": 5}
-    rank = ranks.get(operation.method, 4)
-    return (rank + 1 if rank == 0 and operation.parameter("path") else rank), len(operation.parameter("path"))
-
-
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.READING)
 def survey(api: RestInterface, values: Values) -> Survey:
     """Send each operation that may be called its usual request, and many that differ from it in one thing."""
@@ -506,7 +516,7 @@ def _repeated(surveyor: Surveyor, operations: list[Operation]) -> Survey:
                 losses = surveyor.api.run.losses
                 goes_on = surveyor.api.alive()
                 if surveyor.api.run.losses == losses:
-                    surveyor.record(Probe(label, Kind.AGAIN, "", "", None, none.unanswered))
+                    surveyor.probes.append(Probe(label, Kind.AGAIN, "", "", None, none.unanswered))
                 if not goes_on:
                     raise PartialTraceError(
                         Survey(tuple(surveyor.probes), tuple(times), last, surveyor.elsewhere)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeVar
 
-from conformance.api.rest.inputs import usual_inputs, whole_body, written
+from conformance.api.rest.inputs import renewed, usual_inputs, whole_body, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits
 from conformance.api.rest.things import another, as_answered, differences, represented
@@ -93,9 +93,11 @@ class Writer:
         inputs = usual_inputs(operation, self.values)[0]
         inputs = inputs if body is None else replace(inputs, body=body)
         inputs = inputs if query is None else replace(inputs, query={**inputs.query, **query})
-        request = written(operation, inputs)
+        request = written(operation, renewed(operation, inputs, self.values))
         rest = "".join(request.target.partition("?")[1:])
-        request = replace(request, headers=(*request.headers, *headers))
+        given = {name.lower() for name, _ in headers}
+        kept = [one for one in request.headers if one[0].lower() not in given]
+        request = replace(request, headers=(*kept, *headers))
         request = request.having_type(media_type) if media_type else request
         return self.api.send(replace(request, target=path + rest) if path else request, fresh=fresh)
 

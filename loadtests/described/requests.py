@@ -6,8 +6,9 @@ from conformance.api.rest.inputs import usual_inputs
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation
 from conformance.documents.openapi import Operation, operations_of
+from conformance.scenarios.drawing import order_of
 from conformance.scenarios.scenario import PartialTraceError
-from conformance.scenarios.survey import Probe, Surveyor, order_of
+from conformance.scenarios.survey import Probe, Surveyor
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Described, Robot
 from loadtests.described.device import Device

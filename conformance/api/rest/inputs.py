@@ -144,6 +144,7 @@ def usual_inputs(operation: Operation, values: Values) -> list[Inputs]:
     bodies: list[tuple[str, Any]] = []
     for name, body in list(operation.bodies.items())[:1] if operation.bodies else []:
         found = values.body(body.schema, body.examples, operation)
+        found = [values.unique.renewed(operation, value, body.schema) for value in found]
         bodies = [(name, _with_files(value, body.schema, name)) for value in found]
     if bodies:
         base = replace(base, media_type=bodies[0][0], body=bodies[0][1])
@@ -162,9 +163,18 @@ def _with_files(value: Any, schema: dict[str, Any], media_type: str) -> Any:
     return {name: b"roaas" if is_binary(properties.get(name, {})) else item for name, item in value.items()}
 
 
+def renewed(operation: Operation, inputs: Inputs, values: Values, place: str = "") -> Inputs:
+    """Return the inputs of a creation with new values of the members that must be new, but for the one at a place."""
+    if operation.method != "POST" or inputs.media_type not in operation.bodies:
+        return inputs
+    schema, keep = operation.bodies[inputs.media_type].schema, place.removeprefix("body /")
+    return replace(inputs, body=values.unique.renewed(operation, inputs.body, schema, keep=keep))
+
+
 def whole_body(operation: Operation, values: Values) -> tuple[str, Any]:
     """Return the media type and a body with all optional members; an empty media type without a body."""
     for name, body in operation.bodies.items():
         whole = values.filled(sample(body.schema, whole=True), body.schema, operation)
+        whole = values.unique.renewed(operation, whole, body.schema)
         return name, _with_files(whole, body.schema, name)
     return "", NOTHING

@@ -9,6 +9,7 @@ from typing import Any
 
 from conformance.api.rest.references import in_link, refers, singular, thing_of, values_in
 from conformance.api.rest.samples import backwards, fits, sample
+from conformance.api.rest.unique import Unique
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
@@ -30,12 +31,16 @@ class Values:
     Args:
         given: values by the name of a parameter or member, from the user.
         collections: names of the collections that the API has, in the singular.
+
+    Attributes:
+        unique: what is known of the members that must be new.
     """
 
     def __init__(
         self, given: Mapping[str, Sequence[Any]] | None = None, collections: frozenset[str] = frozenset()
     ) -> None:
         self.collections = collections
+        self.unique = Unique(collections)
         self._accepted: dict[str, set[str]] = defaultdict(set)
         self._given = {plain_name(name): list(values) for name, values in (given or {}).items()}
         self._seen: dict[str, list[Any]] = defaultdict(list)

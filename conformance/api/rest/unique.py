@@ -1,0 +1,130 @@
+"""Members of which each thing of a collection has a value of its own, such as a name or a barcode.
+
+A description has no word for them. So they are found by trying: a creation that is refused may be accepted with other
+texts and numbers. Without these, a device refuses nearly all that is created, and little of it is seen.
+"""
+
+from __future__ import annotations
+
+import string
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any, Final
+
+from conformance.api.rest.references import refers
+from conformance.api.rest.samples import fits
+from conformance.documents.json_schema import Schema, is_number, kinds_of
+from conformance.documents.openapi import Operation
+from conformance.documents.representation import flat
+
+# So many members are tried, and so many characters of a text are counted up.
+_TRIED: Final = 6
+_COUNTED: Final = 8
+# From one value to the next: what other code counts up by one does not meet it.
+_STEP: Final = 7919
+# So many of them are looked at for one that was not sent before.
+_STEPS: Final = 40
+# Of integers without a bound: each program holds it.
+_GREATEST: Final = 2**31 - 1
+_ALPHABETS: Final = (string.digits, string.ascii_lowercase, string.ascii_uppercase)
+
+
+class Unique:
+    """What is known of the members that must be new.
+
+    Args:
+        collections: names of the collections that the API has, in the singular.
+    """
+
+    def __init__(self, collections: frozenset[str]) -> None:
+        self._collections = collections
+        self._names: dict[str, tuple[str, ...]] = {}
+        self._taken: set[tuple[str, str, Any]] = set()
+        self._turns: Counter[str] = Counter()
+        self._own: dict[str, dict[str, Any]] = {}
+
+    def knows(self, operation: Operation) -> bool:
+        """Return whether members of an operation's body are known that must be new."""
+        return bool(self._names.get(_collection(operation)))
+
+    def trials(self, operation: Operation, body: Any, schema: Schema) -> Iterator[tuple[tuple[str, ...], Any]]:
+        """Yield members that may have to be new, and the body with new values of them: first all, then each alone."""
+        parts = flat(schema).get("properties", {})
+        names = [name for name in body if self._may_be(name, parts.get(name, {}))] if isinstance(body, dict) else []
+        for chosen in [names[:_TRIED], *([name] for name in names[:_TRIED] if len(names) > 1)] if names else ():
+            yield tuple(chosen), self._with_new(operation, body, schema, tuple(chosen))
+
+    def _may_be(self, name: str, schema: Schema) -> bool:
+        given = flat(schema)
+        plain = not given.keys() & {"enum", "const"} and bool(kinds_of(given) & {"string", "integer"})
+        return plain and not given.get("readOnly") and not refers(name, schema, self._collections)
+
+    def found(self, operation: Operation, names: tuple[str, ...]) -> None:
+        """Remember that these members must be new."""
+        self._names[_collection(operation)] = names
+
+    def renewed(self, operation: Operation, body: Any, schema: Schema, *, keep: str = "") -> Any:
+        """Return a body with new values in place of those that were sent before; a change has always the same new ones.
+
+        Args:
+            operation: that it is for.
+            body: as JSON.
+            schema: of it.
+            keep: a member whose value has to stay.
+        """
+        collection = _collection(operation)
+        if not isinstance(body, dict) or collection not in self._names:
+            return body
+        names = [name for name in self._names[collection] if name in body and name != keep]
+        if operation.method != "POST":
+            if names and operation.label not in self._own:
+                new = self._with_new(operation, body, schema, tuple(names))
+                self._own[operation.label] = {name: new[name] for name in names}
+            own = self._own.get(operation.label, {})
+            return {**body, **{name: own[name] for name in names if name in own}}
+        if any((collection, name, str(body[name])) in self._taken for name in names):
+            body = self._with_new(operation, body, schema, tuple(names))
+        self._taken |= {(collection, name, str(body[name])) for name in names}
+        return body
+
+    def _with_new(self, operation: Operation, body: dict[str, Any], schema: Schema, names: tuple[str, ...]) -> Any:
+        collection, parts = _collection(operation), flat(schema).get("properties", {})
+        changed = dict(body)
+        self._taken |= {(collection, name, str(body[name])) for name in names}
+        for name in names:
+            for _ in range(_STEPS):
+                self._turns[collection] += 1
+                changed[name] = numbered(parts.get(name, {}), body[name], self._turns[collection] * _STEP)
+                if (collection, name, str(changed[name])) not in self._taken:
+                    break
+        self._taken |= {(collection, name, str(changed[name])) for name in names}
+        return changed
+
+
+def numbered(schema: Schema, value: Any, number: int) -> Any:
+    """Return a text or an integer that a schema allows and that differs by a number; the same one if there is none."""
+    if is_number(value):
+        given = flat(schema)
+        least, most = given.get("minimum", value), given.get("maximum", _GREATEST)
+        made = least + (value - least + number) % (most - least + 1)
+        return made if fits(schema, made) else value
+    if not isinstance(value, str):
+        return value
+    places = list[tuple[int, str]]()
+    for place in range(len(value) - 1, -1, -1):
+        alphabet = next((one for one in _ALPHABETS if value[place] in one), "")
+        other = alphabet[(alphabet.find(value[place]) + 1) % len(alphabet)] if alphabet else ""
+        if other and fits(schema, value[:place] + other + value[place + 1 :]):
+            places.append((place, alphabet))
+    made = list(value)
+    for place, alphabet in places[:_COUNTED]:
+        number, index = divmod(number + alphabet.find(made[place]), len(alphabet))
+        made[place] = alphabet[index]
+    text = "".join(made)
+    return text if fits(schema, text) else value
+
+
+def _collection(operation: Operation) -> str:
+    """Return the path of the collection in which an operation creates or changes a thing."""
+    template = operation.template.rstrip("/")
+    return template if operation.method == "POST" else template.rpartition("/")[0]

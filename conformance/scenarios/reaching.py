@@ -1,0 +1,79 @@
+"""Requests that get to what they are for: with values that must be new, and with the present entity tag."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from conformance.api.rest.inputs import Inputs, renewed, written
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.values import Values
+from conformance.api.rest.variations import Variation
+from conformance.documents.openapi import Operation, is_json
+from conformance.scenarios.scenario import NotPossibleError
+from conformance.transport.exchange import NoAnswerError, Outgoing
+from conformance.verdict.time_limit import TimeIsOverError
+
+#: There is such a thing already, or the state forbids it.
+CONFLICT: Final = 409
+#: The device asks for a condition, or the one in the request does not hold.
+WANTS_CONDITION: Final = frozenset({412, 428})
+_IF_MATCH: Final = "if-match"
+_QUIET: Final = (NotPossibleError, TimeIsOverError, NoAnswerError)
+
+
+@dataclass
+class Reaching:
+    """Writes such requests.
+
+    Attributes:
+        api: the device.
+        values: those that the run knows.
+        wants_tag: operations for which the device asked for a condition.
+    """
+
+    api: RestInterface
+    values: Values
+    wants_tag: set[str] = field(default_factory=set)
+    _asked: set[str] = field(default_factory=set)
+    _tags: dict[str, str] = field(default_factory=dict)
+
+    def request(self, operation: Operation, variation: Variation) -> Outgoing:
+        """Return the request of a variation, with the entity tag of its resource if it has or needs If-Match.
+
+        By whatever else stands in it, it would be refused (RFC 9110 13.1.1).
+        """
+        request = written(operation, renewed(operation, variation.inputs, self.values, variation.place))
+        others = tuple(one for one in request.headers if one[0].lower() != _IF_MATCH)
+        needs = len(others) < len(request.headers) or operation.label in self.wants_tag
+        if operation.safe or not needs or variation.place.lower() == f"header {_IF_MATCH}":
+            return request
+        path = request.target.partition("?")[0]
+        if path not in self._tags:
+            with suppress(*_QUIET):
+                self._tags[path] = self.api.send(Outgoing("GET", path)).response.header("etag") or ""
+        tag = self._tags.get(path, "")
+        return replace(request, headers=(*others, ("If-Match", tag))) if tag else request
+
+    def acted(self) -> None:
+        """Forget the entity tags: something may have changed."""
+        self._tags.clear()
+
+    def finds_new(self, operation: Operation, inputs: Inputs) -> bool:
+        """Find out which members must be new in each creation; return whether new ones are accepted."""
+        label, unique, found = operation.label, self.values.unique, False
+        if label in self._asked or not is_json(inputs.media_type) or operation.safe:
+            return False
+        self._asked.add(label)
+        with suppress(*_QUIET):
+            for names, body in unique.trials(operation, inputs.body, operation.bodies[inputs.media_type].schema):
+                exchange = self.api.send(written(operation, replace(inputs, body=body)))
+                if exchange.response.ok:
+                    self.values.learn(operation, exchange)
+                    unique.found(operation, names)
+                if found is exchange.response.ok:
+                    break
+                found = True
+        self.api.single[label] = self.api.single.get(label, False) and not found
+        return found
