@@ -47,6 +47,13 @@ def test_no_contract_has_an_exception():
     assert [contract["name"] for contract in config["contracts"] if loose & contract.keys()] == []
 
 
+def test_every_room_of_the_suite_is_told_to_know_no_pack():
+    config = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    (contract,) = (one for one in config["contracts"] if one["name"].startswith("Nothing generic knows"))
+    rooms = {f"conformance.{path.parent.name}" for path in (ROOT / "conformance").glob("*/__init__.py")}
+    assert rooms == {*contract["source_modules"], *contract["forbidden_modules"]}
+
+
 def test_the_floors_hold():
     lint = "from importlinter.cli import lint_imports_command; lint_imports_command()"
     command = [sys.executable, "-c", lint, "--no-cache"]

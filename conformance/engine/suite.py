@@ -25,6 +25,7 @@ JUDGING = (
     "observe",
     "target",
     "api",
+    "measures",
     "scenarios",
     "checkers",
     "rules",
