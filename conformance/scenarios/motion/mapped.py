@@ -211,8 +211,11 @@ class MappedDevice:
         Raises:
             NoAnswerError: there is no response.
         """
-        wanted = {**dict.fromkeys(self.drives.axes, 0.0), **speeds}
-        written = {name: int(one) if integers and one == int(one) else one for name, one in wanted.items()}
+        written = {**dict.fromkeys(self.drives.axes, 0.0), **speeds}
+        # What is no number, and is to be refused, is no velocity that is wanted.
+        wanted = {name: float(one) for name, one in written.items() if isinstance(one, int | float)}
+        if integers:
+            written |= {name: int(one) for name, one in wanted.items() if one == int(one)}
         made = self.request_of(self.drives, written, authorized=authorized)
         return self._sent(made, wanted, authorized=authorized, fresh=fresh)
 

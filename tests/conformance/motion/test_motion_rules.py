@@ -12,6 +12,8 @@ from simulated import DEVICES, MUTANTS, RULES, cases_of, played
 
 from conformance.rules.motion import test_motion_attempts
 from conformance.scenarios.motion.trace import Quiet, Reading, Tried
+from conformance.scenarios.scenario import Recording, Recordings
+from conformance.scenarios.stored import TRACES_NAME, read_traces, write_traces
 from conformance.statement.motion_map import MotionMap
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.case import Case
@@ -76,6 +78,21 @@ def test_a_velocity_that_is_taken_wrongly_now_and_then_or_not_quite_ended_is_fou
 @pytest.mark.parametrize("name", ["rover", "arm"])
 def test_a_right_device_breaks_no_rule_at_quick(name, seed):
     assert _failed(name, noise=0.004 if seed % 2 else 0.0, seed=seed, effort="quick")[0] == set()
+
+
+@pytest.mark.parametrize("name", ["arm", "rover"])
+def test_a_trace_is_judged_alike_after_it_was_stored(name, tmp_path):
+    made = list(played(name, MUTANTS[name]["stop-late"], noise=0.004, seed=1))
+    write_traces(Recordings({scenario.name: Recording(trace) for scenario, trace, _ in made}), tmp_path)
+    refused = []
+    stored = read_traces(tmp_path / TRACES_NAME, [scenario for scenario, *_ in made], lambda *why: refused.append(why))
+    assert refused == []
+    for scenario, trace, given in made:
+        again = stored.played[scenario.name].trace
+        for rule in (one for one in RULES if scenario in one.on):
+            assert [one.holds for one in cases_of(rule, again, given)] == [
+                one.holds for one in cases_of(rule, trace, given)
+            ]
 
 
 @pytest.mark.parametrize("tolerance", [0.02, 0.08, 0.14])
