@@ -13,11 +13,16 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.left_behind import LeftBehind
 from conformance.api.rest.request_context import RequestContext
 from conformance.api.rest.statuses import CRASHES, HELD, held_text
+from conformance.api.rest.things import represented
 from conformance.api.rest.validity import VALID, validity
 from conformance.api.rest.variations import Kind
 from conformance.contract.described import SOAP
+from conformance.documents.json_schema import kinds_of
+from conformance.documents.json_text import read_json
 from conformance.documents.openapi import operations_of
+from conformance.documents.representation import flat
 from conformance.documents.resources import matching
+from conformance.documents.writing import json_text
 from conformance.scenarios.living import ABSENT
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -31,8 +36,14 @@ _MOST: Final = 2000
 _MOST_THINGS, _REMEMBERED = 40, 400
 # A device that acts later has so long, s: a little longer than the checkers wait.
 _SETTLES_S: Final = 3.2
+# So many things are deleted at the end.
+_MOST_DELETED: Final = 10
+_DONE: Final = frozenset({200, 204})
 _ERRORS: Final = range(400, 500)
 _ANY_FORMAT: Final = frozenset({None, "*/*", "application/json"})
+
+
+_Things = dict[str, tuple[bool, float]]
 
 
 class OtherExchanges(Listener):
@@ -46,7 +57,7 @@ class OtherExchanges(Listener):
 
     def __init__(self, api: RestInterface) -> None:
         self.probes: list[Probe] = []
-        self.things: dict[str, tuple[bool, float]] = {}
+        self.things: _Things = {}
         self._made = LeftBehind(operations_of(api.run.contract), api.client.base_url).made
         self._api = api
         self._seen: set[int] = set()
@@ -122,17 +133,48 @@ class OtherExchanges(Listener):
         return operation.label if said.verdict == VALID and not invents else ""
 
 
-def _read(api: RestInterface, things: dict[str, tuple[bool, float]]) -> dict[str, tuple[bool, float]]:
-    """Read things; return those that are missing, or are there although they were deleted."""
-    sent = {path: api.client.send("GET", path, headers=(("Accept", "*/*"),)) for path in things}
+def _read(api: RestInterface, things: _Things) -> dict[str, Exchange]:
+    return {path: api.client.send("GET", path, headers=(("Accept", "*/*"),)) for path in things}
+
+
+def _wrong(things: _Things, sent: dict[str, Exchange]) -> _Things:
+    """Return the things that are missing, or are there although they were deleted."""
     return {path: one for path, one in things.items() if one[0] is (sent[path].response.status in ABSENT)}
+
+
+def _deleted(api: RestInterface, sent: dict[str, Exchange]) -> _Things:
+    """Delete things that were read: so many that a thing with each declared value of a member is deleted."""
+    covered, found = set[tuple[str, ...]](), _Things()
+    for path, exchange in sent.items():
+        read, delete = (matching(api.run.contract, method, path) for method in ("GET", "DELETE"))
+        if read is None or delete is None or not allowed(api, delete) or len(found) >= _MOST_DELETED:
+            continue
+        parts = flat(read.shape or {}).get("properties", {})
+        own = represented(read_json(exchange.response.body).value, parts)
+        few = [name for name, one in parts.items() if name in own and _has_few(one)]
+        values = {(read.template,), *((read.template, name, json_text(own[name])) for name in few)}
+        if not values <= covered:
+            covered |= values
+            answer = api.client.send("DELETE", path).response
+            found |= {path: (False, answer.received_s)} if answer.status in _DONE else {}
+    return found
+
+
+def _has_few(schema: object) -> bool:
+    """Return whether a member has few values, as states do."""
+    return isinstance(schema, dict) and ("enum" in flat(schema) or kinds_of(schema) == {"boolean"})
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)
 def others(api: RestInterface, other_exchanges: OtherExchanges) -> Survey:
     """Read what was created or deleted once more, and return what other checks have sent and received."""
     with suppress(NoAnswerError, TimeIsOverError):
-        wrong = _read(api, dict(islice(other_exchanges.things.items(), _MOST_THINGS)))
+        things = dict(islice(other_exchanges.things.items(), _MOST_THINGS))
+        sent = _read(api, things)
+        wrong = _wrong(things, sent)
+        own = {path: one for path, one in sent.items() if things[path][0] and path not in wrong}
+        deleted = _deleted(api, own)
+        wrong |= _wrong(deleted, _read(api, deleted))
         # A device may take a while, but not for ever.
         if wrong:
             until = max(when for _, when in wrong.values()) + _SETTLES_S

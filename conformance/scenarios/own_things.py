@@ -9,7 +9,7 @@ from typing import Any, Final
 from urllib.parse import quote, urlsplit
 
 from conformance.api.rest.applicable import allowed
-from conformance.api.rest.inputs import Inputs, usual_inputs, written
+from conformance.api.rest.inputs import Inputs, usual_inputs, whole_body, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.samples import fits
@@ -89,7 +89,10 @@ def _created(surveyor: Surveyor, create: Operation, read: Operation) -> _Thing |
     made: Probe | None = None
     usual = usual_inputs(create, surveyor.values)[:2]
     body = _with_texts(create, usual[0].body)
-    owned = _with_owned(create, read, usual[0].body)
+    # With all members, each can be written and removed later.
+    whole = whole_body(create, surveyor.values)[1]
+    whole = whole if isinstance(whole, dict) else usual[0].body
+    owned = _with_owned(create, read, whole) or (whole if isinstance(whole, dict) else None)
     for inputs in (*(replace(usual[0], body=one) for one in (owned, body) if one), *usual):
         made = surveyor.send(create, Variation(Kind.AGAIN, "", "", inputs))
         if made.ok:
