@@ -1,14 +1,21 @@
 """What is kept of the exchanges of checks that no scenario records."""
 
+from contextlib import closing
+
 import pytest
+from aiohttp import web
+from small_device import REFUSED, answers, described, error, reading, small_device
 
 from conformance.api.rest.interface import RestInterface
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.scenarios.other_exchanges import OtherExchanges, others
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import Calls, Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
+from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
 _LEVEL = {"name": "level", "in": "query", "required": True, "schema": {"type": "integer", "minimum": 0}}
@@ -91,3 +98,65 @@ def test_a_device_that_never_answered_2xx_is_not_judged(api, kept):
     api.working.clear()
     with pytest.raises(NotPossibleError, match="credentials"):
         others.play(api, kept)
+
+
+_STATE = {"type": "string", "enum": ["idle", "busy", "off"]}
+_TUBE = {"type": "object", "properties": {"id": {"type": "integer"}, "state": _STATE}}
+_ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "integer"}}
+
+
+class _Tubes:
+    """A device with tubes, which loses the second one, and whose busy ones DELETE leaves there, if it is broken."""
+
+    def __init__(self, *, broken):
+        self.there, self.broken, self.made, self.sent = {}, broken, 0, []
+
+    def served(self):
+        created, gone = {"201": answers(_TUBE)}, {"204": {"description": "gone"}, "4XX": REFUSED}
+        item = {**reading(_TUBE, parameters=[_ID]), "delete": {"parameters": [_ID], "responses": gone}}
+        document = described({"/tubes": {"post": {"responses": created}}, "/tubes/{id}": item})
+        routes = {"/tubes": {"POST": self.post}, "/tubes/{id}": {"GET": self.get, "DELETE": self.delete}}
+        return document, routes
+
+    async def post(self, _):
+        self.made += 1
+        tube = {"id": self.made, "state": _STATE["enum"][self.made % 3]}
+        if not (self.broken and self.made == 2):
+            self.there[self.made] = tube
+        return web.json_response(tube, status=201, headers={"Location": f"/tubes/{self.made}"})
+
+    def _of(self, request):
+        self.sent.append(f"{request.method} {request.path}")
+        return self.there.get(int(request.match_info["id"]))
+
+    async def get(self, request):
+        tube = self._of(request)
+        return web.json_response(tube) if tube else error(404, "no such tube")
+
+    async def delete(self, request):
+        tube = self._of(request)
+        if not (self.broken and tube["state"] == "busy"):
+            del self.there[tube["id"]]
+        return web.Response(status=204)
+
+
+@pytest.mark.parametrize("broken", [False, True])
+def test_what_is_missing_or_there_again_is_read_once_more_after_a_wait(tmp_path, broken):
+    tubes = _Tubes(broken=broken)
+    document, routes = tubes.served()
+    contract = Contract.load(write_described_pack(tmp_path, document, document))
+    with small_device(document, routes) as url, closing(HttpClient(url, Connection(timeout_s=30.0))) as client:
+        statement = Statement(endpoints=Endpoints(rest=url), calls=Calls(allow=("POST *", "DELETE *")))
+        api = RestInterface(Run(statement=statement, contract=contract, effort=Effort("quick")), client)
+        client.connection.listeners.append(kept := OtherExchanges(api))
+        api.working.update(dict.fromkeys(("POST /tubes", "GET /tubes/{id}")))
+        for _ in range(7):
+            client.send("POST", "/tubes")
+        others.play(api, kept)
+    deleted = [int(one.rpartition("/")[2]) for one in tubes.sent if one.startswith("DELETE")]
+    assert {number % 3 for number in deleted} == {0, 1, 2}, "a thing in each state"
+    assert len(deleted) == 3
+    again = {one for one in tubes.sent if one.startswith("GET") and tubes.sent.count(one) > 2}
+    busy = {f"GET /tubes/{number}" for number in deleted if number % 3 == 1}
+    assert again == (busy if broken else set())
+    assert tubes.sent.count("GET /tubes/2") == (2 if broken or 2 in deleted else 1)
