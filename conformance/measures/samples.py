@@ -22,24 +22,21 @@ Sample = tuple[float, float]
 """A time, s, and a value."""
 
 
-class Timed(Protocol):
+class _Timed(Protocol):
     """A reading: when it was requested, and when the response had arrived, s of the run's clock."""
 
     @property
-    def sent(self) -> float:
-        """When it was requested."""
-
+    def sent(self) -> float: ...
     @property
-    def received(self) -> float:
-        """When the response had arrived."""
+    def received(self) -> float: ...
 
 
-def usual_s(readings: Sequence[Timed]) -> float:
+def usual_s(readings: Sequence[_Timed]) -> float:
     """Return how long a reading takes, by the median, s."""
     return median(one.received - one.sent for one in readings) if readings else 0.0
 
 
-def longest_s(readings: Sequence[Timed]) -> float:
+def longest_s(readings: Sequence[_Timed]) -> float:
     """Return how long the slowest reading took, s: a loaded machine or link may delay anything else by as much."""
     return max((one.received - one.sent for one in readings), default=0.0)
 
@@ -90,21 +87,19 @@ def goes_on(
     samples: Sequence[Sample],
     rate: Callable[[Sequence[Sample]], float | None],
     most: Callable[[Sequence[Sample]], float],
-    parts: int = SEVERAL,
 ) -> float:
     """Return how fast something moves on and on, per second; 0 if it rests, comes to rest, or sways.
 
     Args:
         samples: of at least one second or so.
         rate: returns the rate that some samples show; None: they do not show it.
-        most: returns the rate that such samples of something at rest may show.
-        parts: so many parts of the time must each show it, in one direction, and none of them less than half of it.
+        most: returns the rate that such samples of something at rest may show: each third of the time must show more.
     """
-    if len(samples) < parts * SEVERAL:
+    if len(samples) < SEVERAL * SEVERAL:
         return 0.0
-    begin, length = samples[0][0], (samples[-1][0] - samples[0][0]) / parts
+    begin, length = samples[0][0], (samples[-1][0] - samples[0][0]) / SEVERAL
     found: list[float] = []
-    for part in range(parts):
+    for part in range(SEVERAL):
         within = [one for one in samples if begin + part * length <= one[0] <= begin + (part + 1) * length]
         seen = rate(within) if len(within) >= SEVERAL else None
         if seen is None or abs(seen) <= most(within):

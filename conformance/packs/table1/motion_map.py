@@ -56,13 +56,8 @@ def motion_map_of(statement: Statement, area: tuple[float, float, float, float])
             "stamp": "/header/stamp",
             "agrees": {f"GET {_VELOCITY}": twist},
             "axes": {
-                axis: {
-                    "at": f"/pose/pose/position/{axis}",
-                    "unit": "m",
-                    "limits": area[index::2],
-                    "tolerance": arrives_m,
-                }
-                for index, axis in enumerate("xy")
+                axis: {"at": f"/pose/pose/position/{axis}", "unit": "m", "limits": side, "tolerance": arrives_m}
+                for axis, side in (("x", area[::2]), ("y", area[1::2]))
             },
         },
         "goto": goto if same_frame else None,
