@@ -36,7 +36,10 @@ class Identities:
         """Yield the cases of one exchange."""
         operation, answer = occasion.operation, occasion.response
         method = occasion.request.method
-        if operation is None or not answer.ok or method in SAFE - {"GET"}:
+        if self._items is None:
+            found = [one for one in operations_of(occasion.contract) if one.method == "GET"]
+            self._items = {collection_of(one.template): one for one in found if collection_of(one.template)}
+        if not self._items or operation is None or not answer.ok or method in SAFE - {"GET"}:
             return
         path = occasion.context.target.partition("?")[0].rstrip("/")
         above, _, last = path.rpartition("/")
@@ -46,22 +49,15 @@ class Identities:
             self._own[above].discard(id_)
         if method != "GET" or answer.cut or not is_json(answer.media_type):
             return
-        item = self._item_of(occasion, operation)
+        item = self._items.get(operation.template.rstrip("/"))
         if item is not None:
             items = listed(read_json(answer.body).value) or []
-            found = {identifier_of(one, item) for one in items if isinstance(one, dict)} - {""}
-            self._count += len(found)
+            ids = {identifier_of(one, item) for one in items if isinstance(one, dict)} - {""}
+            self._count += len(ids)
             if self._count < _REMEMBERED:
-                self._listed[path] |= found
+                self._listed[path] |= ids
         if collection_of(operation.template):
             yield from self._item(occasion, operation, above, id_)
-
-    def _item_of(self, occasion: Occasion, operation: Operation) -> Operation | None:
-        """Return the operation that reads an item of a list."""
-        if self._items is None:
-            found = [one for one in operations_of(occasion.contract) if one.method == "GET"]
-            self._items = {collection_of(one.template): one for one in found if collection_of(one.template)}
-        return self._items.get(operation.template.rstrip("/"))
 
     def _item(self, occasion: Occasion, operation: Operation, above: str, id_: str) -> Iterator[Case]:
         own, known = self._own[above], self._listed[above]

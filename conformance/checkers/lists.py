@@ -58,7 +58,7 @@ class Lists:
         if listing is None or occasion.request.method != "GET" or not occasion.context.usual:
             return
         page, sent = page_of(occasion.response, operation), listing.sent(occasion.context.target)
-        if page is None or sent is None:
+        if page is None or sent is None or not (listing.operation.parameters or page.totals):
             return
         yield from self._limit(occasion, listing, page, sent)
         yield from self._filters(occasion, listing, page, sent)

@@ -142,7 +142,7 @@ class Memory:
         """Yield the cases of one exchange."""
         operation, method = occasion.operation, occasion.request.method
         path = _path_in(occasion.context.target)
-        if method in SAFE:
+        if method in SAFE or not self._items:
             item = self._items.get(operation.template.rstrip("/")) if operation is not None else None
             if item is not None and method == "GET" and occasion.context.plain:
                 yield from self._read(occasion, item, path)

@@ -126,11 +126,11 @@ class Resources:
             occasion.request.method,
             occasion.response.status,
         )
-        resource = resource_at(occasion.contract, path)
-        if resource is None:
-            return
         if occasion.operation is not None:
             yield from self._declared(occasion, path)
+            return
+        resource = resource_at(occasion.contract, path)
+        if resource is None:
             return
         if not occasion.context.usual or method not in METHODS or _elsewhere(occasion, resource, path):
             return
