@@ -64,7 +64,7 @@ class Permission:
             TimeIsOverError: the time of the run is over.
         """
         self._run.limit.check()
-        if not self._run.contract.has_own_requirements:
+        if not self._run.contract.is_claimed:
             # Which operation a message is for, its scenario has decided by the same rules.
             posts = method == "POST" and _place(url) in self._reading
             return "" if posts else self._refused_call(method, url)
@@ -126,7 +126,7 @@ def permitted(run: Run, client: HttpClient, methods: Iterable[str], path: str, *
     """
     refusals = {method: client.refusal(method, path) for method in methods}
     # A device that claims no contract is judged by what may be called.
-    reason = next(filter(None, refusals.values()), "") if run.contract.has_own_requirements else ""
+    reason = next(filter(None, refusals.values()), "") if run.contract.is_claimed else ""
     for id_ in ids if reason else ():
         requirement = run.contract.ledger.get(id_)
         if requirement is not None and Prerequisite.MOTION in requirement.needs:

@@ -243,10 +243,7 @@ def _certify(door: FrontDoor | None, judged: Judged, options: CertifyOptions, st
     notes = (*remarks, *_notes(run))
     command = command_without_folders(sys.argv[1:], ("--call", "--never"))
     moves = run.statement.motion_map.calls if run.allow_motion and run.statement.motion_map else ()
-    robot, calls = (
-        RobotUnderTest(run, connection),
-        () if contract.has_own_requirements else tuple(told(*_rules(run), moves)),
-    )
+    robot, calls = (RobotUnderTest(run, connection), () if contract.is_claimed else tuple(told(*_rules(run), moves)))
     progress, bar = None if options.progress == "none" else sys.stderr, options.progress == "auto"
     said: dict[str, Any] = {"progress": progress, "bar": bar, "notes": notes, "announced": calls}
     return judge(robot, options.out, command=command, baseline=baseline, **said)
@@ -276,13 +273,13 @@ def _rules(run: Run) -> tuple[CallRules, tuple[Operation, ...]]:
 
 def _notes(run: Run) -> tuple[str, ...]:
     notes = []
-    if run.statement.claims is None and run.contract.has_own_requirements:
+    if run.statement.claims is None and run.contract.is_claimed:
         notes.append(f"No classes were claimed; judged are those that have an address: {', '.join(run.claims)}.")
     notes += [
         f"Class {name} is not claimed: the robot's {' and '.join(missing)} interface has no address."
         for name, missing in run.statement.lacking(run.contract).items()
     ]
-    if not run.contract.has_own_requirements:
+    if not run.contract.is_claimed:
         rules, operations = _rules(run)
         unused = rules.unused(operations)
         notes += [f"The pattern {one!r} matches no operation of the description." for one in unused]

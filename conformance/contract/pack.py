@@ -159,7 +159,7 @@ class Contract:
             interfaces = entry.interfaces or (known.interfaces if known else ())
             enough = known.one_is_enough if known else entry.one_is_enough
             topic = entry.topic or (known.topic if known else Topic.SERVICE)
-            beside = known is not None and known.beside and not self.has_own_requirements
+            beside = known is not None and known.beside and not self.is_claimed
             found[entry.name] = ConformanceClass(
                 entry.name,
                 entry.title or known.title,  # type: ignore[union-attr] # checked above
@@ -217,10 +217,10 @@ class Contract:
             raise ContractError(f"{self.openapi_path} is no OpenAPI description: it has no 'paths'")
         return document
 
-    @cached_property
-    def has_own_requirements(self) -> bool:
-        """Whether the pack demands more than its descriptions say, so that devices claim it and it permits requests."""
-        return not self._is_data and (self.directory / LEDGER).is_file()
+    @property
+    def is_claimed(self) -> bool:
+        """Whether devices claim the pack, whose author permits requests: an author wrote its ``pack.toml``, no run."""
+        return self.manifest is not None and not self._is_data
 
     @cached_property
     def original(self) -> dict[str, Any]:
@@ -276,7 +276,7 @@ class Contract:
         generic = {id_: item for id_, item in generic.items() if generic.keys().isdisjoint(item.same_as)}
         own: dict[str, Requirement] = {}
         path = self.directory / LEDGER
-        if self.has_own_requirements:
+        if path.is_file() and not self._is_data:
             try:
                 own = load_ledger(path, self.classes)
             except LedgerError as error:

@@ -232,7 +232,7 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
         if run.aborted and not (evidence.cases or evidence.skips or evidence.errors):
             judge.stopped(requirement.id, run.aborted)
     seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, run.scored, run.beside)
-    if not run.contract.has_own_requirements:
+    if not run.contract.is_claimed:
         # What the motion map declares is claimed, and so is that the operations of a WSDL answer.
         _leave_out(
             seen[id_]

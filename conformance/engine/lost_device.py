@@ -185,7 +185,7 @@ class LostDevice:
 
     def _may_repeat(self, request: Request) -> bool:
         """Return whether a request may be sent again: one that moves a device may move it elsewhere now."""
-        harmless = not (self._run.contract.has_own_requirements or self._run.statement.motion_map)
+        harmless = not (self._run.contract.is_claimed or self._run.statement.motion_map)
         return request.method in SAFE_METHODS or (harmless and request.raw is None)
 
     def _does(self, *requests: Request) -> bool:

@@ -26,7 +26,7 @@ def record_exception(
             run.out_of_time(id_)
         return
     # A description may be such that no valid request can be made from it.
-    unmade = isinstance(error, HarnessError) and not run.contract.has_own_requirements
+    unmade = isinstance(error, HarnessError) and not run.contract.is_claimed
     if isinstance(error, NotPossibleError | NotPermittedError) or unmade:
         # A note is the reason of a skip where nothing was judged, and changes nothing where other checks have judged.
         tell = run.judge.note if isinstance(error, NoOccasionError) else run.judge.skip

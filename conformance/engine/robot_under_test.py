@@ -131,7 +131,7 @@ class RobotUnderTest:
         if self.run.allow_motion or self.run.statement.calls.allow:
             self._guard = Guard(self.rest)
             self.connection.before_sending = self._guard.before_sending
-        if not self.run.contract.has_own_requirements:
+        if not self.run.contract.is_claimed:
             self.permission.may_call_ports(self.rest.client.base_url)
             self.log = OperationLog(self.run.contract, self.rest.client.base_url)
             self.connection.listeners.append(self.log)

@@ -104,7 +104,7 @@ def _known(item: Requirement, contract: Contract, sets: Mapping[str, Requirement
         "aliases": list(item.aliases),
         "sets": [name for name, one in sets.items() if not ids.isdisjoint(one.requirements)],
         # Of a device that claims no contract, a run leaves out what no permitted request shows.
-        "decides": holds_back(item) and contract.has_own_requirements,
+        "decides": holds_back(item) and contract.is_claimed,
         "beside": contract.classes[item.class_].beside,
     }
 

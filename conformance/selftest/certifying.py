@@ -178,7 +178,7 @@ def robot_of(job: Job, folder: Path) -> RobotUnderTest:
         contract=contract,
         claims=statement.claimed(contract),
         # A device that belongs to somebody is not moved.
-        allow_motion=contract.has_own_requirements,
+        allow_motion=contract.is_claimed,
         seed=job.seed,
         effort=Effort(job.effort),
         # Nothing is hurt by a mutant that cannot be stopped.

@@ -101,7 +101,7 @@ class Run:
 
     def out_of_time(self, requirement: str) -> None:
         """Record that the time was over before a case of a requirement was tried."""
-        say = self.judge.note if self.contract.has_own_requirements else self.judge.not_seen
+        say = self.judge.note if self.contract.is_claimed else self.judge.not_seen
         say(requirement, self.limit.reason)
 
     @property

@@ -262,7 +262,7 @@ def verdict_line(run: Run, value: Overall, verdicts: Iterable[Verdict]) -> str:
         return "inconclusive, because the device refused the credentials"
     if run.unshown and value is Overall.INCONCLUSIVE:
         return f"inconclusive, because {run.unshown}"
-    if not run.contract.has_own_requirements:
+    if not run.contract.is_claimed:
         said = _OF_DESCRIPTION[value]
         said = f"{said}, as far as --minutes {run.limit.minutes:g} allowed" if run.limit.is_struck else said
         return f"{said}, {run.less}" if run.less else said

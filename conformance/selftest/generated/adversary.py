@@ -27,7 +27,7 @@ _REPEATING = frozenset({"freeze", "delay", "ignore", "lag", "crossed"})
 def kinds_in_requests(contract: Contract) -> Mapping[str, frozenset[str]]:
     """Return by operation the kinds of values that its requests may have."""
     found: dict[str, frozenset[str]] = defaultdict(frozenset)
-    if not contract.has_own_requirements:
+    if not contract.is_claimed:
         for operation in operations_of(contract):
             schemas = [one.schema for one in operation.parameters]
             schemas += [body.schema for body in operation.bodies.values()]

@@ -27,7 +27,7 @@ def every_change(contract: Contract) -> tuple[GeneratedMutant, ...]:
 @cache
 def generated_mutants(contract: Contract) -> tuple[GeneratedMutant, ...]:
     """Return the generated mutants: the changes that break a clause of the contract."""
-    if not contract.has_own_requirements:
+    if not contract.is_claimed:
         return described_mutants(contract)
     return tuple(change for change in every_change(contract) if open_place(contract, change) is None)
 

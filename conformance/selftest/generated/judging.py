@@ -140,7 +140,7 @@ def _judge(
     result = GeneratedResult(mutant)
     tally = Tally()
     # Any requirement ends a run on a device that claims no contract: what else it does not keep is of no use.
-    claims_none = not contract.has_own_requirements
+    claims_none = not contract.is_claimed
     musts = frozenset(id_ for id_, item in contract.ledger.items() if claims_none or item.level is Level.MUST)
     given_up = False
     claimed = statement_of(job_for(robot, proxy, efforts[0], seed), contract).claimed(contract)
@@ -182,7 +182,7 @@ def _attempts(contract: Contract, mutant: GeneratedMutant, claimed: tuple[str, .
 
     The classes of a device that claims no contract are judged all at once: any may notice its mutants.
     """
-    if not contract.has_own_requirements:
+    if not contract.is_claimed:
         yield claimed, ()
         return
     classes = tuple(class_ for class_ in mutant.classes if class_ in claimed)
