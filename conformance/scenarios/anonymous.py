@@ -2,19 +2,28 @@
 
 from collections.abc import Iterator
 from contextlib import closing, suppress
+from dataclasses import replace
+from typing import Final
 from urllib.parse import quote
 
 from conformance.api.rest.applicable import allowed
 from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.stranger import Stranger
+from conformance.api.rest.things import collection_of
 from conformance.api.rest.values import Values
 from conformance.documents.openapi import Operation, operations_of
 from conformance.documents.security import demands
+from conformance.scenarios.own_things import created_path
 from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.scenarios.survey import Surveyor
+from conformance.scenarios.writing import Writer
 from conformance.transport.client import HttpClient
-from conformance.transport.exchange import Exchange, NoAnswerError
+from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
+
+# What may be said of the thing before the credentials are looked at.
+_UNDECIDED: Final = frozenset({404, 409, 410})
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)
@@ -48,7 +57,32 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
                         fresh=True,
                     )
                     found += [exchange] if exchange else []
+                    if exchange and not authorized and exchange.response.status in _UNDECIDED:
+                        found += _on_new_thing(api, values, operation, request)
     return (*found, *_beyond_ascii(api, values, closed))
+
+
+def _on_new_thing(api: RestInterface, values: Values, operation: Operation, request: Outgoing) -> Iterator[Exchange]:
+    """Send a request without credentials for a thing that was just created, if one can be, and delete the thing."""
+    known = {
+        (item.method, item.template.rstrip("/")): item for item in operations_of(api.run.contract) if allowed(api, item)
+    }
+    item = operation.template.partition("}")[0] + "}"
+    read, create, delete = (known.get((method, path)) for method, path in _life_of(item))
+    if operation.safe or read is None or create is None or "{" in operation.template[len(item) :]:
+        return
+    surveyor = Surveyor(api, values)
+    path = created_path(surveyor, create, read)
+    if path:
+        target = path + operation.template[len(item) :] + "".join(request.target.partition("?")[1:])
+        own = replace(request, target=target)
+        yield api.client.send(own.method, own.target, headers=own.headers, body=own.body, authorized=False, fresh=True)
+        if delete is not None:
+            Writer(api, values).send(delete, path)
+
+
+def _life_of(item: str) -> tuple[tuple[str, str], ...]:
+    return ("GET", item), ("POST", collection_of(item)), ("DELETE", item)
 
 
 def _beyond_ascii(api: RestInterface, values: Values, closed: list[Operation]) -> Iterator[Exchange]:

@@ -62,8 +62,9 @@ def own_things(api: RestInterface, values: Values) -> Survey:
                 if changes:
                     _Thing(surveyor, read, path_of_usual(read, values)).written(changes)
             elif create is not None and collection_of(path):
-                thing = _put(surveyor, create, read) if create.method == "PUT" else _created(surveyor, create, read)
-                if thing is not None:
+                make = _put if create.method == "PUT" else created_path
+                if thing_path := make(surveyor, create, read):
+                    thing = _Thing(surveyor, read, thing_path)
                     thing.asked()
                     thing.written(changes)
                     thing.deleted(delete)
@@ -75,17 +76,17 @@ def path_of_usual(read: Operation, values: Values) -> str:
     return written(read, usual_inputs(read, values)[0]).target
 
 
-def _put(surveyor: Surveyor, create: Operation, read: Operation) -> _Thing | None:
-    """Create a thing under an identifier that the client chooses; return it if nothing was there before."""
+def _put(surveyor: Surveyor, create: Operation, read: Operation) -> str:
+    """Create a thing under an identifier that the client chooses; return its path if nothing was there before."""
     path = path_chosen(read, _TURN)
     thing = _Thing(surveyor, read, path)
     if not path or thing.get(place="path of what does not exist").status not in ABSENT:
-        return None
-    return thing if thing.sent(create, None).ok else None
+        return ""
+    return path if thing.sent(create, None).ok else ""
 
 
-def _created(surveyor: Surveyor, create: Operation, read: Operation) -> _Thing | None:
-    """Create a thing; return it if the response says where it is."""
+def created_path(surveyor: Surveyor, create: Operation, read: Operation) -> str:
+    """Create a thing; return the path by which it is read, as far as the response says where it is, or nothing."""
     made: Probe | None = None
     usual = usual_inputs(create, surveyor.values)[:2]
     body = _with_texts(create, usual[0].body)
@@ -98,7 +99,7 @@ def _created(surveyor: Surveyor, create: Operation, read: Operation) -> _Thing |
         if made.ok:
             break
     if made is None or made.exchange is None or made.status != 201:  # noqa: PLR2004 - RFC 9110 15.3.2
-        return None
+        return ""
     sent, answer = made.exchange.request.url, made.exchange.response
     location, target = answer.header("location"), ""
     if location and is_same(joined(sent, location), sent):
@@ -107,7 +108,7 @@ def _created(surveyor: Surveyor, create: Operation, read: Operation) -> _Thing |
         base = urlsplit(sent).path.removeprefix(surveyor.api.client.prefix).rstrip("/")
         target = f"{base}/{quote(str(id_), safe='')}{'/' if read.template.endswith('/') else ''}"
     pattern = re.sub(r"\\{[^{}]*\\}", "[^/]+", re.escape(read.template))
-    return _Thing(surveyor, read, target) if re.fullmatch(pattern, target) else None
+    return target if re.fullmatch(pattern, target) else ""
 
 
 @dataclass

@@ -1,8 +1,10 @@
 """What requires credentials by the description: what is sent, and how the responses are judged."""
 
+from contextlib import closing
+
 import pytest
 from toy_messages import exchange
-from toy_server import serving
+from toy_server import Handler, server_of, serving
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
@@ -49,6 +51,50 @@ def test_what_requires_credentials_is_sent_without_them_and_with_wrong_ones(tmp_
     sent = [dict(one.request.headers).get("Authorization") for one in trace]
     assert sent[::2] == [None] * len(methods)
     assert "$ROAAS_TOKEN" not in sent
+
+
+_ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "integer"}}
+_BAYS = {
+    **_DOCUMENT,
+    "paths": {
+        "/bays": {"post": {"responses": {"201": {"description": "made"}}}},
+        "/bays/{id}": {"parameters": [_ID], "get": _ANSWERS, "delete": _ANSWERS},
+        "/bays/{id}/light": {"parameters": [_ID], "post": _ANSWERS},
+    },
+}
+
+
+class _Bays(Handler):
+    """Looks whether there is a bay, and only then at the credentials; not for those in ``server.open``."""
+
+    def answer(self):
+        path, bays = self.path, self.server.bays
+        known, authorized = self.headers.get("Authorization") == "Bearer roaas", True
+        id_ = int(path.split("/")[2]) if path.count("/") > 1 else 0
+        if not known and (self.command, path.count("/")) not in self.server.open:
+            authorized = False
+        if self.command == "POST" and not id_ and authorized:
+            bays.append(len(bays) + 1)
+            return self.send(201, b'{"id": %d}' % bays[-1])
+        if id_ and id_ not in bays:
+            return self.send(404, b"{}")
+        if self.command == "DELETE" and authorized:
+            bays[id_ - 1] = 0
+        return self.send(200 if authorized else 401, b"{}")
+
+
+@pytest.mark.parametrize("unguarded", [(), ("DELETE", 2), ("POST", 3)])
+def test_a_thing_that_is_there_shows_whether_credentials_are_needed(tmp_path, unguarded):
+    contract = Contract.load(write_described_pack(tmp_path, _BAYS, _BAYS))
+    with server_of(_Bays, bays=[], open={unguarded}) as server:
+        statement = Statement(endpoints=Endpoints(rest=server.url), calls=Calls(allow=("*",)))
+        run = Run(statement=statement, contract=contract)
+        with closing(HttpClient(server.url, Connection(token="roaas"))) as client:  # noqa: S106 - no secret
+            trace = anonymous_requests.play(RestInterface(run, client), Values({}, frozenset({"bay"})))
+    served = {one.request.method for one in trace if one.response.ok}
+    assert served == set(unguarded[:1])
+    # What was created for it is deleted, or was by whoever needs no credentials.
+    assert set(server.bays) == {0}
 
 
 @pytest.mark.parametrize(("status", "holds"), [(401, True), (403, True), (404, True), (200, False), (204, False)])
