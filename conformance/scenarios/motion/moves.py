@@ -165,7 +165,7 @@ def _drive_before(mapped: MappedDevice) -> None:
         half = with_room(mapped, [{name: axis.limits[1] / 2}], velocity.hold_s + velocity.settle_s)
         last = mapped.drive(half[0])
         mapped.clock.sleep(last.answered + velocity.hold_s - mapped.clock.now())
-        mapped.come_to_rest()
+        mapped.come_to_rest(stop=False)  # velocity 0 would be the last one
 
 
 @scenario(needs=_NEEDS, stage=Stage.MOTION)

@@ -6,12 +6,13 @@ from pathlib import Path
 import msgspec
 import pytest
 import rover
-from simulated import Api, map_of
+from simulated import DEVICES, MUTANTS, RULES, Api, cases_of, map_of, played
 
 from conformance.observe.clock import SimulatedClock
 from conformance.packs.table1.motion_map import motion_map_of
 from conformance.papers_robot.statement import load_robot_statement
 from conformance.scenarios.motion.mapped import MappedDevice
+from conformance.scenarios.motion.moves import stops
 from conformance.statement.motion_map import MotionMap
 
 _ROOT = Path(__file__).parents[3]
@@ -76,3 +77,14 @@ def test_a_stop_that_is_refused_while_no_goal_is_active_leaves_the_device_at_res
     mapped.drive({"ahead": speed})
     assert mapped.leave_at_rest() == ""
     assert not any(body.velocity(clock.now()).values())
+
+
+def test_a_device_that_takes_up_a_velocity_after_a_stop_is_found_though_its_stop_is_refused_at_rest(monkeypatch):
+    monkeypatch.setitem(DEVICES, "rover", (_Refusing, rover.LIMITS, rover.MAP))
+    found = {}
+    for change in (None, MUTANTS["rover"]["resumes-after-stop"]):
+        traces = {scenario: (trace, given) for scenario, trace, given in played("rover", change, effort="quick")}
+        rules = [one for one in RULES if one.requirement in {"motion/stop", "motion/stop-lasts"}]
+        found[change] = [one.holds for rule in rules for one in cases_of(rule, *traces[stops])]
+    assert all(found.pop(None))
+    assert not all(found.popitem()[1])
