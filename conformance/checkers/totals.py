@@ -63,6 +63,7 @@ class _Count:
         last: what identified the items of the last whole list that it agreed with.
         wrong_since_s: by the names of the parameters, when it was wrong first since such a list agreed with it.
         times: how often it was wrong while nothing changed.
+        sizes: the totals that were the number of items on a page, and not of the list.
         other: the parts of the list, since it agreed last, that tell another total.
     """
 
@@ -73,6 +74,7 @@ class _Count:
     last: frozenset[str] = frozenset()
     wrong_since_s: dict[frozenset[str], float] = field(default_factory=dict)
     times: int = 0
+    sizes: set[int] = field(default_factory=set)
     other: list[tuple[Occasion, int]] = field(default_factory=list)
 
     def learn(self, total: int, part: _Part) -> None:
@@ -162,13 +164,15 @@ class Totals:
                 number = f"{'' if part.sure else 'at least '}{least}"
                 expected = f"{number} as {name}, by the offset and the items that are shown"
                 yield _case(part.occasion, name, f"{total} as {name}", expected, holds=False)
-        elif not part.whole and shown and (count.is_of_all or plain_name(name) in TOTALS) and total != count.all:
-            count.other.append((part.occasion, total))
-            # Nothing was changed since the whole list was read.
-            count.times += total == shown and count.all_s > self._changed_s
-            if total == shown and count.all_s > self._changed_s and count.times >= _OFTEN:
-                expected = f"{count.all} as {name}, as the whole list tells"
-                yield _case(part.occasion, name, f"{total} as {name}", expected, holds=False)
+        elif not part.whole and shown and total != count.all:
+            if count.is_of_all:
+                count.other.append((part.occasion, total))
+            # Nothing was changed since the whole list was read; a list that shrinks by itself may have one such size.
+            elif plain_name(name) in TOTALS and total == shown < count.all and count.all_s > self._changed_s:
+                count.sizes.add(total)
+                if len(count.sizes) >= _OFTEN:
+                    expected = f"{count.all} as {name}, as the whole list tells"
+                    yield _case(part.occasion, name, f"{total} as {name}", expected, holds=False)
 
     def _is_cut(self, listing: Listing, shown: int, sent: Mapping[str, str]) -> bool:
         """Return whether a server may have cut a list at its own bound: a round number that no list exceeded."""

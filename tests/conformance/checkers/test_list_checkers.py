@@ -358,10 +358,19 @@ def test_a_total_that_is_wrong_beside_a_part_is_noticed(tmp_path):
 @pytest.mark.parametrize("query", [{}, {"state": "open"}], ids=["all", "filtered"])
 def test_a_total_that_is_the_size_of_the_page_is_noticed(query, tmp_path):
     seen = Seen(tmp_path, [_whole("limit"), _text("state", enum=_STATES)], _totalled("total")).read(VALVES)
-    of = [one for one in VALVES if one["state"] == "open"] if query else VALVES
+    every = [*VALVES, {**VALVES[0], "id": 9}]
+    seen.read(every)
+    of = [one for one in every if one["state"] == "open"] if query else every
     seen.read(of, **query).read(of[:1], limit=1, **query)
     assert not seen.broken, "once may be chance"
-    assert seen.read(of[:1], limit=1, **query).broken == {TOTAL}
+    assert seen.read(of[:2], limit=2, **query).broken == {TOTAL}
+
+
+def test_a_list_that_grows_and_shrinks_by_itself_has_another_total(tmp_path):
+    seen = Seen(tmp_path, [_whole("limit", default=3)], _totalled("total"))
+    for count in (2, 3, 3, 2, 3, 3):
+        seen.read(VALVES[:count])
+    assert not seen.broken
 
 
 def _changed_beside(seen):
