@@ -2,8 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from functools import partial
-from itertools import cycle, islice
+from itertools import chain, cycle, islice, repeat
 
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import Trace
@@ -17,8 +16,8 @@ _ENOUGH = "all steps that were planned are done"
 # A command takes about this long to be reached, at least; and this part of the settle time of a robot that is slow.
 _COMMAND_S = 0.4
 _OF_SETTLE = 0.25
-# A pause without any request, s.
-_PAUSE_S = 1.5
+# A pause without any request, s; so many in one walk.
+_PAUSE_S, _PAUSES = 1.5, 3
 
 
 class Walk:
@@ -48,7 +47,8 @@ class Walk:
         """
         before: list[Callable[[], object]] = [] if effort.slow else list(preludes)
         if before and effort.name != "quick":
-            before.append(partial(robot.clock.sleep, _PAUSE_S))
+            lengths = chain(repeat(_PAUSE_S, _PAUSES), repeat(0.0))
+            before.append(lambda: robot.clock.sleep(next(lengths)))
         self._preludes = cycle(before)
         self.robot = robot
         self.drive = Drive(robot)

@@ -7,6 +7,7 @@ import pytest
 from toy_body import interface_of
 
 from conformance.api.soap.callable_services import SoapServices
+from conformance.observe.clock import SimulatedClock
 from conformance.packs.table1.robot.no_commands import no_commands
 from conformance.packs.table1.robot.refused_requests import RefusedRequests, is_refused
 from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, VELOCITY, Robot
@@ -274,6 +275,15 @@ def test_two_of_them_come_before_each_command_of_a_walk(api, effort):
     walk = Walk(Robot(api), Effort(effort), 0.1, preludes=[lambda: done.append(1), lambda: done.append(2)])
     walk.prelude()
     assert done == [1, 2]
+
+
+def test_a_walk_pauses_a_few_times(api):
+    clock = SimulatedClock()
+    walk = Walk(Robot(api, clock), Effort("standard"), 0.1, preludes=[lambda: None])
+    began = clock.now()
+    for _ in range(40):
+        walk.prelude()
+    assert clock.now() - began == pytest.approx(4.5)
 
 
 def test_a_slow_robot_is_sent_no_more_than_the_commands(api):
