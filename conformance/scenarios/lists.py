@@ -440,7 +440,9 @@ class _Parts:
             return None
         expected = whole.identities[: len(joined)]
         fault = "" if tuple(joined[: len(expected)]) == expected else _difference(expected, tuple(joined))
-        fault = fault or (ends if len(joined) < self._count(whole) else "")
+        # The list may have become shorter meanwhile.
+        count = min([self._count(whole), *last[1].totals.values()])
+        fault = fault or (ends if len(joined) < max(count, len(whole.items)) else "")
         twice = next((f"the item {one[:60]} twice" for one in joined if joined.count(one) > 1), "")
         fault = fault or ("" if self.reader.by else twice)
         return self._paged(way, last[0], f"each item of the list once, page after page by {way}", fault)
