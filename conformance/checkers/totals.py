@@ -10,7 +10,6 @@ from typing import Final
 from conformance.api.rest.listing import COUNTS, TOTALS, Listing, Page, number_of
 from conformance.checkers.occasion import Occasion
 from conformance.documents.parameters import plain_name
-from conformance.documents.representation import flat
 from conformance.verdict.case import Case
 
 #: A total may be kept apart from the list, and be late after a change, s. Wrong so often while nothing changes, it is
@@ -134,7 +133,7 @@ class Totals:
         is_open = listing.limit is None or listing.limit.name not in sent
         is_beyond = shown == 0 and offset > 0
         whole = not page.goes_on and (shown < most or (is_open and not most)) and not is_beyond
-        sure = whole and not self._is_cut(listing, shown, sent)
+        sure = whole and not self._is_cut(listing, shown)
         part = _Part(occasion, page, frozenset(sent), offset, whole=whole, sure=sure)
         for name, total in page.totals.items():
             every = self._counts[label, name, frozenset()]
@@ -174,13 +173,12 @@ class Totals:
                     expected = f"{count.all} as {name}, as the whole list tells"
                     yield _case(part.occasion, name, f"{total} as {name}", expected, holds=False)
 
-    def _is_cut(self, listing: Listing, shown: int, sent: Mapping[str, str]) -> bool:
+    def _is_cut(self, listing: Listing, shown: int) -> bool:
         """Return whether a server may have cut a list at its own bound: a round number that no list exceeded."""
-        limit, is_round = listing.limit, shown % _CUTS[0] == 0 or shown % _CUTS[1] == 0
-        has_parts = not all(one is None for one in (limit, listing.offset, listing.page, listing.cursor))
-        is_declared = limit is not None and limit.name in sent and "maximum" in flat(limit.schema)
+        is_round = shown % _CUTS[0] == 0 or shown % _CUTS[1] == 0
+        has_parts = not all(one is None for one in (listing.limit, listing.offset, listing.page, listing.cursor))
         longest = self._longest[listing.operation.label]
-        return not is_declared and is_round and shown >= max(_FEWEST_CUT if has_parts else _CAP, longest)
+        return is_round and shown >= max(_FEWEST_CUT if has_parts else _CAP, longest)
 
 
 def _is_cap(total: int) -> bool:
