@@ -16,7 +16,8 @@ from conformance.commandline.result_command import CommandResult
 from loadtests.engine.run import Run
 from loadtests.engine.watching import follow_parent, tell
 from loadtests.result.document import compose
-from loadtests.result.files import RunAborted, write
+from loadtests.result.files import write
+from loadtests.result.outcome import RunAborted
 from loadtests.result.terminal import summary
 from loadtests.settings.settings import Settings
 

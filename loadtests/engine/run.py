@@ -23,7 +23,7 @@ from loadtests.measuring.preflight import preflight, reach
 from loadtests.measuring.rising_load import RisingLoad
 from loadtests.measuring.robot_process import RobotProcess, start_anew
 from loadtests.measuring.streams import hear
-from loadtests.result.files import Carried, Outcome, RunAborted
+from loadtests.result.outcome import Carried, Outcome, RunAborted
 from loadtests.schedule.plan import QUICK_ANSWER_S, SHORT_BLOCK_S, Plan
 from loadtests.settings.settings import Settings
 from ros_probe.process import ProbeError

@@ -19,7 +19,8 @@ from loadtests.measuring.machine import Moment, conditions
 from loadtests.measuring.pauses import PAUSE_S, Paused
 from loadtests.measuring.preflight import Findings
 from loadtests.measuring.robot_process import same_machine
-from loadtests.result.files import FORMAT, Outcome, RunAborted
+from loadtests.result.files import FORMAT
+from loadtests.result.outcome import Outcome, RunAborted
 from loadtests.schedule.arrivals import arrivals_due
 from loadtests.schedule.plan import Plan, step_operation
 from loadtests.schedule.segment import GAP_S

@@ -1,10 +1,9 @@
-"""What a run collects, and the files that come of it, each written completely or not at all."""
+"""The files that come of a run, each written completely or not at all."""
 
 import io
 import json
 import re
 from collections import Counter
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,18 +12,6 @@ from hdrh.histogram import HdrHistogram
 from conformance.commandline.atomic_write import write_atomically, write_json
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult
-from conformance.commandline.started import Started
-from loadtests.clients.robot import Robot
-from loadtests.measuring.distributed_executor import Executor
-from loadtests.measuring.end_to_end import Journeys
-from loadtests.measuring.machine import Moment
-from loadtests.measuring.pauses import Paused
-from loadtests.measuring.preflight import Findings
-from loadtests.measuring.robot_process import RobotProcess
-from loadtests.measuring.streams import Heard
-from loadtests.schedule.plan import Plan, SeriesName
-from loadtests.settings.settings import Settings
-from loadtests.statistics.steps import Step
 
 FORMAT = "roaas-latency/1"
 _NO_NAME = re.compile(r"[^A-Za-z0-9.-]+")
@@ -66,60 +53,3 @@ def percentile_distribution(encoded: str) -> str:
     text = io.BytesIO()
     histogram.output_percentile_distribution(text, _US_PER_MS, _TICKS)
     return text.getvalue().decode("ascii")
-
-
-class RunAborted(Exception):  # noqa: N818 -- an outcome, with its exit code
-    """Raised when a run ends before it measures; holds the exit code and the reason."""
-
-    def __init__(self, code: int, message: str) -> None:
-        super().__init__(message)
-        self.code = code
-
-
-@dataclass
-class Carried:
-    """A plan, and how many seconds of it were carried out."""
-
-    plan: Plan
-    elapsed_s: float = 0.0
-
-
-@dataclass
-class Outcome:
-    """What became of a run so far.
-
-    Attributes:
-        robots: the one under load, and the one that it is compared with, if any.
-        findings: of the calls to the robot under load before the run.
-        notes: worth knowing; invalid: reasons why the figures are worthless.
-        interrupted: by Ctrl-C; dead_at: when the robot fell silent, in seconds from the plan's start.
-        carried: each repeat's plan, and how many seconds of it were carried out.
-        paused: what requests cost after a pause and right behind one another, by series.
-        before: the machine when the run began.
-        robot_process: the process at the robot's address before the comparison, where that is known.
-        cpu_share: the busiest worker's share of a core in the comparison.
-        steps: results of the stepped load.
-        knee_searches: results of the searches for the knee; over_connections: of more and more connections.
-        journeys: deliveries from the request to the application, by way.
-        heard: what came over each stream.
-    """
-
-    settings: Settings
-    robots: tuple[Robot, ...]
-    started: Started
-    findings: Findings = field(default_factory=Findings)
-    notes: list[str] = field(default_factory=list)
-    invalid: list[str] = field(default_factory=list)
-    interrupted: bool = False
-    dead_at: float | None = None
-    executor: Executor | None = None
-    carried: list[Carried] = field(default_factory=list)
-    paused: dict[SeriesName, Paused] = field(default_factory=dict)
-    before: Moment = field(default_factory=Moment.now)
-    robot_process: RobotProcess | None = None
-    cpu_share: float | None = None
-    steps: list[Step] = field(default_factory=list)
-    knee_searches: list[dict[str, Any]] = field(default_factory=list)
-    over_connections: list[dict[str, Any]] = field(default_factory=list)
-    journeys: dict[str, Journeys] = field(default_factory=dict)
-    heard: list[Heard] = field(default_factory=list)
