@@ -93,6 +93,7 @@ def created_path(surveyor: Surveyor, create: Operation, read: Operation) -> str:
     # With all members, each can be written and removed later.
     whole = whole_body(create, surveyor.values)[1]
     whole = whole if isinstance(whole, dict) else usual[0].body
+    whole = _with_texts(create, whole) or whole
     owned = _with_owned(create, read, whole) or (whole if isinstance(whole, dict) else None)
     for inputs in (*(replace(usual[0], body=one) for one in (owned, body) if one), *usual):
         made = surveyor.send(create, Variation(Kind.AGAIN, "", "", inputs))
@@ -101,14 +102,17 @@ def created_path(surveyor: Surveyor, create: Operation, read: Operation) -> str:
     if made is None or made.exchange is None or made.status != 201:  # noqa: PLR2004 - RFC 9110 15.3.2
         return ""
     sent, answer = made.exchange.request.url, made.exchange.response
-    location, target = answer.header("location"), ""
+    location, targets = answer.header("location"), []
     if location and is_same(joined(sent, location), sent):
-        target = path_of(joined(sent, location)).removeprefix(surveyor.api.client.prefix)
-    elif id_ := identified(read_json(answer.body).value, read)[1]:
+        targets = [path_of(joined(sent, location)).removeprefix(surveyor.api.client.prefix)]
+    if id_ := identified(read_json(answer.body).value, read)[1]:
         base = urlsplit(sent).path.removeprefix(surveyor.api.client.prefix).rstrip("/")
-        target = f"{base}/{quote(str(id_), safe='')}{'/' if read.template.endswith('/') else ''}"
+        targets += [f"{base}/{quote(str(id_), safe='')}{'/' if read.template.endswith('/') else ''}"]
     pattern = re.sub(r"\\{[^{}]*\\}", "[^/]+", re.escape(read.template))
-    return target if re.fullmatch(pattern, target) else ""
+    usable = list(dict.fromkeys(one for one in targets if re.fullmatch(pattern, one)))
+    # A Location may be wrong.
+    found = (one for one in usable if len(usable) == 1 or _Thing(surveyor, read, one).get().ok)
+    return next(found, "")
 
 
 @dataclass

@@ -145,10 +145,11 @@ class Handler(BaseHTTPRequestHandler):
         now, body = time.monotonic(), self.body
         body.x += body.speed * max(0.0, min(now, body.until) - body.since)
         body.speed, body.since = body.speed if now < body.until else 0.0, now
-        if path == "/drive":
-            body.speed, body.until = json.loads(content)["speed"], now + 3600
-        elif path == "/halt":
-            body.until = now + self.server.options.coast
+        speed = json.loads(content)["speed"] if path == "/drive" else 0.0
+        if path == "/halt" or (path == "/drive" and speed == 0):
+            body.until = min(body.until, now + self.server.options.coast)
+        elif path == "/drive":
+            body.speed, body.until = speed, now + 3600
         return {"x": body.x, "speed": body.speed}
 
     def events(self, options):

@@ -10,6 +10,7 @@ from conformance.documents.openapi import read_operations
 
 _TEXTS = {"type": "array", "items": {"type": "string"}}
 _NUMBERS = {"type": "array", "items": {"type": "integer"}}
+_WORDS = {"type": "array", "items": {"enum": ["a", "b"]}}
 
 
 def _operation(parameter=None, member=None):
@@ -55,7 +56,7 @@ def test_equal_items_are_sent_in_a_query():
         ({"style": "spaceDelimited", "explode": False}, _NUMBERS, "list=1%202"),
         ({"style": "form", "explode": False}, _NUMBERS, "list=1,2"),
         ({"style": "form"}, _NUMBERS, "list=1&list=2"),
-        ({"style": "pipeDelimited", "explode": False}, {"type": "array", "items": {"enum": ["a", "b"]}}, "list=a%7Cb"),
+        ({"style": "pipeDelimited", "explode": False}, _WORDS, "list=a%7Cb list=a list=b"),
         ({"style": "pipeDelimited", "explode": False}, {**_NUMBERS, "maxItems": 1}, ""),
     ],
 )
@@ -66,4 +67,4 @@ def test_several_items_are_sent_in_their_style(style, schema, query):
         for one in valid_variations(operation, Inputs(), Values())
         if one.kind is Kind.BOUND
     ]
-    assert sent == ([query] if query else [])
+    assert sent == query.split()
