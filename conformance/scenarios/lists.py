@@ -346,8 +346,11 @@ class _Parts:
         part = self.reader.part({offset.name: far}) if offset is not None and far is not None else None
         if offset is None or part is None or (whole.goes_on and not whole.totals):
             return None
-        again = [one for one in part[1].identities if one in whole.identities]
-        fault = f"the item {again[0]} of the first page" if again else ""
+        found = part[1].identities
+        # By a page's number some servers answer the last page, which may be the only one, or end with what was read.
+        is_last = listing.offset is None and len(found) >= end
+        again = bool(found) and found[:1] == whole.identities[:1] and not is_last
+        fault = f"the item {found[0]} of the first page" if again else ""
         return self._paged(offset.name, part[0], f"no item of the first page, by {offset.name}={far}", fault)
 
     def _last(self, whole: Page) -> Paged | None:
