@@ -65,6 +65,7 @@ def _no_answer(
     elif goes_on:
         for id_ in dict.fromkeys(run.contract.renamed.get(id_, id_) for id_ in open_ids):
             run.judge.check(id_, False, error.unanswered, "a response")  # noqa: FBT003 - the condition of check()
+        run.judge.silent(error.unanswered)
         for finding in run.judge.met:
             # One that was there before may be of a check that judged this requirement by itself.
             if finding.exchange is error.unanswered and finding.seen == 1:

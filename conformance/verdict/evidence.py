@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from conformance.contract.classes import CauseKind
+from conformance.contract.classes import CauseKind, Level
 from conformance.contract.ledger import Requirement, renamed, twins
 from conformance.documents.openapi import is_json
 from conformance.documents.patterns import PatternError
@@ -27,6 +27,14 @@ _FAULT = 200
 _REFUSED = 400
 # What differs between two cases of one finding: numbers, and values in quotes.
 _VALUES = re.compile(r"[-+]?\d[\d.e+-]*|'[^']*'|\"[^\"]*\"")
+# What a requirement that is about missing responses expects of each kind.
+_SILENT = {
+    NoAnswer.TIMEOUT: "a response within the deadline",
+    NoAnswer.CIRCUIT_OPEN: "a response within the deadline",
+    NoAnswer.CLOSED: "a response",
+    NoAnswer.REFUSED: "a response",
+}
+_SILENCES = frozenset({CauseKind.HANG, CauseKind.NO_RESPONSE})
 
 
 class RefutedError(AssertionError):
@@ -107,6 +115,8 @@ class Judge:
         self.concerned: Callable[[Request], Iterable[str]] = lambda _: ()
         self._ledger: Mapping[str, Requirement] = known if isinstance(known, Mapping) else {}
         self._renamed, self._twins = renamed(self._ledger), twins(self._ledger)
+        # The requirement that is about missing responses of one kind, and about nothing else.
+        self._on_silence = {one.forbids[0]: id_ for id_, one in self._ledger.items() if len(one.forbids) == 1}
         self._sent: deque[Sent] = deque(maxlen=MAX_SEQUENCE)
         self._findings = 0
         self._newest: Attempt | None = None
@@ -204,7 +214,22 @@ class Judge:
             if not operations and exchange is not None:
                 operations = [Showing(label, 1, exchange.request) for label in self.concerned(exchange.request)]
             self._found(evidence, requirement, exchange, expected, found, cause, subject, operations, cases)
+            required, kind = self._ledger.get(requirement), kind_of(exchange, found)
+            # What only SHOULD be answered may be left unanswered.
+            if required and required.level is Level.MUST and kind in _SILENCES and kind not in required.forbids:
+                self.silent(exchange)
         return holds
+
+    def silent(self, attempt: Attempt | None) -> None:
+        """Record a missing response for the requirement that is about it: by_cause() then tells it by that one.
+
+        A raw request tests a rule of its own.
+        """
+        expected = _SILENT.get(attempt.kind) if isinstance(attempt, Unanswered) else None
+        if isinstance(attempt, Unanswered) and expected and attempt.request.raw is None:
+            kind = kind_of(attempt)
+            cause = "hang" if kind is CauseKind.HANG else f"closed {attempt.problem}"
+            self.check(self._on_silence.get(kind, ""), False, attempt, expected, found=attempt.problem, cause=cause)  # noqa: FBT003
 
     def record(self, case: Case, requirement: str = "") -> bool:
         """Record a case of the requirement that it names, or of the given one; return whether it holds."""

@@ -2,9 +2,14 @@
 
 import datetime as dt
 
-from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
+import pytest
+
+from conformance.contract.generic import generic_ledger
+from conformance.engine.record_exception import record_exception
+from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError, Request, Response, Unanswered
 from conformance.verdict.baseline import Expectation, apply_baseline
 from conformance.verdict.causes import by_cause
+from conformance.verdict.evidence import Judge
 from conformance.verdict.run import Run
 from conformance.verdict.verdicts import class_verdicts, overall, verdict_of
 
@@ -142,3 +147,46 @@ def test_an_effect_that_a_check_found_is_no_cause_of_others():
     run.judge.check(_XML, False, _closed(), "a robot at rest", found="the robot moved by 0.3 m")
     told = {(requirement, blocks) for requirement, _, blocks in _told(run)[1]}
     assert told == {(_STATUS, ()), (_READ, ()), (_XML, ())}
+
+
+_HANG, _CRASH = "robustness/no-hang", "robustness/no-crash"
+_REFUSALS = {
+    "hang": (NoAnswer.TIMEOUT, "no response within 10 s", _HANG),
+    "not sent again": (NoAnswer.CIRCUIT_OPEN, "not sent", _HANG),
+    "closed": (NoAnswer.CLOSED, "the server closed the connection", _CRASH),
+    "refused": (NoAnswer.REFUSED, "no connection", _CRASH),
+}
+
+
+@pytest.mark.parametrize("way", ["MUST", "exception"])
+@pytest.mark.parametrize(("kind", "problem", "named"), _REFUSALS.values(), ids=_REFUSALS)
+def test_a_missing_response_is_named_by_the_requirement_that_is_about_it(kind, problem, named, way):
+    ledger = generic_ledger()
+    run = Run(claims=("http", "robustness", "description"))
+    run.judge = Judge(ledger)
+    missing = Unanswered(Request("OPTIONS", "http://r2/fan"), problem, kind)
+    for id_ in (_HANG, _CRASH, "http/date"):
+        run.judge.check(id_, True, _GOOD, "a response")
+    if way == "MUST":
+        run.judge.check("http/allow", False, missing, "a response")
+    else:
+        ids = ("description/allow", "http/allow")
+        record_exception(run, lambda: True, ids, dict.fromkeys(ids, 0), NoAnswerError(missing))
+    seen, causes = by_cause(run.judge.evidence, ledger, run.claims)
+    assert [cause.finding.requirement for cause in causes] == [named]
+    assert "http/allow" in causes[0].blocks
+    assert not seen["http/allow"].findings
+
+
+@pytest.mark.parametrize(
+    ("id_", "request_", "found"),
+    [
+        ("description/allow", Request("GET", "http://r2/fan"), ""),  # SHOULD: closing may be allowed
+        ("http/framing", Request("GET", "http://r2/fan", raw=b"GET / HTTP/1.1"), ""),  # a rule of its own
+        ("http/allow", Request("GET", "http://r2/fan"), "another response"),  # the check found something else
+    ],
+)
+def test_what_a_check_allows_for_itself_is_no_crash(id_, request_, found):
+    judge = Judge(generic_ledger())
+    judge.check(id_, False, Unanswered(request_, "closed", NoAnswer.CLOSED), "a response", found=found)
+    assert set(judge.refuted()) == {id_}
