@@ -2,24 +2,29 @@
 
 Operations are written as in ``--call``: "METHOD PATH", the path as the description has it, or "POST /PORT/OPERATION" of
 a WSDL. Positions in responses are JSON pointers (RFC 6901); in XML they go by local names, with "@name" for an
-attribute. Bodies and paths are templates: "{yaw}" is the target of the axis yaw, "{seconds}" the duration of a move,
-"{value}" the value of a switch, and "{goto:/uuid}" a value in the response to the last accepted move.
+attribute. Bodies and paths are templates: "{yaw}" is the target of the axis yaw, "{yaw:/z}" a component of that turn's
+quaternion, "{seconds}" the duration of a move, "{value}" the value of a switch, and "{goto:/uuid}" a value in the
+response to the last accepted move.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal
 
 import msgspec
 
 from conformance.contract.toml_file import Finite, NotNegative, Positive
 
+_NO_NAMES: Final[Mapping[str, str]] = MappingProxyType({})
 NAME: Final = re.compile(r"\{([^{}]+)\}")
 """A name in a template."""
 Pointer = Annotated[str, msgspec.Meta(pattern=r"^(/.*)?$")]
 Call = Annotated[str, msgspec.Meta(pattern=r"^[A-Z]+ /\S*$")]
+Angle = Literal["roll", "pitch", "yaw"]
 
 
 class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -33,6 +38,8 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         tolerance: how far from its target it may rest; None: that of the move.
         noise: standard deviation of its position as it is read; what a reading shows at rest counts as well.
         rest: how fast it may seem to move at rest, units per second; None: a fifth of its tolerance.
+        angle: it turns freely, in rad: the angle of this name, of a quaternion or as a number; empty: it does not. Its
+            limits say which targets are tried.
     """
 
     at: Pointer
@@ -42,6 +49,7 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     tolerance: Positive | None = None
     noise: NotNegative = 0.0
     rest: Positive | None = None
+    angle: Angle | Literal[""] = ""
 
     def __post_init__(self) -> None:
         """Check the limits.
@@ -59,6 +67,14 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def within(self, position: float, margin: float = 0.0) -> float:
         """Return the position, or the nearest one between the limits, with a margin."""
         return min(max(position, self.limits[0] + margin), self.limits[1] - margin)
+
+    def apart(self, one: float, other: float) -> float:
+        """Return how far a position is from another one, and by the shorter way for what turns."""
+        return math.remainder(one - other, math.tau) if self.angle else one - other
+
+    def near(self, position: float, other: float) -> float:
+        """Return the position; for what turns, with so many whole turns that it is near another one."""
+        return other + self.apart(position, other) if self.angle else position
 
 
 class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -158,6 +174,38 @@ class Speed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError('one of at = "/pointer" and of = "axis" must say how the velocity is measured')
 
 
+class Way(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Another way to give the device a velocity. What its template does not name stays as it was.
+
+    Attributes:
+        send: the operation.
+        body: a template; None: it has no body.
+        media_type: in which the body is written.
+        root: the name of the root element, of XML.
+    """
+
+    send: Call
+    body: Any = None
+    media_type: Literal["application/json", "application/xml", "text/xml", "application/x-www-form-urlencoded"] = (
+        "application/json"
+    )
+    root: str = ""
+
+    def __post_init__(self) -> None:
+        """Check that XML has a root.
+
+        Raises:
+            ValueError: it has none.
+        """
+        if self.media_type.endswith("/xml") != bool(self.root):
+            raise ValueError("root names the root element of a body that is XML, and of no other")
+
+    @property
+    def axes(self) -> set[str]:
+        """The velocities that it commands, by name."""
+        return names_in([self.send, self.body])
+
+
 class Velocity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How the device is given a velocity; zero stops it.
 
@@ -169,6 +217,7 @@ class Velocity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         settle_s: time to reach a velocity, and to rest, s.
         hold_s: how long the device goes on after the last command, s; None: until another command comes.
         beyond_limits: what the device does with a velocity beyond its limits: "refused", "clamped", or "undefined".
+        ways: other ways to give it a velocity, or a part of one.
     """
 
     send: Call
@@ -178,6 +227,7 @@ class Velocity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     settle_s: Positive = 0.5
     hold_s: Positive | None = None
     beyond_limits: Beyond = "undefined"
+    ways: tuple[Way, ...] = ()
 
 
 class Switch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -249,13 +299,18 @@ class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("nothing would move: it needs [motion.goto], [motion.velocity] or [motion.switches]")
         axes = set(self.state.axes)
         if self.goto:
-            _check_names("goto", self.goto, axes, frozenset({"seconds"}))
+            turns = {f"{name}:/{one}": name for name, axis in self.state.axes.items() if axis.angle for one in "xyzw"}
+            _check_names("goto", self.goto, axes, {"seconds": "seconds", **turns})
         elif loose := [name for name, axis in self.state.axes.items() if axis.tolerance is None]:
             raise ValueError(f"axis {loose[0]} needs a tolerance, as there is no [motion.goto] that has one")
         if self.velocity:
             _check_names("velocity", self.velocity, set(self.velocity.axes))
             if strange := {one.of for one in self.velocity.axes.values()} - axes - {""}:
                 raise ValueError(f"of = {min(strange)!r} is no axis of [motion.state.axes]")
+            for way in self.velocity.ways:
+                _check_names(
+                    "velocity.ways", way, way.axes & set(self.velocity.axes) or {next(iter(self.velocity.axes))}
+                )
         for name, switch in self.switches.items():
             _check_names(f"switches.{name}", switch, {"value"})
         for given in filter(None, (self.stop, self.action)):
@@ -271,7 +326,8 @@ class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def bodies(self) -> tuple[tuple[str, Any], ...]:
         """The operations that command the device, with the templates of their bodies."""
-        given = (self.goto, self.velocity, self.stop, *self.switches.values())
+        ways = self.velocity.ways if self.velocity else ()
+        given = (self.goto, self.velocity, *ways, self.stop, *self.switches.values())
         return tuple((one.send, one.body) for one in given if one)
 
     @property
@@ -292,12 +348,13 @@ class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def _check_names(
-    table: str, given: Goto | Velocity | Switch, needed: set[str], more: frozenset[str] = frozenset()
+    table: str, given: Goto | Velocity | Way | Switch, needed: set[str], more: Mapping[str, str] = _NO_NAMES
 ) -> None:
-    found = names_in([given.send, given.body])
+    """Check the names in a template; ``more``: others that it may have, each with the axis that it moves."""
+    found = {more.get(name, name) for name in names_in([given.send, given.body])}
     if missing := needed - found:
         raise ValueError(f"{table} has no {{{min(missing)}}} in send or body, so nothing would move that axis")
-    _refuse_strange(found - needed - more)
+    _refuse_strange(found - needed - more.keys())
 
 
 def _refuse_strange(names: set[str]) -> None:

@@ -45,7 +45,7 @@ def off(here: dict[str, float], there: dict[str, float], motion: MotionMap, shar
     """Return by how much and along which axis a position is off another; empty if it is within the tolerances."""
     for axis, wanted in there.items():
         # So that a position that is no number is off as well.
-        if not abs(here[axis] - wanted) <= share * motion.tolerance(axis):
+        if not abs(motion.state.axes[axis].apart(here[axis], wanted)) <= share * motion.tolerance(axis):
             return f"{axis} at {here[axis]:.4g} in place of {wanted:.4g}"
     return ""
 

@@ -74,6 +74,8 @@ def way(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     for leg in legs_of(trace):
         seen = usable(leg)
         for name, axis in motion.state.axes.items():
+            if axis.angle:
+                continue
             room = motion.tolerance(name)
             least, greatest = axis.limits[0] - room, axis.limits[1] + room
             places = [middle_of(seen[i : i + SEVERAL], name) for i in range(len(seen) - SEVERAL + 1)]

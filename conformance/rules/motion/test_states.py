@@ -33,8 +33,9 @@ def _apart(values: dict[str, float], own: dict[str, float], motion: MotionMap) -
     if not values:
         return "no numbers at the map's pointers"
     for name, value in values.items():
-        room = motion.tolerance(name) if name in motion.state.axes else motion.speed_tolerance(name)
-        if not abs(value - own[name]) <= room:
+        axis = motion.state.axes.get(name)
+        room = motion.tolerance(name) if axis else motion.speed_tolerance(name)
+        if not abs(axis.apart(value, own[name]) if axis else value - own[name]) <= room:
             return f"{name} {value:.4g} in place of {own[name]:.4g}"
     return ""
 

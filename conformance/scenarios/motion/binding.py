@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 from typing import Any, Protocol
+from urllib.parse import urlencode
 
+from conformance.api.rest.calls import JSON
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import INVALID, validity
 from conformance.documents.json_text import read_json
+from conformance.documents.writing import xml_bytes
 from conformance.documents.wsdl import SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import each, label_of
 from conformance.documents.xml import NotXmlError, elements, parse
@@ -32,8 +35,18 @@ class Binding(Protocol):
     def has_credentials(self) -> bool:
         """Whether a request can be sent without the credentials that the device wants."""
 
-    def made(self, call: str, body: Any, *, authorized: bool = True) -> Outgoing:
-        """Return the request of a call with a body; None: it has none, or the usual one."""
+    def made(
+        self, call: str, body: Any, media_type: str = JSON, root: str = "", *, authorized: bool = True
+    ) -> Outgoing:
+        """Return the request of a call with a body; None: it has none, or the usual one.
+
+        Args:
+            call: the operation.
+            body: its values.
+            media_type: in which they are written; a SOAP message is XML.
+            root: the name of the root element, of XML.
+            authorized: whether the credentials are sent.
+        """
 
     def content(self, octets: bytes) -> Any:
         """Return what the body of a response says; None: nothing that can be read."""
@@ -55,13 +68,25 @@ class JsonBinding:
         """Whether the connection has any."""
         return bool(self._api.client.connection.credentials.items)
 
-    def made(self, call: str, body: Any, *, authorized: bool = True) -> Outgoing:  # noqa: ARG002 - the client leaves them out
+    def made(
+        self,
+        call: str,
+        body: Any,
+        media_type: str = JSON,
+        root: str = "",
+        *,
+        authorized: bool = True,  # noqa: ARG002 - the client leaves them out
+    ) -> Outgoing:
         """Return the request of a call."""
         method, _, path = call.partition(" ")
         fields: Headers = (("Accept", "application/json"),) if body is None and method == "GET" else ()
         if body is None:
             return Outgoing(method, path, fields, b"")
-        return Outgoing(method, path, (("Content-Type", "application/json"),), json.dumps(body).encode())
+        if root:
+            written = xml_bytes(body, root)
+        else:
+            written = json.dumps(body).encode() if media_type == JSON else urlencode(body).encode()
+        return Outgoing(method, path, (("Content-Type", media_type),), written)
 
     def content(self, octets: bytes) -> Any:
         """Return the JSON of a body."""
@@ -88,7 +113,9 @@ class SoapBinding:
         """Whether messages carry a token, or the connection has any."""
         return self._messages.token is not None or bool(self._api.client.connection.credentials.items)
 
-    def made(self, call: str, body: Any, *, authorized: bool = True) -> Outgoing:
+    def made(
+        self, call: str, body: Any, _media_type: str = "", _root: str = "", *, authorized: bool = True
+    ) -> Outgoing:
         """Return the message of a call, with its values in the order of the schema.
 
         Raises:

@@ -13,10 +13,18 @@ from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.scenarios.motion.binding import Binding, JsonBinding
 from conformance.scenarios.motion.resting import at_rest, fastest
 from conformance.scenarios.motion.room import Room
-from conformance.scenarios.motion.templates import NoValueError, at, filled, numbers_at, seconds_of
+from conformance.scenarios.motion.templates import (
+    NoValueError,
+    at,
+    filled,
+    numbers_at,
+    positions_at,
+    quaternion_of,
+    seconds_of,
+)
 from conformance.scenarios.motion.trace import Command, Leg, Reading, Resting, middle_of
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
-from conformance.statement.motion_map import Goto, MotionMap, Stop, Switch, Velocity, names_in
+from conformance.statement.motion_map import Goto, MotionMap, Stop, Switch, Velocity, Way, names_in
 from conformance.transport.client import is_drafting
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, NotPermittedError, Outgoing
 
@@ -68,7 +76,7 @@ class MappedDevice:
         self.binding: Binding = binding or JsonBinding(api)
         self.room = Room(motion)
         self._answer: Any = None
-        self._read_at = 0.0
+        self._read_at, self._last = 0.0, Position()
         self.resting, self.rests = Resting(), False
         here = self.where() if looks else {}
         self.home = {name: motion.state.axes[name].well_inside(value) for name, value in here.items()}
@@ -119,7 +127,10 @@ class MappedDevice:
         self._read_at = sent = self.clock.now()
         exchange, document = self.get(state.read)
         received = self.clock.now()
-        values = numbers_at(document, {name: axis.at for name, axis in state.axes.items()})
+        values = positions_at(document, {name: axis.at for name, axis in state.axes.items()}, state.axes)
+        # What turns goes on beyond a whole turn.
+        values = {name: state.axes[name].near(one, self._last.get(name, one)) for name, one in values.items()}
+        self._last = values or self._last
         speeds = numbers_at(document, self.motion.speeds)
         try:
             stamp = seconds_of(at(document, state.stamp)) if state.stamp else None
@@ -158,7 +169,7 @@ class MappedDevice:
         except NoValueError:
             return ""
 
-    def call_of(self, given: Goto | Velocity | Switch | Stop, values: Mapping[str, Any]) -> tuple[str, Any]:
+    def call_of(self, given: Goto | Velocity | Way | Switch | Stop, values: Mapping[str, Any]) -> tuple[str, Any]:
         """Return call and body of a command.
 
         An axis without a value goes home, or stands still.
@@ -170,16 +181,19 @@ class MappedDevice:
                 name: value - here[name] for name, value in values.items() if isinstance(value, int | float) and here
             }
             values = {**values, **ways, "seconds": given.seconds}
-        elif isinstance(given, Velocity):
-            values = {**dict.fromkeys(given.axes, 0.0), **values}
+            for name, axis in self.motion.state.axes.items():
+                values |= quaternion_of(name, values[name], axis.angle) if axis.angle else {}
+        elif isinstance(given, Velocity | Way):
+            values = {**dict.fromkeys(self.drives.axes, 0.0), **values}
         return filled(given.send, values, self._answer), filled(given.body, values, self._answer)
 
     def request_of(
-        self, given: Goto | Velocity | Switch | Stop, values: Mapping[str, Any], *, authorized: bool = True
+        self, given: Goto | Velocity | Way | Switch | Stop, values: Mapping[str, Any], *, authorized: bool = True
     ) -> Outgoing:
         """Return the request of a command; see call_of()."""
         self.rests = False
-        return self.binding.made(*self.call_of(given, values), authorized=authorized)
+        form = (given.media_type, given.root) if isinstance(given, Way) else ()
+        return self.binding.made(*self.call_of(given, values), *form, authorized=authorized)
 
     def _sent(self, made: Outgoing, targets: Position, **how: Any) -> Command:
         sent = self.clock.now()
@@ -192,18 +206,27 @@ class MappedDevice:
         Raises:
             NoAnswerError: there is no response.
         """
-        command = self._sent(self.request_of(self.moves, targets), {**self.home, **(ends or targets)})
+        axes, wanted = self.motion.state.axes, {**self.home, **(ends or targets)}
+        wanted = {name: axes[name].near(one, self._last.get(name, one)) for name, one in wanted.items()}
+        command = self._sent(self.request_of(self.moves, targets), wanted)
         if command.accepted:
             self.note(command.exchange)
         return command
 
     def drive(
-        self, speeds: Mapping[str, Any], *, integers: bool = False, authorized: bool = True, fresh: bool = False
+        self,
+        speeds: Mapping[str, Any],
+        *,
+        way: Way | None = None,
+        integers: bool = False,
+        authorized: bool = True,
+        fresh: bool = False,
     ) -> Command:
         """Command velocities; those without a value are 0.
 
         Args:
             speeds: by name.
+            way: how, if not as usual: those that it does not name stay as they are.
             integers: write whole numbers without a fraction.
             authorized: send the credentials.
             fresh: send it on a connection that is closed afterwards.
@@ -216,7 +239,7 @@ class MappedDevice:
         wanted = {name: float(one) for name, one in written.items() if isinstance(one, int | float)}
         if integers:
             written |= {name: int(one) for name, one in wanted.items() if one == int(one)}
-        made = self.request_of(self.drives, written, authorized=authorized)
+        made = self.request_of(way or self.drives, written, authorized=authorized)
         return self._sent(made, wanted, authorized=authorized, fresh=fresh)
 
     def note(self, exchange: Exchange) -> None:
@@ -269,7 +292,10 @@ class MappedDevice:
 
     def is_near(self, here: Mapping[str, float], there: Mapping[str, float]) -> bool:
         """Return whether a position is another one, within the tolerances."""
-        return bool(here) and all(abs(here[name] - there[name]) <= self.motion.tolerance(name) for name in there)
+        axes = self.motion.state.axes
+        return bool(here) and all(
+            abs(axes[name].apart(here[name], there[name])) <= self.motion.tolerance(name) for name in there
+        )
 
     def where(self) -> Position:
         """Return where the device is by the median of several readings.

@@ -83,8 +83,10 @@ def clamped_targets(mapped: MappedDevice) -> tuple[Leg, ...]:
 
 
 def beyond(axes: Mapping[str, Axis | Speed]) -> Iterator[tuple[str, float, float]]:
-    """Yield axes, their limits, and targets or velocities beyond these."""
+    """Yield axes, their limits, and targets or velocities beyond these; nothing is beyond what turns freely."""
     for name, axis in axes.items():
+        if isinstance(axis, Axis) and axis.angle:
+            continue
         for part in _BEYOND:
             room = part * (axis.limits[1] - axis.limits[0])
             yield name, axis.limits[0], axis.limits[0] - room

@@ -42,6 +42,7 @@ class Room:
     def __init__(self, motion: MotionMap) -> None:
         self.slowest_s = 0.0
         self._motion = motion
+        self._axes = {name: axis for name, axis in motion.state.axes.items() if not axis.angle}
         speeds = motion.velocity.axes if motion.velocity else {}
         # By velocity and axis: least and greatest change per second at velocity 1.
         self._rates: dict[str, dict[str, Span]] = {
@@ -60,7 +61,7 @@ class Room:
             NotPossibleError: the limits leave no room for a velocity that can be measured.
         """
         share, ways = 1.0, dict[str, Span]()
-        for name, axis in self._motion.state.axes.items():
+        for name, axis in self._axes.items():
             down, up = self._way(name, choices, _FASTER * (lasts_s + _BLIND * self.slowest_s))
             if down + up > 0:
                 ways[name] = down, up
@@ -73,7 +74,7 @@ class Room:
                     f"the limits of {', '.join(ways)} leave no room to drive {name} for {lasts_s:.1f} s: the slowest "
                     f"response took {self.slowest_s:.2f} s"
                 )
-        limits = {name: self._motion.state.axes[name].limits for name in ways}
+        limits = {name: self._axes[name].limits for name in ways}
         begin = {
             name: (limits[name][0] + share * down, limits[name][1] - share * up) for name, (down, up) in ways.items()
         }
@@ -86,7 +87,7 @@ class Room:
             return
         (name, speed), late_s = driven[0], LATE * usual_s(readings)
         seen = [one for one in readings if one.values and one.received - one.sent <= late_s]
-        for axis in self._motion.state.axes:
+        for axis in self._axes:
             for first, last in itertools.combinations(seen, 2):
                 lapse_s = (last.sent + last.received - first.sent - first.received) / 2
                 way = last.values[axis] - first.values[axis]
@@ -100,7 +101,7 @@ class Room:
         seen = [one for one in readings if one.values][-SEVERAL:]
         if len(seen) < SEVERAL:
             return False
-        for name, axis in self._motion.state.axes.items():
+        for name, axis in self._axes.items():
             here, (down, up) = middle_of(seen, name), self._way(name, choices, rests_s + _BLIND * self.slowest_s)
             if (down and here - down < axis.limits[0]) or (up and here + up > axis.limits[1]):
                 return True

@@ -9,7 +9,7 @@ from conformance.observe.polling import poll_for
 from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice
 from conformance.scenarios.motion.moves import recorded
-from conformance.scenarios.motion.templates import NoValueError, at, numbers_at
+from conformance.scenarios.motion.templates import NoValueError, at, positions_at
 from conformance.scenarios.motion.trace import Reading, Switched, Told
 from conformance.scenarios.scenario import NotDeclaredError, scenario
 from conformance.scenarios.stage import Need, Stage
@@ -75,7 +75,7 @@ def _read_all(mapped: MappedDevice, wanted: set[str], when: str) -> Told:
     for call, pointers in {state.read: own, **state.agrees}.items():
         if asked := {name: pointer for name, pointer in pointers.items() if name in wanted}:
             exchange, document = mapped.get(call)
-            values[call], exchanges[call] = numbers_at(document, asked), exchange
+            values[call], exchanges[call] = positions_at(document, asked, state.axes), exchange
     return Told(when, values, exchanges)
 
 

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import datetime as dt
+import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
-from conformance.statement.motion_map import NAME
+from conformance.statement.motion_map import NAME, Angle, Axis
+
+_PARTS: Final = ("x", "y", "z", "w")
+# The axis about which each angle turns.
+_ABOUT: Final[dict[Angle, str]] = {"roll": "x", "pitch": "y", "yaw": "z"}
 
 
 class NoValueError(LookupError):
@@ -63,8 +68,47 @@ def at(document: Any, pointer: str) -> Any:
 
 def numbers_at(document: Any, pointers: Mapping[str, str]) -> dict[str, float]:
     """Return the numbers at JSON pointers by name; empty if one is missing."""
+    return positions_at(document, pointers, {})
+
+
+def angle_of(quaternion: Any, angle: Angle) -> float:
+    """Return an angle of a quaternion, rad: an object with x, y, z and w, or four numbers in this order.
+
+    Raises:
+        NoValueError: it is none.
+    """
+    named = dict(zip(_PARTS, quaternion, strict=False)) if isinstance(quaternion, list) else quaternion
+    parts = numbers_at(named, {part: f"/{part}" for part in _PARTS})
+    length = math.hypot(*parts.values())
+    if not 0 < length < math.inf:
+        raise NoValueError("the response has no quaternion there")
+    x, y, z, w = (one / length for one in parts.values())
+    if angle == "roll":
+        return math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    if angle == "pitch":
+        return math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
+    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def quaternion_of(name: str, value: Any, angle: Angle) -> dict[str, Any]:
+    """Return the components of a turn by names of templates; what is no number becomes each of them."""
+    if not isinstance(value, int | float):
+        return {f"{name}:/{part}": value for part in _PARTS}
+    turn = {_ABOUT[angle]: math.sin(value / 2), "w": math.cos(value / 2)}
+    return {f"{name}:/{part}": turn.get(part, 0.0) for part in _PARTS}
+
+
+def positions_at(document: Any, pointers: Mapping[str, str], axes: Mapping[str, Axis]) -> dict[str, float]:
+    """Return positions at JSON pointers by axis, and other numbers by their names; empty if one is missing."""
     try:
-        return {name: float(at(document, pointer)) for name, pointer in pointers.items()}
+        found = {name: at(document, pointer) for name, pointer in pointers.items()}
+        angles = {name: axes[name].angle for name in found if name in axes}
+        return {
+            name: angle_of(one, angle)
+            if (angle := angles.get(name)) and isinstance(one, list | Mapping)
+            else float(one)
+            for name, one in found.items()
+        }
     except (NoValueError, TypeError, ValueError):
         return {}
 

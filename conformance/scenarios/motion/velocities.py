@@ -18,10 +18,12 @@ from conformance.scenarios.motion.resting import creeping
 from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
 from conformance.scenarios.stage import Need, Stage
+from conformance.statement.motion_map import Way
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
 _NEEDS: Final = (Need.REST, Need.MOTION)
+_By = tuple[Way | None, ...]
 # For so long a velocity is measured once it must be reached, s.
 MEASURED_S: Final = 0.5
 # Of the limit: a slow velocity, and the slowest.
@@ -48,16 +50,50 @@ _NOTED: Final = 50
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
-def velocities(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
+def velocities(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Drive, ...]:
     """Drive each axis at its limits and slowly, there and back, and two at once; end each drive with velocity 0.
 
-    At quick each axis at its limits, and slowly two at once, or the only one back.
+    At quick each axis at its limits, and slowly two at once, or the only one back; the seed says in which of several
+    ways. At standard each way drives each axis there and back, and beside another axis that it must leave alone.
     """
+    chosen = _chosen(mapped, run.seed, quick=effort.name == "quick")
     return recorded(
         drive
-        for speeds, longer in _planned(mapped, quick=effort.name == "quick")
-        for drive in _drives(mapped, _named(speeds), speeds, longer=longer)
+        for speeds, longer, by in chosen
+        for drive in _drives(mapped, _named(speeds, by), speeds, longer=longer, by=by)
     )
+
+
+def _chosen(mapped: MappedDevice, seed: int, *, quick: bool) -> Iterator[tuple[Position, bool, _By]]:
+    """Yield velocities, whether they are to outlast the hold time, and the ways in which they are commanded in turn."""
+    for number, (speeds, longer) in enumerate(_planned(mapped, quick=quick), seed):
+        yield speeds, longer, _in_turn(mapped, speeds, number) if quick else ()
+    if not quick:
+        yield from ((speeds, False, by) for speeds, by in _by_each_way(mapped))
+
+
+def _by(way: Way, speeds: Position) -> _By:
+    """Return the ways in which velocities are commanded in turn, so that the last commands at least a part of them."""
+    return (way,) if {name for name, speed in speeds.items() if speed} <= way.axes else (None, way)
+
+
+def _in_turn(mapped: MappedDevice, speeds: Position, number: int) -> _By:
+    """Return one of the ways in which velocities can be commanded."""
+    ways = [way for way in mapped.drives.ways if way.axes & speeds.keys()]
+    return ((), *(_by(way, speeds) for way in ways))[number % (1 + len(ways))]
+
+
+def _by_each_way(mapped: MappedDevice) -> Iterator[tuple[Position, _By]]:
+    """Yield velocities for each further way to command one: of each axis alone, and of two at once."""
+    for way in mapped.drives.ways:
+        several = [{name: _SLOW * limit} for name, limit in _ends(mapped) if name in way.axes]
+        several += [one for one in _at_once(mapped) if one.keys() & way.axes]
+        yield from ((speeds, _by(way, speeds)) for speeds in several)
+
+
+def _ends(mapped: MappedDevice) -> Iterator[tuple[str, float]]:
+    for name, axis in mapped.drives.axes.items():
+        yield from ((name, limit) for limit in _there_and_back(mapped, axis.limits, axis.of))
 
 
 def _planned(mapped: MappedDevice, *, quick: bool) -> Iterator[tuple[Position, bool]]:
@@ -85,8 +121,9 @@ def _slowest(mapped: MappedDevice, name: str, limit: float) -> Position:
     return {name: math.copysign(min(max(_SLOWEST * abs(limit), least), _SLOW * abs(limit)), limit)}
 
 
-def _named(speeds: Position) -> str:
-    return " and ".join(f"{name} {speed:g}" for name, speed in speeds.items())
+def _named(speeds: Position, by: _By = ()) -> str:
+    way = next((f" by {one.send}" + (" as XML" if one.root else "") for one in by if one), "")
+    return " and ".join(f"{name} {speed:g}" for name, speed in speeds.items()) + way
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
@@ -126,11 +163,13 @@ def _let_go(mapped: MappedDevice, hold_s: float, chance: random.Random, *, quick
     others = [*others[:2], *slowest[:2]] if quick else [*limits, *others, *slowest]
     refusals = list(_refusals(mapped))
     chance.shuffle(refusals)
-    for made, speeds in enumerate([*limits, *others]):
+    number = chance.randrange(1 + len(mapped.drives.ways))
+    left = [(one, _in_turn(mapped, one, number + made) if quick else ()) for made, one in enumerate([*limits, *others])]
+    for made, (speeds, by) in enumerate([*left, *(() if quick else _by_each_way(mapped))]):
         # An odd number of commands and an even one; and with readings and without.
         silent = made == 1 if quick else len(limits) <= made < 2 * len(limits)
-        what = f"{_named(speeds)}, let go" + (", and nothing is read until it must rest" if silent else "")
-        yield from _drives(mapped, what, speeds, let_go_s=hold_s, more=made % 2, silent=silent)
+        what = f"{_named(speeds, by)}, let go" + (", and nothing is read until it must rest" if silent else "")
+        yield from _drives(mapped, what, speeds, let_go_s=hold_s, more=made % 2, silent=silent, by=by)
     name = axes[0][0]
     for kind, refused in refusals[: 1 if quick else None]:
         limit = next(_there_and_back(mapped, axes[0][1].limits, axes[0][1].of))
@@ -174,6 +213,7 @@ def _drives(
     longer: bool = False,
     refused: Callable[[], Command] | None = None,
     silent: bool = False,
+    by: _By = (),
 ) -> Iterator[Drive]:
     """Drive at a velocity; again, if a slow link let the hold time pass, or velocity 0 was answered late.
 
@@ -189,6 +229,7 @@ def _drives(
         longer: whether the drive outlasts the hold time.
         refused: sends what the device must refuse after the last command; None: nothing is sent.
         silent: whether nothing is read until the device must rest.
+        by: in which ways the velocity is commanded in turn; empty: as usual.
     """
     drives, hold_s = mapped.drives, mapped.drives.hold_s or 0.0
     # One that is let go is measured in its hold time.
@@ -201,15 +242,16 @@ def _drives(
         if ends and made != speeds:
             raise NotPossibleError(f"the limits leave no room for {what}")
         slowed = "".join(f", slowed to {made[name]:.2g} for room" for name in made if made[name] != speeds[name])
-        commands, readings, whole = _kept_up(mapped, made, lasts_s, rests_s)
-        commands += [mapped.drive(made, fresh=True) for _ in range(more if whole else 0)]
+        commands, readings, whole = _kept_up(mapped, made, lasts_s, rests_s, by or (None,))
+        last = by[-1] if by else None
+        commands += [mapped.drive(made, way=last, fresh=True) for _ in range(more if whole else 0)]
         wanted = {**dict.fromkeys(drives.axes, 0.0), **made, **(ends or {})}
         drive = Drive(what, wanted, tuple(commands), tuple(readings), None, (), slowed=slowed, resting=mapped.resting)
         if let_go_s is not None and not whole:
             # The next try begins elsewhere, or is slower: this one has shown how far the device comes.
             mapped.come_to_rest()
             continue
-        drive = _ended(mapped, drive, let_go_s, refused, silent=silent)
+        drive = _ended(mapped, drive, let_go_s, refused, silent=silent, way=by[0] if by else None)
         if drive.refused is None or not drive.refused.accepted:
             yield drive
         in_time = drive.end is None or not drive.end.was_late(drive.readings)
@@ -220,27 +262,34 @@ def _drives(
 
 
 def _kept_up(
-    mapped: MappedDevice, speeds: Position, lasts_s: float, rests_s: float
+    mapped: MappedDevice, speeds: Position, lasts_s: float, rests_s: float, by: _By
 ) -> tuple[list[Command], list[Reading], bool]:
     """Command velocities again and again for as long as they are measured; return whether there was room for that."""
     given = mapped.drives
     every_s = min(_KEPT_S, given.hold_s / _KEPT) if given.hold_s else _KEPT_S
-    commands, readings = [mapped.drive(speeds)], list[Reading]()
+    ways = itertools.cycle(by)
+    commands, readings = [mapped.drive(speeds, way=next(ways))], list[Reading]()
     while mapped.clock.now() < commands[0].answered + lasts_s and commands[-1].accepted:
         mapped.room.note(speeds, readings[-_NOTED:])
         if mapped.room.is_over([speeds], readings, rests_s):
             return commands, readings, False
         if mapped.clock.now() >= commands[-1].sent + every_s:
-            commands.append(mapped.drive(speeds))
+            commands.append(mapped.drive(speeds, way=next(ways)))
         readings.append(mapped.read())
     return commands, readings, True
 
 
 def _ended(
-    mapped: MappedDevice, drive: Drive, let_go_s: float | None, refused: Callable[[], Command] | None, *, silent: bool
+    mapped: MappedDevice,
+    drive: Drive,
+    let_go_s: float | None,
+    refused: Callable[[], Command] | None,
+    *,
+    silent: bool,
+    way: Way | None,
 ) -> Drive:
-    """End a drive by velocity 0, or let the device go; return it with what came after."""
-    end = mapped.drive({}, integers=True) if let_go_s is None else None
+    """End a drive by velocity 0, sent in a way, or let the device go; return it with what came after."""
+    end = mapped.drive({}, way=way, integers=True) if let_go_s is None else None
     last = end or drive.commands[-1]
     rests_at = last.answered + (let_go_s or 0.0) + mapped.drives.settle_s
     answer: Command | None = None
