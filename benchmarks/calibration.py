@@ -20,7 +20,7 @@ import numpy as np
 from programs import HERE, machine, median_of, roaas_load, started
 from scipy import signal, stats
 
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import SHORT_BLOCK_S, Load, Plan
 from loadtests.statistics.comparisons import aa_interval, comparison

@@ -5,11 +5,15 @@ from typing import Annotated, Self
 
 import msgspec
 
+from conformance.contract.locating import folder_of
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import Text
 from conformance.papers_robot.thresholds import Threshold
 from conformance.statement import load
 from conformance.statement.statement import Statement, load_statement
+
+#: The folder with the files of the contract, in a checkout and in a wheel alike.
+CONTRACT_DIR = folder_of("table1")
 
 
 class Ros(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -6,35 +6,15 @@ import os
 import shutil
 import unicodedata
 from collections import Counter
-from pathlib import Path
 
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from lxml import html
-from signed_results import COUNT, Vendor, conformant, failures, roaas
-from small_device import certified, constant, described, reading, small_device
+from signed_results import COUNT, Vendor, conformant, dropped, failures, outcomes, roaas, run
 
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key
 from reports.attestation.signature import unseal
 from reports.errors import EnvelopeRefusedError, KeyUnusableError
-
-
-@pytest.fixture
-def vendor(tmp_path):
-    generate(tmp_path / "keys")
-    return Vendor(tmp_path / "sent", tmp_path / "keys")
-
-
-@pytest.fixture(scope="module")
-def honest(tmp_path_factory):
-    """A vendor whose certificate the default policy accepts."""
-    folder = tmp_path_factory.mktemp("honest")
-    generate(folder / "keys")
-    honest = Vendor(folder / "sent", folder / "keys")
-    done = honest.sign(conformant())
-    assert done.exit_code == 0, done.output
-    return honest
 
 
 def test_a_complete_result_is_signed_and_accepted(honest):
@@ -141,17 +121,8 @@ def test_a_name_in_a_result_leads_to_no_folder(vendor, name):
     assert (done.exit_code, "give its folder with --contract" in done.output) == (2, True), done.output
 
 
-def run(**members):
-    """A statement with other facts about the run."""
-    return lambda document: document["predicate"]["roaas"].update(members)
-
-
 def extent(**members):
     return lambda document: document["predicate"]["roaas"]["extent"].update(members)
-
-
-def outcomes(edit):
-    return lambda document: edit(document["predicate"]["roaas"]["outcomes"])
 
 
 def moved(outcomes):
@@ -160,10 +131,6 @@ def moved(outcomes):
 
 def other_words(outcomes):
     outcomes["MUST"]["Pass"] = outcomes["MUST"].pop("pass")
-
-
-def dropped(outcomes):
-    del outcomes["MUST"]["pass"][1:]
 
 
 def doubled(outcomes):
@@ -518,109 +485,6 @@ def test_an_envelope_that_contradicts_its_result_is_refused(vendor):
     assert "the certificate says otherwise than result.json: robot" in done.output, done.output
 
 
-_POLICY = """
-classes = ["description", "robustness", "http"]
-requirement_sets = ["unfrozen"]
-efforts = ["quick"]
-motion = false
-"""
-
-
-@pytest.fixture(scope="module")
-def device(tmp_path_factory):
-    """The certificate of a device that was judged by its own description, and a policy for it."""
-    folder = tmp_path_factory.mktemp("device")
-    generate(folder / "keys")
-    (folder / "policy.toml").write_text(_POLICY)
-    schema = {"type": "object", "required": ["value"], "properties": {"value": {"type": "integer"}}}
-    routes = {"/state": constant({"value": 1})}
-    with small_device(described({"/state": reading(schema)}), routes) as url:
-        done = certified(url, folder / "sent", "--sign", folder / "keys" / PRIVATE_NAME)
-    assert done.exit_code == 0, done.text
-    return Vendor(folder / "sent", folder / "keys")
-
-
-def accepted(vendor: Vendor, sent: Path):
-    """Verify what was sent by the policy."""
-    policy, contract = vendor.keys.parent / "policy.toml", vendor.folder / "description"
-    return vendor.verify("--policy", policy, "--contract", contract, "--result", sent)
-
-
-FILES = [
-    "result.json", "certificate.html", "certificate.md", "certificate-print.html", "junit.xml", "traces.json.gz",
-    "description/openapi.json", "description/original.json", "description/pack.toml", "description/unresolved.json",
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("name", FILES)
-def test_each_file_of_the_folder_is_signed(device, tmp_path, name):
-    shutil.copytree(device.folder, tmp_path / "sent")
-    with (tmp_path / "sent" / name).open("ab") as file:
-        file.write(b" ")
-    done = accepted(device, tmp_path / "sent")
-    assert (done.exit_code, f"REFUSED  {name}" in done.output) == (1, True), done.output
-
-
-def test_the_certificate_of_a_described_device_is_accepted_with_its_files(device, tmp_path):
-    done = accepted(device, device.folder)
-    assert done.exit_code == 0, done.output
-    assert "not signed" not in done.output
-    shutil.copytree(device.folder, tmp_path / "sent")
-    (tmp_path / "sent" / "readme.txt").write_text("added")
-    (tmp_path / "sent" / "junit.xml").unlink()
-    done = accepted(device, tmp_path / "sent")
-    assert done.exit_code == 0, done.output
-    assert "but not signed: readme.txt. Nothing is proved" in " ".join(done.output.split())
-    assert ": junit.xml. They were not compared" in " ".join(done.output.split())
-
-
-def test_a_file_added_to_the_description_is_refused(device, tmp_path):
-    shutil.copytree(device.folder, tmp_path / "sent")
-    (tmp_path / "sent" / "description" / "overlay.yaml").write_text("added")
-    done = accepted(device, tmp_path / "sent")
-    assert (done.exit_code, "REFUSED  description/overlay.yaml" in done.output) == (1, True), done.output
-
-
-def test_neither_sign_nor_verify_runs_code_of_a_description(device, tmp_path):
-    sent = tmp_path / "sent"
-    shutil.copytree(device.folder, sent)
-    evil = f"from pathlib import Path\nPath({str(tmp_path / 'ran')!r}).write_text('')\n"
-    for name in ("evil.py", "conftest.py", "rules/http/test_evil.py"):
-        (sent / "description" / name).parent.mkdir(parents=True, exist_ok=True)
-        (sent / "description" / name).write_text(evil)
-    manifest = sent / "description" / "pack.toml"
-    manifest.write_text('plugin = "evil.py"\n' + manifest.read_text())
-    policy = ("--policy", device.keys.parent / "policy.toml", "--contract", sent / "description")
-    assert device.verify("--result", sent, *policy).exit_code == 1
-    assert roaas("sign", sent, "--key", device.keys / PRIVATE_NAME).exit_code == 2
-    assert not (tmp_path / "ran").exists()
-
-
-def replaced_description(folder):
-    path = folder / "description" / "openapi.json"
-    path.write_text(path.read_text().replace("integer", "number"))
-
-
-def linked_description(folder):
-    path = folder / "description" / "openapi.json"
-    path.rename(folder / "elsewhere.json")
-    path.symlink_to(folder / "elsewhere.json")
-
-
-@pytest.mark.parametrize(
-    ("edit", "said"),
-    [
-        (replaced_description, "not judged by these files: description/openapi.json"),
-        (linked_description, "regular file"),
-    ],
-)
-def test_a_result_beside_another_description_is_not_signed(device, tmp_path, edit, said):
-    shutil.copytree(device.folder, tmp_path / "sent")
-    edit(tmp_path / "sent")
-    done = roaas("sign", tmp_path / "sent", "--key", device.keys / PRIVATE_NAME)
-    assert (done.exit_code, said in done.output) == (2, True), done.output
-
-
 def test_the_statement_beside_the_result_is_compared(vendor):
     result = conformant()
     result["places"] = {"statement": {"file": "robot.toml", "line": 1, "classes": {}}}
@@ -646,101 +510,6 @@ def test_another_suite_cannot_know_the_whole_ledger_and_says_so(vendor, tmp_path
     assert vendor.sign(result).exit_code == 0
     done = vendor.verify("--policy", policy)
     assert (done.exit_code, "1 of 267 requirements are not listed" in done.output) == (1, True), done.output
-
-
-HOSTILE = "</td></script><script>alert(1)</script><img src=x onerror=alert(2)>\"'{{7*7}}\x1b[2J\u202e../../x\n"
-
-
-def hostile_everywhere(value):
-    """A value of JSON with a hostile text in place of each text and each name of a map."""
-    match value:
-        case dict():
-            return {f"{HOSTILE}{place}": hostile_everywhere(one) for place, one in enumerate(value.values())}
-        case list():
-            return [hostile_everywhere(one) for one in value]
-        case str():
-            return HOSTILE
-        case _:
-            return value
-
-
-def hostile_facts(document):
-    facts = document["predicate"]["roaas"]
-    for name, value in facts.items():
-        if name in {"robot", "suite", "requirement_set"}:
-            facts[name] = dict.fromkeys(value, HOSTILE)
-        elif name not in {"extent", "requirements", "outcomes", "finished"}:
-            facts[name] = hostile_everywhere(value)
-    facts["outcomes"] = {HOSTILE: {HOSTILE: [HOSTILE]}}
-    facts["requirements"] = {HOSTILE: 1}
-    facts["extent"]["claims"] = [HOSTILE]
-
-
-def registry(folder, *envelopes):
-    """Build a site by the vendors' public keys, which are in a folder beside it."""
-    done = roaas("registry", "build", *envelopes, "--keys", folder / "trusted", "--out", folder / "site")
-    assert "Traceback" not in done.output
-    return done
-
-
-def trusted(folder, *vendors):
-    (folder / "trusted").mkdir()
-    for place, one in enumerate(vendors):
-        shutil.copy(one.keys / PUBLIC_NAME, folder / "trusted" / f"{place}.pem")
-
-
-def test_a_site_shows_what_a_trusted_vendor_wrote_and_runs_none_of_it(vendor, tmp_path):
-    vendor.forge(conformant(), hostile_facts)
-    trusted(tmp_path, vendor)
-    done = registry(tmp_path, vendor.envelope)
-    assert done.stdout.startswith("0 of 1 robot has a certificate that counts; 0 refused"), done.output
-    pages = sorted((tmp_path / "site").rglob("*.html"))
-    assert len(pages) == 2
-    for path in pages:
-        assert path.resolve().is_relative_to(tmp_path / "site")
-        page = html.document_fromstring(path.read_text())
-        assert len(page.xpath("//script")) == 1
-        assert not page.xpath("//img | //*[@onerror]")
-        assert "\x1b" not in path.read_text()
-    said = vendor.verify()
-    assert (said.exit_code, "\x1b" in said.output) == (1, False)
-
-
-def test_a_certificate_of_the_future_supersedes_none(vendor, tmp_path):
-    """Otherwise nothing could ever supersede it."""
-    trusted(tmp_path, vendor)
-    folders = [tmp_path / "future", tmp_path / "now"]
-    future, now = (Vendor(folder, vendor.keys) for folder in folders)
-    future.forge(conformant(), run(finished="2099-01-01T00:00:00Z"))
-    assert now.sign(conformant()).exit_code == 0
-    done = registry(tmp_path, *folders)
-    assert done.stdout.startswith("1 of 1 robot has a certificate that counts"), done.output
-
-
-def test_a_registry_says_that_two_keys_signed_for_one_robot(vendor, honest, tmp_path):
-    trusted(tmp_path, vendor, honest)
-    assert vendor.sign(conformant()).exit_code == 0
-    assert registry(tmp_path, vendor.folder, honest.folder).stdout.startswith("1 of 1 robot")
-    assert "2 keys in all" in (tmp_path / "site" / "index.html").read_text()
-
-
-def test_a_registry_does_not_count_one_requirement_of_all(vendor, tmp_path):
-    trusted(tmp_path, vendor)
-    vendor.forge(conformant(), outcomes(dropped))
-    done = registry(tmp_path, vendor.folder)
-    assert done.stdout.startswith("0 of 1 robot has a certificate that counts"), done.output
-    assert "not the requirements of the suite" in (tmp_path / "site" / "index.html").read_text()
-
-
-def test_a_key_that_was_removed_signs_nothing_any_more(vendor, honest, tmp_path):
-    """A folder of keys is the only trust: what a removed key signed is refused, and links are read as files."""
-    trusted(tmp_path, honest)
-    (tmp_path / "trusted" / "link.pem").symlink_to(vendor.keys / PUBLIC_NAME)
-    assert vendor.sign(conformant()).exit_code == 0
-    assert registry(tmp_path, vendor.folder).exit_code == 0
-    (tmp_path / "trusted" / "link.pem").unlink()
-    done = registry(tmp_path, vendor.folder)
-    assert (done.exit_code, "foreign key" in done.output) == (1, True), done.output
 
 
 def test_a_certificate_with_too_many_classes_is_none(vendor):

@@ -9,7 +9,7 @@ from conformance.api.soap import comparison
 from conformance.api.soap.wsdl_rules import RULES
 from conformance.documents.wsdl import WsdlError, describe, read_services, unusable
 from conformance.documents.wsdl_pack import write_soap_pack
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 
 _SOURCE = "http://device/service?wsdl"
 _WSDL = b"""<w:definitions xmlns:w="http://schemas.xmlsoap.org/wsdl/" xmlns:s="http://schemas.xmlsoap.org/wsdl/soap/"

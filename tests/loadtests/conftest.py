@@ -13,7 +13,7 @@ import jsonschema
 import pytest
 from processes import free_port
 
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 from reports.latency.page import latency_markdown
 from reports.pages.untrusted import plain
 

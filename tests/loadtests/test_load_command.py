@@ -9,7 +9,7 @@ import urllib.request
 import psutil
 import pytest
 
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 
 SHORT = "--rate 60 --duration 2 --warmup 0.4"
 

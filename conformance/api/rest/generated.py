@@ -6,7 +6,6 @@ request is parsed from its bytes (validity.py) and judged by that.
 
 import re
 import warnings
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 from urllib.parse import urlsplit
@@ -18,16 +17,15 @@ from hypothesis.strategies import SearchStrategy
 from schemathesis import GenerationMode
 from schemathesis.config import SchemathesisConfig
 from schemathesis.core.result import Ok
-from schemathesis.core.transport import Response as ThesisResponse
 from schemathesis.errors import SerializationNotPossible
-from schemathesis.generation.drivers import CoverageGenerator, ExamplesGenerator
+from schemathesis.generation.drivers import CoverageGenerator
 from schemathesis.generation.feedback import NO_FEEDBACK
 from schemathesis.generation.overrides import Override
 
 from conformance.contract.pack import Contract
 from conformance.documents.pattern_python import with_python_patterns
 from conformance.documents.schema_budget import unrolls
-from conformance.transport.exchange import Exchange, Outgoing
+from conformance.transport.exchange import Outgoing
 
 #: Raised where no case can be made: schemas allow everything or nothing, or Schemathesis does not know a media type.
 NOT_GENERATED = (Unsatisfiable, SerializationNotPossible)
@@ -56,17 +54,6 @@ class Target:
         """Whether its requests have parameters or a body."""
         return any(True for _ in self.operation.iter_parameters()) or bool(list(self.operation.body))
 
-    def examples(self) -> Iterator[Outgoing]:
-        """Yield requests from the contract's examples."""
-        maker = ExamplesGenerator(
-            operation=self.operation, override=Override(), feedback=NO_FEEDBACK, fill_missing=False
-        )
-        yield from _requests(maker)
-
-    def coverage(self) -> Iterator[Outgoing]:
-        """Yield requests on both sides of each constraint of the schemas."""
-        yield from _requests(self.covering())
-
     def covering(self) -> Any:
         """Return an iterable of Schemathesis cases on both sides of each constraint of the schemas."""
         # Schemathesis follows each reference of each member, in time and memory without bound.
@@ -81,13 +68,6 @@ class Target:
             override=Override(),
             feedback=NO_FEEDBACK,
         )
-
-    def fuzzing(self, *, negative: bool) -> SearchStrategy[Outgoing | None]:
-        """Return a strategy for requests that fit the schemas, or violate them.
-
-        It yields None for a request that cannot be sent.
-        """
-        return self.fuzzed(negative=negative).map(as_request)
 
     def fuzzed(self, *, negative: bool) -> SearchStrategy[Any]:
         """Return a strategy for Schemathesis cases that fit the schemas, or violate them."""
@@ -138,27 +118,6 @@ def _points_elsewhere(key: Any, value: Any) -> bool:
     return isinstance(value, str) and (is_reference or key == "externalValue")
 
 
-def state_machine(document: dict[str, Any]) -> Any:
-    """Return the state machine of the contract's OpenAPI links, or None without links."""
-    from schemathesis.core.errors import NoLinksFound  # noqa: PLC0415 - an internal name, used here alone
-
-    try:
-        machine = _loaded(document).as_state_machine()
-        machine()  # of some descriptions it is told only here that there are none
-    except NoLinksFound:
-        return None
-    return machine
-
-
-def _requests(cases: Any) -> Iterator[Outgoing]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        for case in cases:
-            one = as_request(case)
-            if one is not None:
-                yield one
-
-
 def as_request(case: Any) -> Outgoing | None:
     """Return a Schemathesis case as a request, or None if HTTP cannot transmit it."""
     try:
@@ -189,13 +148,3 @@ def own_headers(case: Any) -> tuple[tuple[str, str], ...] | None:
     pairs += [("Cookie", cookies)] if cookies else []
     sendable = all(_FIELD.fullmatch(name) and (value == "" or _VALUE.fullmatch(value)) for name, value in pairs)
     return tuple(pair for pair in pairs if pair[0].lower() != "content-type") if sendable else None
-
-
-def as_thesis(exchange: Exchange) -> ThesisResponse:
-    """Return a response as Schemathesis's state machine expects it."""
-    answer = exchange.response
-    headers: dict[str, list[str]] = {}
-    for name, value in answer.headers:
-        headers.setdefault(name.lower(), []).append(value)
-    sent = requests.Request(exchange.request.method, exchange.request.url).prepare()
-    return ThesisResponse(answer.status, headers, answer.body, sent, answer.elapsed_ms / 1000, verify=True)

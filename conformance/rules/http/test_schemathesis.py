@@ -1,11 +1,9 @@
-"""Schemathesis over the contract's OpenAPI: examples, coverage, fuzzing and walks along its links.
+"""Schemathesis over the contract's OpenAPI: requests on both sides of each constraint, and random ones.
 
 The suite judges each request by its bytes: valid ones must get a declared status, invalid ones 4xx.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from contextlib import suppress
 
 import pytest
 
@@ -16,14 +14,9 @@ from conformance.api.rest.motion_guard import MotionGuard
 from conformance.api.rest.refusals import judge_refusal
 from conformance.api.rest.validity import INVALID, VALID, validity
 from conformance.documents.openapi import operations_of
-from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Outgoing
 from conformance.verdict.evidence import Judge
 from conformance.verdict.explorer import Explorer
-
-if TYPE_CHECKING:
-    # Importing it takes 0.1 s, in which the robot could drive already.
-    from conformance.api.rest.generated import Target
 
 pytestmark = pytest.mark.needs("rest")
 _IDS = ("http/declared-status", "http/declared-body", "http/no-server-error")
@@ -53,53 +46,44 @@ _FUZZED = 14
 _POSITIVE_REFUSALS = frozenset({405, 406, 408, 411, 413, 414, 415, 431})
 
 
-def _targets(api: RestInterface, *, moving: bool) -> list[Target]:
-    if api.run.effort.name == "quick":
-        return []
-    from conformance.api.rest.generated import targets  # noqa: PLC0415 - takes half a second
-
-    labels = {item.label for item in operations_of(api.run.contract) if item.motion == moving and allowed(api, item)}
-    return [target for target in targets(api.run.contract) if target.label in labels]
-
-
 @pytest.mark.phase("describe")
 @pytest.mark.requirement(*_IDS, "strict-input/query-parameter", "strict-input/query-missing")
 def test_reading_operations(api: RestInterface, judge: Judge, explore: Explorer) -> None:
     """Send generated requests for operations that move nothing; not at quick effort."""
-    guard = MotionGuard(api)
-    for target in _targets(api, moving=False):
-        _run(api, judge, explore, guard, target)
+    _send_generated(api, judge, explore, moving=False)
 
 
 @pytest.mark.phase("input")
 @pytest.mark.requirement(*_IDS, *_STRICT)
 def test_moving_operations(api: RestInterface, judge: Judge, explore: Explorer) -> None:
     """Send generated requests for operations that may move the robot, most of them invalid; not at quick effort."""
-    guard = MotionGuard(api)
     api.device.halt(api)
-    for target in _targets(api, moving=True):
-        _run(api, judge, explore, guard, target)
-        api.device.halt(api)
+    _send_generated(api, judge, explore, moving=True)
 
 
-def _run(api: RestInterface, judge: Judge, explore: Explorer, guard: MotionGuard, target: Target) -> None:
-    coverage = api.run.effort.draw_passing(target.coverage(), _COVERAGE, f"{api.run.seed}/coverage {target.label}")
-    for item in api.run.effort.subsample([*target.examples(), *coverage], 1):
-        _judge_generated(api, judge, guard, item)
+def _send_generated(api: RestInterface, judge: Judge, explore: Explorer, *, moving: bool) -> None:
+    effort = api.run.effort
+    if effort.name == "quick":
+        return
+    from conformance.api.rest.generated import NOT_GENERATED, as_request, targets  # noqa: PLC0415 - takes half a second
 
-    def fuzz(item: Outgoing | None) -> None:
+    guard = MotionGuard(api)
+
+    def send(case: object) -> None:
+        item = as_request(case)
         if item is not None:
             _judge_generated(api, judge, guard, item)
 
-    if api.run.effort.slow or not target.has_input:
-        return
-    from conformance.api.rest.generated import NOT_GENERATED  # noqa: PLC0415 - as above
-
-    for negative in (True, False):
-        try:
-            explore(target.fuzzing(negative=negative), fuzz, cases=_FUZZED)
-        except NOT_GENERATED:
-            continue
+    labels = {item.label for item in operations_of(api.run.contract) if item.motion == moving and allowed(api, item)}
+    for target in (one for one in targets(api.run.contract) if one.label in labels):
+        coverage = effort.draw_passing(target.covering(), _COVERAGE, f"{api.run.seed}/coverage {target.label}")
+        for case in effort.subsample(coverage, 1):
+            send(case)
+        for negative in (True, False) if target.has_input and not effort.slow else ():
+            with suppress(*NOT_GENERATED):
+                explore(target.fuzzed(negative=negative), send, cases=_FUZZED)
+        if moving:
+            api.device.halt(api)
 
 
 def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item: Outgoing) -> None:
@@ -121,36 +105,3 @@ def _judge_generated(api: RestInterface, judge: Judge, guard: MotionGuard, item:
             f"a status by which {said.operation.id} does not refuse the form of a valid request",
             cause=f"{said.operation.id} {answer.status}",
         )
-
-
-@pytest.mark.phase("input")
-@pytest.mark.requirement("http/declared-status")
-def test_walk_along_the_links(api: RestInterface, rest: HttpClient, judge: Judge, explore: Explorer) -> None:
-    """Walk from operation to operation along the contract's links, a few times; not at quick effort."""
-    if api.run.effort.name == "quick":
-        return  # the observers judge http/declared-status on every other request
-    from conformance.api.rest.generated import as_request, as_thesis, state_machine  # noqa: PLC0415 - as above
-
-    machine: Any = state_machine(api.run.contract.openapi)
-    if machine is None:
-        judge.note("http/declared-status", "the contract has no links to walk along")
-        return
-    guard = MotionGuard(api)
-
-    class Walk(machine):  # type: ignore[misc] # made at run time
-        def call(self, case: Any, **_: Any) -> Any:
-            one = as_request(case)
-            fit = guard.admit(one) if one is not None else None
-            if fit is None:
-                exchange = rest.send("GET", api.path)
-            else:
-                exchange = api.send(fit)
-                guard.count(fit, accepted=exchange.response.ok)
-            return as_thesis(exchange)
-
-        def validate_response(self, *_: Any, **__: Any) -> None:
-            """Do nothing: the observers have judged the response."""
-
-    api.device.halt(api)
-    explore.machine(Walk, cases=4, steps=5)
-    api.device.halt(api)

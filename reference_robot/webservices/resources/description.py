@@ -10,7 +10,7 @@ from typing import Any, Final
 import yaml
 from lxml import etree
 
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 from reference_robot.webservices.http.messages import Request, Response, content
 from reference_robot.webservices.resources.health import Health
 from reference_robot.webservices.resources.resource import FORMATS, Resource

@@ -4,7 +4,7 @@ from typing import Any, Final
 
 from lxml import etree
 
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.soap.faults import client_fault
 

@@ -16,7 +16,7 @@ from toy_server import Handler, server_of
 
 from conformance.contract.pack import Contract
 from conformance.contract.requirement_sets import current, load_set
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, statement_in
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate
 from reports.attestation.statement import seed_of

@@ -10,7 +10,7 @@ from conformance.contract.classes import Level, Origin
 from conformance.contract.generic import generic_ledger
 from conformance.contract.pack import Contract, anchor_of, cited_in, sections_of
 from conformance.packs.table1.limits import DeclaredLimits
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 
 TEXT = (CONTRACT_DIR / "contract.md").read_text(encoding="utf-8")
 SECTIONS = sections_of(TEXT)

@@ -6,7 +6,7 @@ from lxml import etree
 from zeep import Client
 
 from conformance.papers_robot.delivery import XSD_FIELDS
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 
 NAMESPACE = "http://soap.turtlebot.mybot.org/"
 WSDL = "{http://schemas.xmlsoap.org/wsdl/}"

@@ -4,7 +4,7 @@ import pytest
 
 from conformance.contract.pack import Contract
 from conformance.contract.requirement_sets import RequirementSetError, current, frozen, judged_by, load_set, names
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.verdict.evidence import Judge
 from conformance.verdict.verdicts import ClassValue, Value, class_verdicts, score, verdict_of
 

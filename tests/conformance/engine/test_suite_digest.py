@@ -8,7 +8,7 @@ from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.contract.requirement_sets import judged_by, load_set
 from conformance.engine.suite import JUDGING, contract_digests, known, suite_digest
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.verdict.verdicts import holds_back
 
 _OTHERS = ("fleet", "selftest", "cli", "explaining", "mutation", "packs", "commandline", "history")

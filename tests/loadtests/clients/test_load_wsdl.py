@@ -5,7 +5,7 @@ import re
 import pytest
 
 from conformance.documents.wsdl import WsdlError
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 from loadtests.clients import wsdl
 from loadtests.clients.robot import Robot
 

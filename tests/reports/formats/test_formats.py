@@ -14,7 +14,7 @@ from jsonschema import Draft4Validator, Draft202012Validator
 from conformance.contract.locating import GENERIC_RULES
 from conformance.contract.pack import Contract
 from conformance.contract.places import places
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 from reports.cli.pages import report
 from reports.formats.catalogue import FORMATS
 from reports.formats.source_pages import page_of

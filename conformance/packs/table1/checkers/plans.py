@@ -1,7 +1,4 @@
-"""Judge every plan of a run, whichever check requests it: its end, start and frame, and that it never leaps.
-
-The allowed step length depends on the request, so that other checks judge it.
-"""
+"""Judge every plan of a run, whichever check requests it: its end, start, heading, frame and steps."""
 
 import itertools
 import math
@@ -12,9 +9,9 @@ from urllib.parse import parse_qsl, urlsplit
 
 from conformance.documents.representation import UnreadableError, local_name, parse_xml, read
 from conformance.measures.samples import FARTHEST
-from conformance.packs.table1.robot.geometry import Pose, pose_of
+from conformance.packs.table1.robot.geometry import Pose, pose_of, wrapped
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, read_as
-from conformance.packs.table1.robot.plan import START_OFF, plan_of
+from conformance.packs.table1.robot.plan import START_OFF, Plan, plan_of
 from conformance.packs.table1.robot.robot import PLAN, POSE
 from conformance.packs.table1.robot.state_over_soap import answered
 from conformance.packs.table1.statement import Statement
@@ -30,11 +27,19 @@ _BACK: Final = 0.5
 _FAR_M: Final = 1e4
 _NEAR_M: Final = 0.01
 _TOLERANCE_M: Final = 0.1
-# What judges a plan's end, start and frame, by media type; the last is SOAP's. YAML takes too long to read.
+_FRAME: Final = "map"
+_YAW_OFF_RAD: Final = 0.2
+_ROUNDING_M: Final = 1e-6
+# What judges a plan's end, start, frame and given start, by media type; the last is SOAP's. YAML is read too slowly.
 _JUDGED: Final = {
-    "application/json": ("rest-resources/plan-end", "rest-resources/plan-start", "rest-resources/plan-frame"),
-    "application/xml": ("rest-formats/same-values",) * 3,
-    "text/xml": ("soap-subscribers/plan",) * 3,
+    "application/json": (
+        "rest-resources/plan-end",
+        "rest-resources/plan-start",
+        "rest-resources/plan-frame",
+        "rest-resources/plan-given-start",
+    ),
+    "application/xml": ("rest-formats/same-values",) * 4,
+    "text/xml": ("soap-subscribers/plan",) * 4,
 }
 # Of fewer poses nobody knows the usual step.
 _FEWEST: Final = 6
@@ -55,6 +60,7 @@ class Plans:
         self._url, self._at, motion = url(f"{PLAN}?"), url(POSE), said.motion
         self._frame, self._in_map = motion.frame, Pose(*motion.odom_to_map)
         self._noise_m = FARTHEST * said.limits.noise.position_m
+        self._longest_m = said.limits.plan_step_m
         # The pose that was read last since anything was asked of the robot; plans from where it is, since then.
         self._here: Exchange | None = None
         self._from_here: list[tuple[Pose, Exchange]] = []
@@ -85,11 +91,12 @@ class Plans:
         poses = plan.poses
         yield from self._judge_end(exchange, asked, poses[-1])
         yield from self._judge_start(exchange, asked, poses[0])
-        yield from self._judge_frame(exchange, asked.get("frame_id", ""), plan.frames)
-        if not any(name.startswith("start") for name in asked) and asked.get("frame_id", "map") == self._frame:
+        yield from self._judge_frame(exchange, asked.get("frame_id", _FRAME if asked else ""), plan.frames)
+        if not any(name.startswith("start") for name in asked) and asked.get("frame_id", _FRAME) == self._frame:
             self._from_here.append((poses[0], exchange))
         if response.media_type == "application/json":
-            yield from self._judge_leaps(exchange, poses)
+            yield from self._judge_way(exchange, plan)
+            yield from self._judge_heading(exchange, asked, poses[-1].yaw)
 
     def _read_pose(self, exchange: Exchange) -> Iterator[Case]:
         """Judge the plans since the pose that was read before, if the robot stood there and still does."""
@@ -137,7 +144,7 @@ class Plans:
         if not (abs(given.x) < _FAR_M and abs(given.y) < _FAR_M):
             return
         yield case(
-            _JUDGED[exchange.response.media_type][1],
+            _JUDGED[exchange.response.media_type][3],
             start.distance(given) <= START_OFF,
             exchange,
             f"a path that starts within {START_OFF:g} m of ({given.x:.3f}, {given.y:.3f})",
@@ -146,7 +153,7 @@ class Plans:
         )
 
     def _judge_frame(self, exchange: Exchange, asked: str, frames: frozenset[str]) -> Iterator[Case]:
-        """Judge that a path and its poses are in the frame in the request; all in one, where it names none.
+        """Judge that a path and its poses are in the frame in the request; all in one, where that is not clear.
 
         A leading slash is no part of a frame's name (tf2 drops it).
         """
@@ -161,16 +168,30 @@ class Plans:
             cause="another frame",
         )
 
-    def _judge_leaps(self, exchange: Exchange, poses: tuple[Pose, ...]) -> Iterator[Case]:
-        leap = longest_leap(poses)
+    def _judge_way(self, exchange: Exchange, plan: Plan) -> Iterator[Case]:
+        """Judge that no step of a path is longer than declared, and that it does not leap."""
+        leap, step_m = longest_leap(plan.poses), plan.longest_step
         yield case(
             "rest-resources/plan-continuous",
-            not leap,
+            not leap and step_m <= self._longest_m + _ROUNDING_M,
             exchange,
-            "a path that does not leap aside and back",
-            found=f"a leap of {leap:.3f} m",
-            cause="leaps",
+            f"a path without a step of more than {self._longest_m:g} m that does not leap aside and back",
+            found=f"a leap of {leap:.3f} m" if leap else f"a step of {step_m:.3f} m",
+            cause="leaps" if leap else "long steps",
         )
+
+    def _judge_heading(self, exchange: Exchange, asked: Mapping[str, str], yaw: float) -> Iterator[Case]:
+        """Judge that a path ends with the heading in the request, where that is clear."""
+        wanted = _number(asked.get("yaw", "0" if asked else ""))
+        if abs(wanted) <= 2 * math.pi:
+            yield case(
+                "rest-resources/plan-yaw",
+                abs(wrapped(yaw - wanted)) <= _YAW_OFF_RAD,
+                exchange,
+                f"a last heading of {wanted:.3f} rad",
+                found=f"a last heading of {yaw:.3f} rad",
+                cause="another heading",
+            )
 
 
 def _read(response: Response) -> Any:

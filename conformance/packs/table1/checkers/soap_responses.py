@@ -1,16 +1,32 @@
-"""Judge every successful SOAP response of a run by the XSD, whichever check asked for it.
+"""Judge every successful SOAP response of a run by the XSD, and whether what it returns is complete.
 
 A response that is invalid now and then is found only if all are looked at.
 """
 
-from collections.abc import Iterable, Iterator
+import itertools
+from collections.abc import Iterable, Iterator, Mapping
 from http import HTTPStatus
-from typing import Final
+from typing import Any, Final
+
+from lxml import etree
 
 from conformance.api.soap.service import SoapService
+from conformance.documents.json_shape import Shape
+from conformance.documents.representation import from_element
 from conformance.documents.xml import NotXmlError, elements, parse
-from conformance.documents.xml_names import clark, local
-from conformance.packs.table1.robot.delivery_messages import NAMESPACE
+from conformance.documents.xml_names import ENVELOPE, clark, local
+from conformance.packs.table1.robot.agreement import entries_of
+from conformance.packs.table1.robot.geometry import length_of
+from conformance.packs.table1.robot.message_shapes import (
+    GET_PLAN,
+    GOAL_AND_STATUS,
+    MESSAGE_TYPE,
+    ODOMETRY,
+    SENSORS,
+    SERVICE_TYPE,
+    SERVICES,
+    TWIST,
+)
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.case import Case, case
 
@@ -18,6 +34,19 @@ _IDS: Final = {"publishers": "soap-delivery/response-valid", "subscribers": "soa
 # A longer path of a plan is judged where it is asked for.
 _LARGE: Final = 100_000
 _SUFFIX: Final = "Response"
+# A service that speaks SOAP 1.2 as well answers it in kind.
+_SOAP_12: Final = b"http://www.w3.org/2003/05/soap-envelope"
+#: Name of the requirement, and shape, of what an operation returns.
+_CONTENT: Final[Mapping[str, tuple[str, Shape]]] = {
+    "GetPose": ("pose", ODOMETRY),
+    "GetVelocity": ("velocity", TWIST),
+    "GetGoal": ("goal", GOAL_AND_STATUS),
+    "GetPlan": ("plan", GET_PLAN),
+    "GetSensors": ("sensors", SENSORS),
+    "GetNavigationServices": ("services", SERVICES),
+}
+_FULL_NAMES: Final = {"sensors": MESSAGE_TYPE, "services": SERVICE_TYPE}
+_UNIT: Final = 1e-3
 
 
 class SoapResponses:
@@ -45,16 +74,50 @@ class SoapResponses:
             root = parse(response.body)
         except NotXmlError:
             return  # judged as what it is
-        inside = [child for part in elements(root) if local(str(part.tag)) == "Body" for child in elements(part)]
-        if len(inside) != 1 or not str(inside[0].tag).endswith(_SUFFIX):
+        parts = [part for part in elements(root) if part.tag == clark(ENVELOPE, "Body")]
+        inside = [child for part in parts for child in elements(part)]
+        if _SOAP_12 in exchange.request.body or (inside and local(str(inside[0].tag)) == "Fault"):
             return
-        name = local(str(inside[0].tag))
-        wanted = clark(NAMESPACE, name)
         # What the robot says of itself is fetched by the checks, and not while an exchange is judged.
-        own = vars(service).get("described", service.contract)
-        described = own if own.shape(wanted) is not None else service.contract
-        if str(inside[0].tag) != wanted or described.shape(wanted) is None:
-            return
-        reason = described.types.invalid(inside[0])
-        expected = f"{name} as the description says it is"
-        yield case(_IDS[service.name], not reason, exchange, expected, found=reason)
+        described = [vars(service).get("described", service.contract), service.contract]
+        tag = str(inside[0].tag) if inside else ""
+        known = next((one for one in described if tag.endswith(_SUFFIX) and one.shape(tag) is not None), None)
+        reason = f"{len(inside)} elements in the Body of {root.tag}" if len(inside) != 1 else f"the element {tag}"
+        if len(inside) == 1 and known is not None:
+            reason = known.types.invalid(inside[0])
+        expected = f"{local(tag) or 'a response'} as the description says it is, alone in the Body of SOAP 1.1"
+        yield case(_IDS[service.name], not reason, exchange, expected, found=reason, cause=reason)
+        if len(inside) == 1 and known is not None:
+            yield from _content(exchange, inside[0])
+
+
+def _content(exchange: Exchange, wrapper: etree._Element) -> Iterator[Case]:
+    """Judge that a reading operation returns all that the contract says; GetGoal may return nothing."""
+    operation = local(str(wrapper.tag)).removesuffix(_SUFFIX)
+    found = [child for child in elements(wrapper) if local(str(child.tag)) == "return"]
+    if operation not in _CONTENT or (operation == "GetGoal" and not any(len(child) for child in found)):
+        return
+    name, shape = _CONTENT[operation]
+    if name in _FULL_NAMES:
+        problem = _list_problem([from_element(child, shape.schema["items"]) for child in found], shape, name)
+    elif len(found) != 1:
+        problem = f"{len(found)} return elements"
+    else:
+        value = from_element(found[0], shape.schema)
+        problem = shape.problem(value)
+        length = length_of(value["pose"]["pose"]["orientation"]) if name == "pose" and not problem else 1.0
+        problem = problem or ("" if abs(length - 1) <= _UNIT else f"an orientation of length {length:g}")
+    expected = f"complete content of {operation}Response"
+    yield case(
+        f"soap-subscribers/{name}", not problem, exchange, expected, found=problem, cause=problem.split(" is ")[0]
+    )
+
+
+def _list_problem(entries: list[Any], shape: Shape, name: str) -> str:
+    """Return what is wrong with a list: an entry that is incomplete, twice, or not named in full."""
+    if problem := shape.problem(entries):
+        return problem
+    listed = entries_of(entries, tuple(shape.schema["items"]["properties"]))
+    twice = next((one for one, two in itertools.pairwise(listed) if one == two), "")
+    short = next((entry["type"] for entry in entries if _FULL_NAMES[name].problem(entry["type"])), "")
+    return f"{twice} stands twice" if twice else f"type {short!r} is not named in full" if short else ""

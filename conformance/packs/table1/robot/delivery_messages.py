@@ -9,7 +9,7 @@ from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_shapes import Element
 from conformance.papers_robot.delivery import EXAMPLE
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 
 NAMESPACE: Final = "http://soap.turtlebot.mybot.org/"
 

@@ -12,21 +12,13 @@ class PlanRead:
     """A plan requested in the frame of goals.
 
     Attributes:
-        goal: where the plan must end.
-        tolerance_m: how far from there it may end, m.
         exchange: the plan's request and response.
         problem: what is wrong with the response; empty: it has a plan.
-        plan: the plan, or None.
-        begin: the start in the request; None: the robot's position.
         start: where the plan begins compared with the robot; None where the request has a start or the pose is unknown.
     """
 
-    goal: Pose
-    tolerance_m: float
     exchange: Exchange
     problem: str
-    plan: Plan | None
-    begin: Pose | None = None
     start: Start | None = None
 
 
@@ -83,7 +75,7 @@ class FramePlan:
 
     Attributes:
         frame: the frame.
-        begin, goal: the robot's position, and where the plan must end, in that frame.
+        begin: the robot's position in that frame.
         exchange: the plan's request and response.
         problem: what is wrong with the response; empty: it has a plan.
         plan: the plan, or None.
@@ -92,7 +84,6 @@ class FramePlan:
 
     frame: str
     begin: Pose
-    goal: Pose
     exchange: Exchange
     problem: str
     plan: Plan | None

@@ -45,6 +45,8 @@ _MOST: Final = 400
 _ALIKE: Final = 2
 # A velocity, and a delivery, that every robot refuses.
 _BEYOND: Final = Velocity(angular_z=1e4)
+#: A frame that no robot knows.
+NO_FRAME: Final = "no_such_frame"
 _NO_NUMBER: Final = ("3", "1", "2", "3", "4", "5", "abc")
 # How many are sent again, of a fast robot and at least.
 _COUNTS: Final = {"quick": 60, "standard": 300}
@@ -167,7 +169,7 @@ def send_known(robot: Robot, soap: SoapServices, refused: RefusedRequests) -> No
     if refused.has_known:
         return
     refused.has_known = True
-    goal = goal_body(Pose(0.0, 0.0, 0.0), "no_such_frame", "refused")
+    goal = goal_body(Pose(0.0, 0.0, 0.0), NO_FRAME, "refused")
     put_goal(robot, goal)
     put_as_xml(robot, VELOCITY, _BEYOND.twist)
     robot.put_velocity(_BEYOND)

@@ -5,20 +5,17 @@ from collections.abc import Iterator
 from lxml import etree
 
 from conformance.api.soap.calls import call, read_exchange, send
-from conformance.api.soap.content import number_at
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.service import MEDIA_TYPE, SoapService
 from conformance.api.soap.valid_messages import call_valid, require_valid_message
 from conformance.api.soap.xml_style import XmlStyle, serialize
 from conformance.documents.wsdl import SoapOperation
 from conformance.documents.xml import elements
-from conformance.documents.xml_names import clark, local
+from conformance.documents.xml_names import local
 from conformance.documents.xml_node import Node
-from conformance.documents.xsd_shapes import Element
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_messages import NAMESPACE, delivery, request
 from conformance.papers_robot.delivery import COFFEE
-from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange, Outgoing
 from conformance.transport.parallel import Addressed
 
@@ -62,16 +59,10 @@ def ask(subscribers: SoapService, operation: str, **parameters: float | str) -> 
     return call_valid(subscribers, request(operation, **parameters)).exchange
 
 
-def declared_return(service: SoapService, operation: str) -> Element:
-    """Return the XSD declaration of what an operation returns.
-
-    Raises:
-        NotPossibleError: the contract has no such operation.
-    """
-    wrapper = service.contract.shape(clark(NAMESPACE, f"{operation}Response"))
-    if wrapper is None or not wrapper.children:
-        raise NotPossibleError(f"the contract has no {operation}")
-    return wrapper.children[0]
+def text_at(element: etree._Element, *names: str) -> str | None:
+    """Return the text at a path of local names, which may be below elements of other names, or None."""
+    found = element.findtext(".//" + "/".join(f"{{*}}{name}" for name in names))
+    return None if found is None else found.strip()
 
 
 def returned(exchange: Exchange) -> tuple[list[etree._Element], str]:
@@ -91,8 +82,11 @@ def position(subscribers: SoapService) -> tuple[float, float] | None:
     answer = call(subscribers, request("GetPose"))
     if not answer.accepted or answer.first is None:
         return None
-    x, y = (number_at(answer.first, "pose", "pose", "position", axis) for axis in "xy")
-    return None if x is None or y is None else (x, y)
+    try:
+        x, y = (float(text_at(answer.first, "pose", "pose", "position", axis) or "") for axis in "xy")
+    except ValueError:
+        return None
+    return x, y
 
 
 def known_messages(service: SoapService, operation: SoapOperation) -> Iterator[Node]:

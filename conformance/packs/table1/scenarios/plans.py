@@ -44,7 +44,7 @@ def plans_from_robot(robot: Robot, explore: Explorer) -> PlansFromRobot:
         start = None
         if plan is not None and before is not None:
             start = start_of(robot, plan, before, exchange, lambda: ask(robot, goal, tolerance=tolerance_m)[1])
-        reads.append(PlanRead(goal, tolerance_m, exchange, problem, plan, start=start))
+        reads.append(PlanRead(exchange, problem, start))
 
     for goal in found:
         request(goal, _DEFAULT_TOLERANCE_M, known=True)
@@ -73,8 +73,8 @@ def plans_from_start(robot: Robot, explore: Explorer) -> PlansFromStart:
         index, shift, yaw = case
         start = starts[index % len(starts)]
         goal = starts[(index + 1 + shift % (len(starts) - 1)) % len(starts)]._replace(yaw=yaw)
-        problem, plan, exchange = ask(robot, goal, start)
-        reads.append(PlanRead(goal, _DEFAULT_TOLERANCE_M, exchange, problem, plan, begin=start))
+        problem, _, exchange = ask(robot, goal, start)
+        reads.append(PlanRead(exchange, problem))
 
     explore(st.tuples(st.integers(0, 2), st.integers(0, 2), st.floats(-math.pi, math.pi)), request, cases=12)
     pairs = ((start, goal._replace(yaw=0.0)) for start, goal in itertools.pairwise(starts))
@@ -124,14 +124,13 @@ def plans_in_frames(robot: Robot) -> tuple[FramePlan, ...]:
 
 def _in_frame(robot: Robot, frame: str, begin: Pose, *, known: bool) -> FramePlan:
     """Request a plan in a frame, to a pose 0.3 m beside ``begin``; ``known`` says that the robot knows the frame."""
-    goal = begin._replace(x=begin.x + 0.3)
-    exchange = robot.get(query(x=goal.x, y=goal.y, frame_id=frame))
+    exchange = robot.get(query(x=begin.x + 0.3, y=begin.y, frame_id=frame))
     message, problem = read_as(exchange.response, GET_PLAN)
     plan, moved_m = None if problem else plan_of(message), None
     if known and plan is not None:
         odometry, _ = robot.read(POSE, ODOMETRY)
         moved_m = 0.0 if odometry is None else begin.distance(pose_of(odometry["pose"]["pose"]))
-    return FramePlan(frame, begin, goal, exchange, problem, plan, moved_m)
+    return FramePlan(frame, begin, exchange, problem, plan, moved_m)
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.SETTLING)

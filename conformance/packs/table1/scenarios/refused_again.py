@@ -8,6 +8,7 @@ from functools import partial
 from http import HTTPStatus
 from typing import Any, Final
 
+from conformance.api.rest.calls import JSON
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import INVALID, VALID, validity
 from conformance.api.soap.callable_services import SoapServices
@@ -22,8 +23,10 @@ from conformance.packs.table1.robot.geometry import Pose, length_of, wrapped
 from conformance.packs.table1.robot.goal import NEW, arrived, await_goal, await_none, difference, goal_body, put_goal
 from conformance.packs.table1.robot.goal_trace import Put
 from conformance.packs.table1.robot.goals import choose_goals
+from conformance.packs.table1.robot.invalid_bodies import elsewhere
+from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.probe import ProbeError, RosProbe
-from conformance.packs.table1.robot.refused_requests import Refused, RefusedRequests, is_refused, send_known
+from conformance.packs.table1.robot.refused_requests import NO_FRAME, Refused, RefusedRequests, is_refused, send_known
 from conformance.packs.table1.robot.robot import GOAL_PATH, Robot
 from conformance.packs.table1.robot.soap_services import send_delivery
 from conformance.packs.table1.robot.standstill import read_rest
@@ -31,7 +34,6 @@ from conformance.packs.table1.robot.standstill_trace import Rest
 from conformance.packs.table1.robot.stopping import bring_to_rest
 from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.packs.table1.scenarios.goal_life import await_motion, put_new
-from conformance.packs.table1.scenarios.invalid_goals import NO_FRAME, InvalidGoal
 from conformance.papers_robot.delivery import COFFEE, COURIER
 from conformance.scenarios.scenario import NoOccasionError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
@@ -74,6 +76,21 @@ class Ordered:
 
 
 @dataclass(frozen=True)
+class DuringGoal:
+    """A request that was sent while a goal was active.
+
+    Attributes:
+        what: the request, or what is wrong with it.
+        exchange: the request and its response.
+        differs: how the goal that the robot then shows differs from the one before; empty if nowhere.
+    """
+
+    what: str
+    exchange: Exchange
+    differs: str
+
+
+@dataclass(frozen=True)
 class RefusedAgain:
     """What became of requests that were refused before.
 
@@ -94,7 +111,7 @@ class RefusedAgain:
     unseen: str = ""
     renamed: Put | None = None
     conflicts: tuple[Put, ...] = ()
-    during: tuple[InvalidGoal, ...] = ()
+    during: tuple[DuringGoal, ...] = ()
     stands: tuple[Exchange, ...] = ()
     drives: bool = False
     cancelled: tuple[Exchange, str] | None = None
@@ -113,6 +130,7 @@ def refused_again(
     player = _Player(api, robot, soap, refused)
     try:
         send_known(robot, soap, refused)
+        player.elsewhere()
         observer = player.observer(probe, senders)
         player.rest()
         # What arrives is read after the drive: it needs a while, and no order may come of what is sent meanwhile.
@@ -159,6 +177,13 @@ class _Player:
         target: Any = read_json(request.body).value["goal"]["target_pose"]
         off = abs(length_of(target["pose"]["orientation"]) - 1) > _NO_UNIT
         return off or target["header"]["frame_id"] == NO_FRAME
+
+    def elsewhere(self) -> None:
+        """Send a valid goal by methods and to a path that the robot has to refuse, so that it is sent again."""
+        (near,) = choose_goals(self.robot, 1.0, 1)
+        body = body_of(goal_body(near, self.robot.statement.motion.frame, "not to be followed"))
+        for method, path in elsewhere(self.robot, GOAL_PATH):
+            self.robot.rest.send(method, path, headers=(("Content-Type", JSON),), body=body, fresh=True)
 
     def rest(self) -> None:
         """Send the requests at rest, and read the robot; if it moves or has a goal, send them one by one."""
@@ -351,7 +376,7 @@ class _Player:
             return None
         differs = "none" if goal is None else difference(goal, active)
         if is_refused(exchange) or self._is_wrong(one):
-            invalid = InvalidGoal(one.what, during=True, exchange=exchange, differs=differs)
+            invalid = DuringGoal(one.what, exchange, differs)
             self.trace = replace(self.trace, during=(*self.trace.during, invalid))
             if differs:
                 return None
@@ -372,7 +397,7 @@ class _Player:
             goal, _ = robot.goal()
             if goal is not None or not (arrived(robot, pose) or not ends(robot, active, cancel)):
                 differs = "none" if goal is None else difference(goal, active)
-                one = InvalidGoal("Accept: image/png", during=True, exchange=exchange, differs=differs)
+                one = DuringGoal("Accept: image/png", exchange, differs)
                 self.trace = replace(self.trace, during=(*self.trace.during, one))
         return exchange if exchange.response.ok else None
 

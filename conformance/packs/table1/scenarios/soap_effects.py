@@ -6,7 +6,6 @@ from functools import partial
 from typing import Final
 
 from conformance.api.interfaces import Interfaces
-from conformance.api.soap import content
 from conformance.api.soap.calls import SoapResponse
 from conformance.api.soap.valid_messages import call_valid
 from conformance.contract.interfaces import Interface
@@ -18,6 +17,7 @@ from conformance.packs.table1.robot.goal import NEW, goal_body, put_goal
 from conformance.packs.table1.robot.message_shapes import DELIVERIES, read_as
 from conformance.packs.table1.robot.robot import DELIVERIES as DELIVERIES_PATH
 from conformance.packs.table1.robot.robot import Robot
+from conformance.packs.table1.robot.soap_services import text_at
 from conformance.packs.table1.robot.stopping import bring_to_rest
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -109,7 +109,7 @@ def goal_by_soap(interfaces: Interfaces) -> GoalBySoap:
     def shows() -> bool:
         answer = ask_goal()
         first = answer.first if answer.accepted else None
-        shown = content.text_at(first, "goal_id", "id") if first is not None else None
+        shown = text_at(first, "goal_id", "id") if first is not None else None
         reads.append((answer.exchange, shown))
         return shown == GOAL_ID
 

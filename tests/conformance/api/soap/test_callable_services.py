@@ -7,7 +7,7 @@ from conformance.api.soap.callable_services import SoapServices, callable_servic
 from conformance.api.soap.calls import call
 from conformance.api.soap.service import SoapService
 from conformance.documents.xml_node import Node
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.transport.client import Connection, HttpClient
 from conformance.verdict.run import Run
 

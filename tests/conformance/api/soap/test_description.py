@@ -8,7 +8,7 @@ from conformance.api.soap import comparison
 from conformance.api.soap.wsdl_rules import RULES
 from conformance.documents.wsdl import WsdlError, describe, read_file, unusable
 from conformance.documents.xml_names import clark
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 
 CONTRACT = read_file(CONTRACT_DIR / "publishers.wsdl")
 WSDL = (CONTRACT_DIR / "publishers.wsdl").read_bytes()

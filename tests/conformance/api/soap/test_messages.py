@@ -19,7 +19,7 @@ from conformance.documents.xml_node import Node
 from conformance.documents.xsd import Types
 from conformance.documents.xsd_assembly import SchemaDocument
 from conformance.documents.xsd_lexical import plain, unreadable
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 
 XSD = b"""<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" xmlns:t="urn:t" targetNamespace="urn:t"
                      elementFormDefault="qualified">

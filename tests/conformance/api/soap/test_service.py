@@ -5,7 +5,7 @@ import time
 import pytest
 
 from conformance.api.soap.service import open_service
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.statement.statement import StatementError
 from conformance.transport.client import Connection
 from conformance.transport.reach import Trust

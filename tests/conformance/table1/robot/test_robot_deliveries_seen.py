@@ -16,7 +16,7 @@ from conformance.packs.table1.robot.delivery import Delivery, deliveries, double
 from conformance.packs.table1.robot.delivery_sender import DeliverySender, Order
 from conformance.packs.table1.robot.delivery_trace import Seen
 from conformance.packs.table1.rules.equivalence import test_equivalence_delivery as rules
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.scenarios.rule import Rule, record
 from conformance.transport.client import Connection
 from conformance.transport.exchange import Exchange, Request, Response

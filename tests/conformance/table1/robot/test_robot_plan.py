@@ -108,7 +108,7 @@ def test_every_plan_ends_where_it_was_asked_to(asked, cases, failures):
 )
 def test_every_plan_starts_where_it_was_asked_to(start, cases, failures):
     judge = _seen(_straight(0.1), path=f"/robot/navigation/service/plan?x=1.9&y=0.0{start}").judge
-    assert judge.counts(["rest-resources/plan-start"]) == {"rest-resources/plan-start": cases}
+    assert judge.counts(["rest-resources/plan-given-start"]) == {"rest-resources/plan-given-start": cases}
     assert judge.refuted().get("rest-resources/plan-start", 0) == failures
 
 
@@ -116,6 +116,17 @@ def test_every_plan_starts_where_it_was_asked_to(start, cases, failures):
 def test_every_plan_is_in_the_frame_that_was_asked_for(frame, failures):
     judge = _seen(_straight(0.1), path=f"/robot/navigation/service/plan?x=1.9&y=0.0{frame}").judge
     assert judge.refuted().get("rest-resources/plan-frame", 0) == failures
+
+
+@pytest.mark.parametrize(("asked", "failures"), [("", 0), ("&yaw=0.1", 0), ("&yaw=0.3", 1), ("&yaw=nan", 0)])
+def test_every_plan_ends_with_the_heading_that_was_asked_for(asked, failures):
+    judge = _seen(_straight(0.1), path=f"/robot/navigation/service/plan?x=1.9&y=0.0{asked}").judge
+    assert judge.refuted().get("rest-resources/plan-yaw", 0) == failures
+
+
+@pytest.mark.parametrize(("step", "failures"), [(1.0, 0), (1.1, 1)])
+def test_no_step_is_longer_than_declared(step, failures):
+    assert _seen(_straight(step)).judge.refuted().get(_ID, 0) == failures
 
 
 def test_a_pose_in_another_frame_is_found_where_none_was_asked_for():

@@ -1,16 +1,23 @@
 """Every successful SOAP response of a run is judged by the XSD."""
 
+import re
+
 import pytest
 
+from conformance.api.soap.envelope import envelope
+from conformance.api.soap.messages import ordinary
 from conformance.api.soap.service import SoapService
 from conformance.contract.interfaces import Interface
+from conformance.documents.wsdl import read_file
+from conformance.documents.xml_names import clark
 from conformance.packs.table1.checkers.soap_responses import SoapResponses
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.observers import Observers
 from conformance.verdict.run import Run
 
+_WSDL = CONTRACT_DIR / "subscribers.wsdl"
 _URL = "http://robot:5555/turtlesim_subscriber_ws"
 _POINT = "<x>{}</x><y>0.0</y><z>0.0</z>"
 _VELOCITY = (
@@ -28,6 +35,10 @@ _VELOCITY = (
         (_VELOCITY.format("0,5"), 200, True),
         (_VELOCITY.format("0.5").replace("<linear>", "<linear/><linear>"), 200, True),
         (_VELOCITY.format("0,5"), 500, False),
+        (_VELOCITY.format("0.5").replace("<s:Body>", "<s:Body><a/>"), 200, True),
+        (_VELOCITY.format("0.5").replace("soap.turtlebot", "soap.other"), 200, True),
+        (_VELOCITY.format("0.5").replace("schemas.xmlsoap.org/soap/envelope/", "www.w3.org/2003/05/soap"), 200, True),
+        (_VELOCITY.format("0.5").replace("t:GetVelocityResponse", "s:Fault"), 200, False),
         ("no XML", 200, False),
         ("", 200, True),
         ("", 202, False),
@@ -35,11 +46,79 @@ _VELOCITY = (
     ],
 )
 def test_an_invalid_response_is_found_whoever_asked(body, status, refuted):
+    assert ("soap-subscribers/response-valid" in judged(body, status)) is refuted
+
+
+def judged(body, status=200):
+    """The requirements that a response breaks."""
     base, path = _URL.rsplit("/", 1)
-    client, wsdl = HttpClient(base, Connection()), CONTRACT_DIR / "subscribers.wsdl"
-    service = SoapService(Interface.SUBSCRIBERS, client, f"/{path}", contract_wsdl_path=wsdl)
+    service = SoapService(Interface.SUBSCRIBERS, HttpClient(base, Connection()), f"/{path}", contract_wsdl_path=_WSDL)
     vars(service)["described"] = service.contract  # as a check has found it
     run = Run()
     response = Response(status, (("Content-Type", "text/xml"),), body.encode(), 1.0)
     Observers(run.judge, [SoapResponses([service])]).answered(Exchange(Request("POST", _URL, (), b"<a/>"), response))
-    assert set(run.judge.refuted()) == ({"soap-subscribers/response-valid"} if refuted else set())
+    return set(run.judge.refuted())
+
+
+_OPERATIONS = {
+    "GetPose": "pose",
+    "GetVelocity": "velocity",
+    "GetGoal": "goal",
+    "GetPlan": "plan",
+    "GetSensors": "sensors",
+    "GetNavigationServices": "sensors",  # which has the services as a part
+}
+
+
+def made(operation):
+    """The text of an ordinary response, with a quaternion of length 1, a goal's status and full names."""
+    described = read_file(_WSDL)
+    wrapper = described.shape(clark(described.target_namespace, f"{operation}Response"))
+    text = envelope([ordinary(wrapper, optional=True)]).written().decode()
+    text = re.sub(r"<orientation>.*?</orientation>", f"<orientation>{_POINT.format('1')}<w>0</w></orientation>", text)
+    text = re.sub(r"<code>[^<]*", "<code>1", text)
+    kind = "nav_msgs/srv/GetPlan" if operation == "GetNavigationServices" else "sensor_msgs/msg/LaserScan"
+    return re.sub(r"<type>[^<]*", f"<type>{kind}", text)
+
+
+@pytest.mark.parametrize("operation", _OPERATIONS)
+def test_what_the_schema_makes_is_complete(operation):
+    assert judged(made(operation)) == set()
+
+
+@pytest.mark.parametrize(
+    ("operation", "old", "new"),
+    [
+        ("GetPose", "<orientation>.*?</orientation>", ""),
+        ("GetPose", "(<orientation><x>)[^<]*", r"\g<1>3"),
+        ("GetPose", "<covariance>[^<]*</covariance>", ""),
+        ("GetVelocity", "(<x>)[^<]*", r"\1NaN"),
+        ("GetVelocity", "(<x>)[^<]*", r"\1<y/>"),
+        ("GetVelocity", "(<angular>.*?</angular>)", r"\1\1"),
+        ("GetPose", "(<nanosec>)[^<]*", r"\g<1>4294967296"),
+        ("GetPose", "(<sec>)[^<]*", r"\g<1>1.5"),
+        ("GetSensors", "(<return>.*</return>)", r"\1\1"),
+        ("GetSensors", "sensor_msgs/msg/", "sensor_msgs/"),
+        ("GetNavigationServices", "<name>[^<]*</name>", ""),
+        ("GetPlan", "<poses>.*</poses>", ""),
+        ("GetGoal", "<pose>.*</pose>", ""),
+    ],
+)
+def test_what_is_incomplete_is_found(operation, old, new):
+    spoiled = re.sub(old, new, made(operation), count=1, flags=re.DOTALL)
+    assert spoiled != made(operation)
+    assert f"soap-subscribers/{_OPERATIONS[operation]}" in judged(spoiled)
+
+
+@pytest.mark.parametrize(
+    ("operation", "old", "new"),
+    [
+        ("GetVelocity", "(<angular>)", r"<own>1</own>\1"),
+        ("GetPose", "((<covariance>[^<]*</covariance>){36})", r"<covariance>\1</covariance>"),
+        ("GetGoal", "<return>.*</return>", ""),
+    ],
+)
+def test_what_the_contract_leaves_open_is_complete(operation, old, new):
+    laid_out = re.sub(old, new, made(operation), count=1, flags=re.DOTALL)
+    assert laid_out != made(operation)
+    assert judged(laid_out) <= {"soap-subscribers/response-valid"}

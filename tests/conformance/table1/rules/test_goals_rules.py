@@ -18,13 +18,14 @@ from conformance.packs.table1.robot.goal_trace import (
     RefusedGoals,
     SpecialGoal,
 )
+from conformance.packs.table1.robot.robot import GOAL_PATH
 from conformance.packs.table1.rules.rest_resources import test_goal_drives as drives
 from conformance.packs.table1.rules.rest_resources import test_goal_ids as ids
 from conformance.packs.table1.rules.rest_resources import test_goal_life as life
 from conformance.packs.table1.rules.rest_resources import test_goal_refused as rules
 from conformance.packs.table1.rules.rest_resources import test_goal_walk as walk
 from conformance.packs.table1.rules.strict_input import test_refused_state as refused
-from conformance.packs.table1.scenarios.invalid_goals import InvalidGoal
+from conformance.packs.table1.scenarios.refused_again import DuringGoal, RefusedAgain
 from conformance.packs.table1.statement import Statement
 
 _RUN = {"run": SimpleNamespace(statement=Statement())}
@@ -169,17 +170,15 @@ def test_how_a_goal_ended_is_told_with_its_id(last, fault):
     assert bool(found) == bool(fault)
 
 
-@pytest.mark.parametrize(
-    ("during", "differs", "expected"),
-    [
-        (False, "this goal as the active one", "no goal after PUT with an empty id"),
-        (True, "", "the goal that was active before PUT with an empty id"),
-    ],
-)
-def test_an_invalid_goal_changes_nothing(during, differs, expected):
-    trace = (InvalidGoal("an empty id", during, exchange(400, method="PUT"), differs),)
-    (case,) = refused.goal_refused.outcomes(trace, {}.__getitem__)
-    assert (case.holds, case.expected) == (not differs, expected)
+@pytest.mark.parametrize("differs", ["", "none"])
+def test_a_refused_request_changes_no_goal(differs):
+    put = exchange(400, method="PUT")
+    goal = replace(put, request=replace(put.request, url=f"http://robot{GOAL_PATH}"))
+    trace = RefusedAgain(during=(DuringGoal("an empty id", goal, differs), DuringGoal("another path", put, differs)))
+    for rule in (refused.goal_refused_again, refused.goal_kept):
+        (case,) = rule.outcomes(trace, {}.__getitem__)
+        assert case.holds is not differs
+        assert case.expected.startswith("the goal that was active before PUT with an")
 
 
 @pytest.mark.parametrize(("left_m", "drives_judged"), [(0.1, [True]), (9.0, [])])

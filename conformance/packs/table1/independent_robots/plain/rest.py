@@ -25,7 +25,7 @@ from conformance.packs.table1.independent_robots.plain import reading
 from conformance.packs.table1.independent_robots.plain.reading import RefusedError
 from conformance.packs.table1.independent_robots.plain.server import Answer
 from conformance.packs.table1.independent_robots.plain.writing import FORMATS, as_json, choose, element, written
-from conformance.papers_robot.files import CONTRACT_DIR
+from conformance.papers_robot.statement import CONTRACT_DIR
 
 _FRAMES = ("map", "odom")
 # So long a goal is accepted before it is executing (action_msgs/GoalStatus), s.

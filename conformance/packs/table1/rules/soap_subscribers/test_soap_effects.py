@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from conformance.api.soap.calls import read_exchange
-from conformance.api.soap.content import text_at
+from conformance.packs.table1.robot.soap_services import text_at
 from conformance.packs.table1.scenarios.soap_effects import (
     GOAL_ID,
     GoalBySoap,

@@ -8,9 +8,8 @@ from conformance.packs.table1.robot.delivery_trace import key_of
 from conformance.packs.table1.robot.goal import CANCELED, NEW, outcome_fault
 from conformance.packs.table1.robot.robot import GOAL_PATH
 from conformance.packs.table1.robot.standstill_trace import Rest, Standing, stays
-from conformance.packs.table1.scenarios.invalid_goals import InvalidGoal, invalid_goals
 from conformance.packs.table1.scenarios.invalid_velocities import invalid_velocities
-from conformance.packs.table1.scenarios.refused_again import RefusedAgain, refused_again
+from conformance.packs.table1.scenarios.refused_again import DuringGoal, RefusedAgain, refused_again
 from conformance.packs.table1.scenarios.standing import standing
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.transport.exchange import SAFE_METHODS
@@ -40,16 +39,21 @@ def refused_again_at_rest(trace: RefusedAgain) -> Iterator[Outcome]:
 @rule("strict-input/goal-refused", on=(refused_again,))
 def goal_refused_again(trace: RefusedAgain) -> Iterator[Outcome]:
     """Judge that the robot keeps its goal when goals and cancels that it has refused are sent again."""
-    yield from goal_refused.judge([one for one in trace.during if _about_goal(one)])
+    return (_kept(one) for one in trace.during if _about_goal(one))
 
 
 @rule("rest-resources/goal-get", on=(refused_again,))
 def goal_kept(trace: RefusedAgain) -> Iterator[Outcome]:
     """Judge that the robot keeps its goal when anything else that it has refused is sent again."""
-    yield from goal_refused.judge([one for one in trace.during if not _about_goal(one)])
+    return (_kept(one) for one in trace.during if not _about_goal(one))
 
 
-def _about_goal(one: InvalidGoal) -> bool:
+def _kept(one: DuringGoal) -> Case:
+    expected = f"the goal that was active before {one.exchange.request.method} with {one.what}"
+    return Case(not one.differs, one.exchange, expected, one.differs, cause=one.what)
+
+
+def _about_goal(one: DuringGoal) -> bool:
     return GOAL_PATH.rstrip("/") in one.exchange.request.url and one.exchange.request.method not in SAFE_METHODS
 
 
@@ -122,12 +126,3 @@ def _once(trace: RefusedAgain, method: str) -> Iterator[Outcome]:
                 count = arrived.count(key_of(delivery, exact=ordered.exact))
                 expected = f"exactly one message for {delivery}, directly after a refused request"
                 yield Case(count == 1, exchange, expected, f"{count} messages", "after a refused request")
-
-
-@rule("strict-input/goal-refused", on=(invalid_goals,))
-def goal_refused(trace: tuple[InvalidGoal, ...]) -> Iterator[Outcome]:
-    """Judge that the robot follows no invalid goal, and keeps the goal that it has."""
-    for one in trace:
-        kept = "the goal that was active before" if one.during else "no goal after"
-        expected = f"{kept} {one.exchange.request.method} with {one.what}"
-        yield Case(not one.differs, one.exchange, expected, one.differs, cause=one.what)
