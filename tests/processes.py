@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import psutil
 import warm_commands
 
 # A process inherits the peak memory of the one that starts it, here of pytest. This small one stands between the two.
@@ -69,3 +70,21 @@ def independent_robot(name: str) -> Iterator[tuple[subprocess.Popen[str], str, s
             yield process, *(word.split("=", 1)[1] for word in words[1:3])
         finally:
             process.kill()
+
+
+def shown_of(command: list[str]) -> tuple[str, dict[int, str]]:
+    """Run a command; return what it said, and what a list of processes shows of it and of those below it."""
+    seen = dict[int, str]()
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        while process.poll() is None:
+            for child in [psutil.Process(process.pid), *psutil.Process(process.pid).children(recursive=True)]:
+                try:
+                    seen[child.pid] = f"{child.cmdline()} {child.environ()}"
+                except psutil.Error:
+                    continue
+            try:
+                process.wait(0.1)
+            except subprocess.TimeoutExpired:
+                continue
+        said = process.stdout.read()
+    return said, seen

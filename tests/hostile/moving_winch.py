@@ -4,23 +4,13 @@ import threading
 import time
 from typing import Any, Final
 
+import moving_cart
 from soap_devices import Device, abstract, messages, operation, wsdl
 
 _NAMES: Final = ("GetState", "Drive", "Stop")
-MAP: Final = """
-[motion.state]
-read = "POST /winchPort/GetState"
-[motion.state.axes]
-x = { at = "/X", limits = [-1000, 1000], tolerance = 0.01 }
-[motion.velocity]
-send = "POST /winchPort/Drive"
-body = { Ahead = "{ahead}" }
-tolerance = 0.08
-[motion.velocity.axes]
-ahead = { limits = [-0.5, 0.5], of = "x" }
-[motion.stop]
-send = "POST /winchPort/Stop"
-"""
+MAP = moving_cart.MAP.replace('"/x"', '"/X"').replace('{ ahead = "{', '{ Ahead = "{')
+for _way, _name in (("GET /state", "GetState"), ("PUT /velocity", "Drive"), ("POST /stop", "Stop")):
+    MAP = MAP.replace(_way, f"POST /winchPort/{_name}")
 
 
 def _message(name: str, inside: str = "") -> str:

@@ -2,15 +2,14 @@
 
 import html
 import json
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import psutil
 import pytest
 from echoing_device import ENCODINGS, EchoingService, echoing_device, leaks
+from processes import shown_of
 from soap_devices import serving
 
 from conformance.transport.reach import Trust
@@ -52,19 +51,7 @@ def _measured(kept: Path, out: Path, *words: str) -> tuple[dict, list[str]]:
     """Run a load test; return its result, and all that it said and that a list of processes shows of it."""
     given = [str(kept / word) if word in _SECRETS else word for word in words]
     command = [sys.executable, "-m", "roaas", "load", *given, *_PLAN, "--out", str(out)]
-    seen = dict[int, str]()
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
-        while process.poll() is None:
-            for child in [psutil.Process(process.pid), *psutil.Process(process.pid).children(recursive=True)]:
-                try:
-                    seen[child.pid] = f"{child.cmdline()} {child.environ()}"
-                except psutil.Error:
-                    continue
-            try:
-                process.wait(0.1)
-            except subprocess.TimeoutExpired:
-                continue
-        said = process.stdout.read()
+    said, seen = shown_of(command)
     assert len(seen) >= 4, f"the command, the master, two workers: {said}"
     result = json.loads((out / "latency.json").read_text(encoding="utf-8"))
     return result, [said, *seen.values()]

@@ -2,15 +2,13 @@
 
 import gzip
 import json
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import psutil
 import pytest
 from echoing_device import ENCODINGS, EchoingService, echoing_device, leaks
-from processes import ended
+from processes import ended, shown_of
 from small_device import certified
 from soap_devices import serving
 
@@ -112,19 +110,7 @@ def test_load_and_its_processes(tmp_path, kept, device):
     plan = ["--operation", "GET /tiring", "--rate", "60", "--duration", "1", "--warmup", "0.1", "--processes", "2"]
     words = ["load", f"{device}/openapi.json", *_options(kept), *plan, "--out", tmp_path / "o"]
     command = [sys.executable, "-m", "roaas", *map(str, words)]
-    seen = dict[int, str]()
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
-        while process.poll() is None:
-            for child in [psutil.Process(process.pid), *psutil.Process(process.pid).children(recursive=True)]:
-                try:
-                    seen[child.pid] = f"{child.cmdline()} {child.environ()}"
-                except psutil.Error:
-                    continue
-            try:
-                process.wait(0.1)
-            except subprocess.TimeoutExpired:
-                continue
-        said = process.stdout.read()
+    said, seen = shown_of(command)
     assert len(seen) >= 4, "the command, the master, two workers"
     errors = json.loads((tmp_path / "o" / "latency.json").read_text(encoding="utf-8"))["errors"]
     assert any("$ROAAS_QUERY_KEY" in one["message"] for one in errors), said

@@ -148,7 +148,7 @@ def _said_with(effect: Callable[[Body, Position, float], Position]) -> Change:
 def second_mutants() -> Iterator[tuple[str, Change]]:
     """Yield mutants that treat a second move under way wrongly."""
 
-    def changed(effect: Callable[[Body, Position, float, Callable[[Position, float, float], None]], None]) -> Change:
+    def _driven(effect: Callable[[Body, Position, float, Callable[[Position, float, float], None]], None]) -> Change:
         def change(body: Body) -> None:
             right, aim = body.go, body.aim
 
@@ -174,17 +174,17 @@ def second_mutants() -> Iterator[tuple[str, Change]]:
     def between(body: Body, target: Position, seconds: float, aim: Any) -> None:
         aim({name: (value + body.target[name]) / 2 for name, value in target.items()}, seconds, body.now())
 
-    yield "second-ignored", changed(lambda *_: None)
-    yield "second-queued", changed(later)
-    yield "second-then-first", changed(back)
-    yield "second-between", changed(between)
-    yield "second-stops", changed(lambda body, target, seconds, aim: body.halt(body.now()))
+    yield "second-ignored", _driven(lambda *_: None)
+    yield "second-queued", _driven(later)
+    yield "second-then-first", _driven(back)
+    yield "second-between", _driven(between)
+    yield "second-stops", _driven(lambda body, target, seconds, aim: body.halt(body.now()))
 
 
 def stop_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
     """Yield mutants that do not stop, or not for good."""
 
-    def changed(effect: Callable[[Body, float, Callable[[float], None]], None]) -> Change:
+    def _driven(effect: Callable[[Body, float, Callable[[float], None]], None]) -> Change:
         def change(body: Body) -> None:
             right = body.halt
             body.halt = lambda now: effect(body, now, right)  # type: ignore[method-assign]
@@ -202,7 +202,7 @@ def stop_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
             right(now)
             body.later.append((now + wait_s, lambda due: body.aim(target, 0.5, due)))
 
-        return changed(only_moving(effect))
+        return _driven(only_moving(effect))
 
     def creep(body: Body, now: float, _: Any) -> None:
         here, target = body.at(now), body.target
@@ -216,12 +216,12 @@ def stop_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
         if body.stops % 2 == 0:  # type: ignore[attr-defined]
             right(now)
 
-    yield "stop-held-back", changed(only_moving(_held_back))
-    yield "stop-ignored", changed(only_moving(lambda *_: None))
-    yield "stop-late", changed(only_moving(lambda body, now, right: body.later.append((now + 0.6, right))))
-    yield "stop-half", changed(only_moving(half))
-    yield "stop-creeps", changed(only_moving(creep))
-    yield "stop-one-axis", changed(only_moving(one_axis))
+    yield "stop-held-back", _driven(only_moving(_held_back))
+    yield "stop-ignored", _driven(only_moving(lambda *_: None))
+    yield "stop-late", _driven(only_moving(lambda body, now, right: body.later.append((now + 0.6, right))))
+    yield "stop-half", _driven(only_moving(half))
+    yield "stop-creeps", _driven(only_moving(creep))
+    yield "stop-one-axis", _driven(only_moving(one_axis))
     yield "stop-resumes", then(lambda body: dict(body.target), 0.8)
     yield "stop-goes-home", then(lambda body: dict.fromkeys(axes, 0.0), 0.4)
     yield "stop-goes-back", then(lambda body: dict(body.start), 0.3)
@@ -339,24 +339,27 @@ def action_mutants() -> Iterator[tuple[str, Change]]:
     yield "action-running-as-stopped", said({"running": "stopped"})
 
 
+def _driven(effect: Callable[[Body, Position, float], tuple[Position, float] | None]) -> Change:
+    """Return a mutant that drives at other speeds, or for another time; None: it does not drive."""
+
+    def change(body: Body) -> None:
+        right = body.drive
+
+        def drive(speeds: Position, hold_s: float, now: float) -> None:
+            found = effect(body, speeds, hold_s)
+            if found is not None:
+                right(*found, now)
+
+        body.drive = drive  # type: ignore[method-assign]
+
+    return change
+
+
 def velocity_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
     """Yield mutants that take a velocity wrongly, or do not let go."""
 
-    def changed(effect: Callable[[Body, Position, float], tuple[Position, float] | None]) -> Change:
-        def change(body: Body) -> None:
-            right = body.drive
-
-            def drive(speeds: Position, hold_s: float, now: float) -> None:
-                found = effect(body, speeds, hold_s)
-                if found is not None:
-                    right(*found, now)
-
-            body.drive = drive  # type: ignore[method-assign]
-
-        return change
-
     def times(factor: float, axis: str) -> Change:
-        return changed(lambda body, speeds, hold_s: ({**speeds, axis: factor * speeds[axis]}, hold_s))
+        return _driven(lambda body, speeds, hold_s: ({**speeds, axis: factor * speeds[axis]}, hold_s))
 
     def half(body: Body, speeds: Position, hold_s: float) -> tuple[Position, float]:
         body.drives = getattr(body, "drives", 0) + 1  # type: ignore[attr-defined]
@@ -372,20 +375,23 @@ def velocity_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
         yield f"velocity-fast:{axis}", times(1.3, axis)
         yield f"velocity-mirrored:{axis}", times(-1.0, axis)
         yield f"velocity-ignored:{axis}", times(0.0, axis)
-    yield "velocity-swapped", changed(lambda _, speeds, hold_s: (_swapped(speeds), hold_s))
-    yield "velocity-stop-ignored", changed(lambda _, speeds, hold_s: (speeds, hold_s) if any(speeds.values()) else None)
+    yield "velocity-swapped", _driven(lambda _, speeds, hold_s: (_swapped(speeds), hold_s))
+    yield (
+        "velocity-stop-ignored",
+        _driven(lambda _, speeds, hold_s: (speeds, hold_s) if any(speeds.values()) else None),
+    )
     yield (
         "velocity-stop-creeps",
-        changed(lambda _, speeds, hold_s: (speeds if any(speeds.values()) else dict.fromkeys(axes, 0.15), 60.0)),
+        _driven(lambda _, speeds, hold_s: (speeds if any(speeds.values()) else dict.fromkeys(axes, 0.15), 60.0)),
     )
-    yield "watchdog-none", changed(lambda _, speeds, hold_s: (speeds, 60.0))
-    yield "watchdog-late", changed(lambda _, speeds, hold_s: (speeds, 2.5 * hold_s))
-    yield "watchdog-half", changed(half)
+    yield "watchdog-none", _driven(lambda _, speeds, hold_s: (speeds, 60.0))
+    yield "watchdog-late", _driven(lambda _, speeds, hold_s: (speeds, 2.5 * hold_s))
+    yield "watchdog-half", _driven(half)
     yield "watchdog-asleep", _asleep
     yield "velocities-mixed", _mixed
     yield "resumes-after-stop", _resumed
-    yield "not-renewed", changed(deaf)
-    yield "hold-short", changed(lambda _, speeds, hold_s: (speeds, 0.3 * hold_s))
+    yield "not-renewed", _driven(deaf)
+    yield "hold-short", _driven(lambda _, speeds, hold_s: (speeds, 0.3 * hold_s))
 
 
 def _lapsing(every: int) -> Change:
@@ -488,32 +494,19 @@ def finer_velocity_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
     """Yield mutants that take some velocities wrongly, now and then, or come to rest slowly or not quite."""
     first, second = axes
 
-    def changed(effect: Callable[[Body, Position, float], tuple[Position, float] | None]) -> Change:
-        def change(body: Body) -> None:
-            right = body.drive
-
-            def drive(speeds: Position, hold_s: float, now: float) -> None:
-                found = effect(body, speeds, hold_s)
-                if found is not None:
-                    right(*found, now)
-
-            body.drive = drive  # type: ignore[method-assign]
-
-        return change
-
     def goes_on(when: Callable[[Position], bool]) -> Change:
-        return changed(lambda _, speeds, hold_s: (speeds, 60.0 if when(speeds) else hold_s))
+        return _driven(lambda _, speeds, hold_s: (speeds, 60.0 if when(speeds) else hold_s))
 
     def but(axis: str, value: Callable[[float], float]) -> Change:
-        return changed(lambda _, speeds, hold_s: ({**speeds, axis: value(speeds[axis])}, hold_s))
+        return _driven(lambda _, speeds, hold_s: ({**speeds, axis: value(speeds[axis])}, hold_s))
 
     yield (
         "velocity-deadband",
-        changed(lambda _, v, hold_s: ({a: x if abs(x) > 0.17 else 0.0 for a, x in v.items()}, hold_s)),
+        _driven(lambda _, v, hold_s: ({a: x if abs(x) > 0.17 else 0.0 for a, x in v.items()}, hold_s)),
     )
     yield (
         "velocity-half-when-both",
-        changed(lambda _, v, hold_s: ({a: x / 2 for a, x in v.items()} if all(v.values()) else v, hold_s)),
+        _driven(lambda _, v, hold_s: ({a: x / 2 for a, x in v.items()} if all(v.values()) else v, hold_s)),
     )
     for axis in axes:
         yield f"velocity-short-of-least:{axis}", but(axis, lambda x: max(x, -0.35))
@@ -555,7 +548,7 @@ def _swapped(speeds: Position) -> Position:
 def switch_mutants() -> Iterator[tuple[str, Change]]:
     """Yield mutants of a gripper."""
 
-    def changed(effect: Callable[[Body, str, float, Callable[[str, float], None]], None]) -> Change:
+    def _driven(effect: Callable[[Body, str, float, Callable[[str, float], None]], None]) -> Change:
         def change(body: Body) -> None:
             right = body.grip
             body.grip = lambda state, now: effect(body, state, now, right)  # type: ignore[method-assign]
@@ -570,13 +563,13 @@ def switch_mutants() -> Iterator[tuple[str, Change]]:
     def late(body: Body, state: str, now: float, right: Callable[[str, float], None]) -> None:
         body.later.append((now + 1.0, lambda due: right(state, due)))
 
-    yield "grip-ignored", changed(lambda *_: None)
+    yield "grip-ignored", _driven(lambda *_: None)
     yield (
         "grip-late",
-        changed(lambda body, state, now, right: body.later.append((now + 1.0, lambda due: right(state, due)))),
+        _driven(lambda body, state, now, right: body.later.append((now + 1.0, lambda due: right(state, due)))),
     )
-    yield "grip-falls-back", changed(falls_back)
-    yield "grip-one-way", changed(lambda body, state, now, right: right("open", now))
+    yield "grip-falls-back", _driven(falls_back)
+    yield "grip-one-way", _driven(lambda body, state, now, right: right("open", now))
 
 
 def of_arm() -> dict[str, Change]:
