@@ -46,7 +46,6 @@ _MOST_THINGS: Final = 1_000
 # A body of more octets is not remembered, and of a value so many characters are.
 _MOST_OCTETS: Final = 65_536
 _SHOWN: Final = 200
-_MERGE: Final = "application/merge-patch+json"
 # Members of a device that no change of its thing changes; and the fewest characters that no device has by chance.
 _FOR_EVER: Final = re.compile(r"id|uuid|guid|serial|serialnumber|created(?:at|on|time|date)?|creation(?:time|date)")
 _TELLING: Final = 5
@@ -66,7 +65,6 @@ class _Thing:
         made: whether this run created it, and no read has shown it yet.
         body: hash of that of the POST that created it; 0: there was none.
         replaced: whether an equal one was created later, which may be there in its place.
-        cleared: members that a merge patch has removed, with what they were.
         written: what it has to read, by member, with the operation that wrote it.
         shown: the members that were read as written, with how much had been sent by then that may change something.
         differs: how often a member was read in another way.
@@ -81,7 +79,6 @@ class _Thing:
     made: bool = False
     body: int = 0
     replaced: bool = False
-    cleared: dict[str, Any] = field(default_factory=dict)
     written: dict[str, tuple[Any, Operation]] = field(default_factory=dict)
     shown: dict[str, int] = field(default_factory=dict)
     differs: dict[str, int] = field(default_factory=lambda: defaultdict(int))
@@ -176,8 +173,8 @@ class Memory:
     def _changed(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
         """Take a PUT, PATCH or DELETE of an item."""
         last = self._last.pop(path, None)
-        if operation.method != "DELETE" and last is not None and occasion.context.usual:
-            self._last[path] = last[0], last[1] | _sent_of(occasion)
+        if operation.method != "DELETE" and last is not None:
+            self._last[path] = last[0], {}
         if operation.method == "PUT" and occasion.response.status == HTTPStatus.CREATED:
             yield from self._located(occasion, path, path)
             yield from self._defaults(occasion, operation)
@@ -185,12 +182,9 @@ class Memory:
         before = self._things.pop(path.casefold(), None)
         status = occasion.response.status
         overlaps = before is not None and _sent_s(occasion) < before.changed_s
-        if status == HTTPStatus.ACCEPTED or overlaps or not occasion.context.usual:
+        if status == HTTPStatus.ACCEPTED or overlaps or not occasion.context.is_simple:
             return
         thing = _Thing.of(path, occasion.exchange, made=status == HTTPStatus.CREATED)
-        if occasion.request.media_type == _MERGE and last is not None:
-            nulls = [name for name, one in _sent_of(occasion).items() if one is None]
-            thing.cleared = {name: last[0][name] for name in nulls if last[0].get(name) is not None}
         if occasion.request.method == "DELETE":
             thing.gone, thing.own = True, path in self._made
         if status == HTTPStatus.CREATED:
@@ -358,13 +352,7 @@ class Memory:
     def _compared(self, occasion: Occasion, item: Operation, thing: _Thing, age_s: float) -> Iterator[Case]:
         """Judge whether the members of a thing read as they were written."""
         value = read_json(occasion.response.body).value if is_json(occasion.response.media_type) else None
-        names = {plain_name(name) for name in (*thing.written, *thing.cleared)}
-        now = represented(value, names)
-        for name, was in thing.cleared.items():
-            other = f"{shown(was)} as {name}" if now.get(name) == was and was != _default(item, name) else ""
-            expected = f"no {name}, which {thing.change} removed by null (RFC 7396 2)"
-            if other:
-                yield self._case("written-is-read", occasion, expected, other, cause=f"{item.label} {name} null")
+        now = represented(value, {plain_name(name) for name in thing.written})
         for name, (wanted, operation) in thing.written.items() if now else ():
             schema = operation.bodies[next(iter(operation.bodies))].schema
             other = next(differences({name: wanted}, now, schema, item.shape, self._collections), "")
@@ -396,11 +384,6 @@ def _read_only(item: Operation) -> frozenset[str]:
     inner = [flat(one).get("properties", {}) for one in outer.values() if isinstance(one, dict)]
     parts = [(name, one) for part in (outer, *inner) for name, one in part.items() if isinstance(one, dict)]
     return frozenset(name for name, one in parts if flat(one).get("readOnly"))
-
-
-def _default(item: Operation, name: str) -> Any:
-    part = flat(item.shape or {}).get("properties", {}).get(name)
-    return flat(part).get("default") if isinstance(part, dict) else None
 
 
 def _sent_of(occasion: Occasion) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from conformance.checkers.memory import Memory
 from conformance.checkers.occasion import Occasion
 from conformance.checkers.resources import Resources
 from conformance.checkers.texts import Texts
+from conformance.checkers.writes import Writes
 from conformance.contract.pack import Contract
 from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
 from conformance.verdict.case import Case
@@ -37,14 +38,16 @@ class RestCheckers:
         self._contract, self._base_url = contract, base_url
         self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
         # These know what the run has shown so far.
-        self._memory = Memory(contract)
+        self._memory, self._writes = Memory(contract), Writes(contract)
         self._over_time = (
             conditional.Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
+            self._writes,
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:
         """Forget what may have been changed by a request of which nobody knows what it did."""
         self._memory.forget(deletes=deletes)
+        self._writes.forget()
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Yield the cases of one exchange; none if it went to another interface."""

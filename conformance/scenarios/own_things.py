@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -13,18 +14,19 @@ from conformance.api.rest.inputs import Inputs, usual_inputs, whole_body, writte
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import another, collection_of, identified, is_devices, path_chosen
+from conformance.api.rest.things import another, collection_of, identified, path_chosen
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation
 from conformance.documents.json_schema import Schema
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json, operations_of
-from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.resources import resources_of
 from conformance.scenarios.living import ABSENT
 from conformance.scenarios.neighbours import NO_TAG
 from conformance.scenarios.scenario import scenario
+from conformance.scenarios.singletons import is_changeable, is_free
+from conformance.scenarios.special_bodies import TEXTS, special_bodies, with_owned
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey, Surveyor
 from conformance.scenarios.writing import Writer, members
@@ -32,15 +34,12 @@ from conformance.transport.exchange import Exchange, NoAnswerError, NotPermitted
 from conformance.transport.reach import is_same, joined, path_of
 
 _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
-# With an umlaut, a combining mark and a character beyond the Basic Multilingual Plane.
-_TEXT: Final = "Zo\u00eb e\u0301 \U0001f916"
 # So many members of a resource are written one by one.
 _MEMBERS: Final = 6
-# So many members are removed by null, where a patch may; the turn of an identifier that no other check chooses.
-_NULLS, _TURN = 2, 98
+# The turn of an identifier that no other check chooses.
+_TURN: Final = 98
 # So many are written one by one after all together, which shows whether the others stay.
 _SINGLES: Final = 4
-_MERGE: Final = "application/merge-patch+json"
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
@@ -94,7 +93,7 @@ def created_path(surveyor: Surveyor, create: Operation, read: Operation) -> str:
     whole = whole_body(create, surveyor.values)[1]
     whole = whole if isinstance(whole, dict) else usual[0].body
     whole = _with_texts(create, whole) or whole
-    owned = _with_owned(create, read, whole) or (whole if isinstance(whole, dict) else None)
+    owned = with_owned(create, read, whole) or (whole if isinstance(whole, dict) else None)
     for inputs in (*(replace(usual[0], body=one) for one in (owned, body) if one), *usual):
         made = surveyor.send(create, Variation(Kind.AGAIN, "", "", inputs))
         if made.ok:
@@ -178,32 +177,24 @@ class _Thing:
                 if self.sent(change, body, *self._current()).ok:
                     self.get()
             for body in self._special(change):
-                if self.sent(change, body, *self._current()).ok:
-                    self.get()
+                self.sent(change, body, *self._current(), place="body")
+                self.get()
 
-    def _special(self, change: Operation) -> list[Any]:
-        """Return bodies with other values for what the device sets itself, and with null for what may be removed."""
-        media_type, now = next(iter(change.bodies), ""), members(self.last, ()) if self.last is not None else {}
-        usual = usual_inputs(change, self.surveyor.values)[0].body
-        if not is_json(media_type) or not isinstance(usual, dict):
-            return []
-        base = {} if change.method == "PATCH" else usual
-        parts, found = flat(change.bodies[media_type].schema).get("properties", {}), []
-        found += [body] if (body := _with_owned(change, self.read, base)) else []
-        needed = flat(self.read.shape or {}).get("required", ())
-        nulls = [
-            name
-            for name, one in now.items()
-            if one is not None
-            and name in parts
-            and name not in needed
-            and not is_devices(name, parts[name], frozenset())
-        ]
-        if media_type.startswith(_MERGE):
-            found += [{name: None} for name in nulls[:_NULLS]]
-        elif change.method == "PATCH":
-            found += [{name: None} for name in nulls[:_NULLS] if fits(parts[name], None)]
-        return found
+    def _special(self, change: Operation) -> Iterator[Any]:
+        """Yield bodies with other values for what the device sets itself, with what is left out, null or wrong."""
+        media_type, values = next(iter(change.bodies), ""), self.surveyor.values
+        if not is_json(media_type) or self.last is None:
+            return
+        parts = flat(change.bodies[media_type].schema).get("properties", {})
+        single = not self.read.parameter("path")
+
+        def may(name: str) -> bool:
+            return not single or is_changeable(name, parts.get(name, {}), values.collections)
+
+        if not single or is_free(change, self.read.template):
+            yield from special_bodies(
+                change, self.read, lambda: members(self.last, parts) if self.last else {}, values, may
+            )
 
     def _current(self) -> tuple[tuple[str, str], ...]:
         """Return If-Match with its entity tag; a weak one matches none (RFC 9110 13.1.1)."""
@@ -243,27 +234,6 @@ class _Thing:
         return [*found[:_MEMBERS], *([whole] if found and fits(schema, whole) else [])]
 
 
-def _with_owned(change: Operation, read: Operation, body: Any) -> dict[str, Any] | None:
-    """Return a body with values for what the schemas mark as the device's; None where they do not allow it."""
-    media_type = next(iter(change.bodies), "")
-    if not is_json(media_type) or not isinstance(body, dict):
-        return None
-    schema = change.bodies[media_type].schema
-    shown = flat(read.shape or {}).get("properties", {})
-    own = {name: _own_value(one) for name, one in shown.items() if isinstance(one, dict) and flat(one).get("readOnly")}
-    identifying = {plain_name(one.name) for one in read.parameter("path")} | {"id"}
-    own = {name: one for name, one in own.items() if one is not None and plain_name(name) not in identifying}
-    changed = {**body, **own}
-    return changed if own and fits(schema, changed) else None
-
-
-def _own_value(schema: Schema) -> Any:
-    """Return a value that a device hardly gives itself; None for what has few values."""
-    given = flat(schema)
-    candidates: tuple[Any, ...] = ("2001-02-03T04:05:06Z", "2001-02-03", "roaas-own", 987_653, 98_765.25)
-    return None if "enum" in given else next((one for one in candidates if fits(schema, one)), None)
-
-
 def _with_texts(create: Operation, body: Any) -> Any:
     """Return a JSON object with texts beyond ASCII in the place of its texts; None where that is none."""
     media_type = next(iter(create.bodies), "")
@@ -277,11 +247,9 @@ def _with_texts(create: Operation, body: Any) -> Any:
 def _texts(schema: Schema, value: dict[str, Any]) -> dict[str, str]:
     """Return a text beyond ASCII for each free text of an object."""
     parts = flat(schema).get("properties", {})
-    return {
-        name: _TEXT
-        for name, one in value.items()
-        if isinstance(one, str) and name in parts and is_free_text(parts[name]) and fits(parts[name], _TEXT)
-    }
+    free = [name for name, one in value.items() if isinstance(one, str) and name in parts and is_free_text(parts[name])]
+    found = {name: next((text for text in TEXTS if fits(parts[name], text)), "") for name in free}
+    return {name: text for name, text in found.items() if text}
 
 
 def _is_beyond_ascii(body: dict[str, Any]) -> bool:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.api.rest.inputs import usual_inputs
-from conformance.api.rest.invalid_variations import invalid_variations
-from conformance.api.rest.variations import Kind as Variety
 from conformance.documents.openapi import Operation
-from conformance.documents.representation import flat
 from conformance.scenarios.living import ABSENT, Kind, Living, Look, State, Thing
+from conformance.scenarios.special_bodies import half_valid
 from conformance.scenarios.writing import members
 from conformance.transport.exchange import Exchange
 
@@ -33,20 +30,11 @@ def is_refused(exchange: Exchange) -> bool:
     return status in _ERRORS and status not in _UNCLEAR
 
 
-def half_valid(living: Living, operation: Operation, turn: int, now: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield bodies with new valid values and one that the description forbids: of the last member, and of the first."""
+def _half_valid(living: Living, operation: Operation, turn: int, now: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield bodies with new valid values and one that the description forbids."""
     valid = next(iter(living.writer.bodies(operation, turn, now)), None)
-    inputs = usual_inputs(operation, living.writer.values)[0]
-    if valid is None:
-        return
-    names = list(flat(operation.bodies[inputs.media_type].schema).get("properties", {}))
-    ordered = {name: valid[name] for name in sorted(valid, key=lambda one: names.index(one) if one in names else 0)}
-    by_place: dict[str, Any] = {}
-    for one in invalid_variations(operation, replace(inputs, body=ordered)):
-        if one.kind is Variety.INVALID and isinstance(one.inputs.body, dict):
-            by_place.setdefault(one.place, one.inputs.body)
-    wrong = [by_place[f"body /{name}"] for name in ordered if f"body /{name}" in by_place]
-    yield from {id(one): one for one in (wrong[-1:] + wrong[:1])}.values()
+    if valid is not None:
+        yield from half_valid(operation, usual_inputs(operation, living.writer.values)[0], valid)
 
 
 def refuse_changes(living: Living, change: Operation, thing: Thing, turn: int) -> None:
@@ -55,7 +43,7 @@ def refuse_changes(living: Living, change: Operation, thing: Thing, turn: int) -
     valid = next(iter(writer.bodies(change, turn, members(thing.last, ()))), None)
     if valid is not None:
         _look(living, thing, change, writer.send(change, thing.path, valid, media_type=_TEXT))
-    for body in half_valid(living, change, turn + _STEP, members(thing.last, ())):
+    for body in _half_valid(living, change, turn + _STEP, members(thing.last, ())):
         _look(living, thing, change, writer.send(change, thing.path, body))
 
 
@@ -77,7 +65,7 @@ def _look(living: Living, thing: Thing, operation: Operation, sent: Exchange) ->
 
 def refuse_creation(living: Living, create: Operation, turn: int) -> None:
     """Send a creation that should be refused, and look in the list for what it asks for."""
-    body = next(half_valid(living, create, turn, {}), None)
+    body = next(_half_valid(living, create, turn, {}), None)
     if body is None or living.lister is None or living.listing is None or not living.things:
         return
     sent = living.writer.send(create, "", body)

@@ -62,13 +62,18 @@ def singletons(writer: Writer, operations: Mapping[tuple[str, str], Operation]) 
         write = operations.get(("PUT", path)) or operations.get(("PATCH", path))
         if method != "GET" or read.parameter("path") or write is None or not write.bodies:
             continue
-        if write.motion or words_of(path) & _CONNECTING or len(lives) >= _RESOURCES:
+        if not is_free(write, path) or len(lives) >= _RESOURCES:
             continue
         writer.api.run.limit.check()
         with writer.api.run.limit.lifted(), suppress(NoAnswerError):  # the survey tells what breaks a connection
             if writes := _written(writer, read, write):
                 lives.append(Life("", read.label, writes[0].sent, writes[0].found, writes=tuple(writes)))
     return lives
+
+
+def is_free(write: Operation, path: str) -> bool:
+    """Return whether a client may write a resource freely: that moves nothing, and the device stays reachable."""
+    return not (write.motion or words_of(path) & _CONNECTING)
 
 
 def _written(writer: Writer, read: Operation, write: Operation) -> list[Write]:
@@ -88,7 +93,7 @@ def _written(writer: Writer, read: Operation, write: Operation) -> list[Write]:
     chosen = {
         name: list(values_of(parts[name], first[name], writer.values.collections))
         for name in first
-        if _is_changeable(name, parts[name], writer)
+        if is_changeable(name, parts[name], writer.values.collections)
     }
     effort, found, first_time = writer.api.run.effort, list[Write](), list[Write]()
     few = _FEW_MEMBERS if effort.name == "quick" or effort.slow else _MEMBERS
@@ -157,10 +162,10 @@ def _write(writer: Writer, read: Operation, write: Operation, body: Any, before:
     return [done, writer.read_back(write, read, "", sent, before=before, fresh=True)]
 
 
-def _is_changeable(name: str, schema: Schema, writer: Writer) -> bool:
+def is_changeable(name: str, schema: Schema, collections: frozenset[str]) -> bool:
     """Return whether a client may write other values of a member, and still reaches the device."""
     words = {*words_of(name), plain_name(name)}
-    return not (words & (_CONNECTING | HARMFUL) or is_devices(name, schema, writer.values.collections))
+    return not (words & (_CONNECTING | HARMFUL) or is_devices(name, schema, collections))
 
 
 def values_of(schema: Schema, first: Any, collections: frozenset[str]) -> Iterator[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -66,10 +67,18 @@ class RequestContext:
     @cached_property
     def usual(self) -> bool:
         """Whether nothing in it but parameters and body could be a reason to refuse it."""
+        return self._has_only(_USUAL_FIELDS)
+
+    @cached_property
+    def is_simple(self) -> bool:
+        """Whether it is usual but for a condition, which held if the response is a success."""
+        return self._has_only(_USUAL_FIELDS | _CONDITIONS)
+
+    def _has_only(self, fields: Collection[str]) -> bool:
         names = [name.lower() for name, value in self.request.headers if not is_shown(value)]
         return (
             self.request.raw is None
-            and set(names) <= _USUAL_FIELDS
+            and set(names) <= set(fields)
             and names.count("host") == 1
             and self.request.size - len(self.request.body) < _USUAL_OCTETS
         )

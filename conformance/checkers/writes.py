@@ -1,0 +1,343 @@
+"""What a write makes of a resource, by its method and media type: the read after it is compared with the one before.
+
+PUT replaces: what it leaves out has its default. A merge patch changes members and removes by null (RFC 7396). A JSON
+patch does all its operations, or none (RFC 6902). What is refused changes nothing. Only a read, one write and a read
+with nothing between them count, and members that change by themselves do not.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from http import HTTPStatus
+from typing import Any, Final, NamedTuple
+
+from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, merged, partly_patched, patched, same
+from conformance.api.rest.references import collections_of
+from conformance.api.rest.things import differences, is_devices, is_shared, represented
+from conformance.checkers.occasion import Occasion
+from conformance.contract.pack import Contract
+from conformance.documents.json_schema import Schema, is_number, kinds_of
+from conformance.documents.json_text import read_json, shown
+from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
+from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
+from conformance.verdict.case import Case
+
+_REFUSED: Final = range(400, 500)
+# A proxy may have sent 408 after the device has acted; 406 is about the response.
+_UNCLEAR: Final = frozenset({HTTPStatus.NOT_ACCEPTABLE, HTTPStatus.REQUEST_TIMEOUT})
+_NOT_NOW: Final = HTTPStatus.ACCEPTED
+_MOST: Final = 1_000
+_MOST_OCTETS: Final = 65_536
+# What looks like a habit of the device counts when it is seen by so many requests.
+_SEEN: Final = 2
+# Whole numbers beyond this have no double of their own (RFC 8259 6).
+_EXACT: Final = 2**53
+_READ, _KEPT, _DEFAULTS = (f"description/{name}" for name in ("written-is-read", "refused-keeps", "defaults"))
+
+
+class _State(NamedTuple):
+    """What a read has shown, and when it came, s of the monotonic clock."""
+
+    members: dict[str, Any]
+    at_s: float
+
+
+class _Change(NamedTuple):
+    """A write between two reads, as it is judged by the second one."""
+
+    write: Occasion
+    operation: Operation
+    before: dict[str, Any]
+    now: dict[str, Any]
+    moving: frozenset[str]
+
+    @property
+    def sent(self) -> Any:
+        """The JSON value of its body."""
+        return read_json(self.write.request.body).value
+
+    @property
+    def schema(self) -> Schema:
+        """The schema of its body."""
+        return self.operation.bodies[self.write.request.media_type].schema
+
+    @property
+    def label(self) -> str:
+        """The request in words."""
+        return f"{self.operation.label} with status {self.write.response.status}"
+
+    def is_settled(self, name: str, names: Any) -> bool:
+        """Return whether the device has acted by the second read, which a device that acts later has not.
+
+        Its response shows the member as that read does, or another member of the request has changed.
+        """
+        response = self.write.response
+        answer = read_json(response.body).value if is_json(response.media_type) else None
+        told = represented(answer, {plain_name(one) for one in self.now})
+        is_told = bool(told) and same(told.get(name), self.now.get(name)) and len(told) > 1
+        return is_told or any(
+            not same(self.now.get(one), self.before.get(one)) for one in names if one != name and one not in self.moving
+        )
+
+
+class Writes:
+    """Judges each read that follows one write of the same resource.
+
+    Args:
+        contract: the description's.
+    """
+
+    def __init__(self, contract: Contract) -> None:
+        operations = operations_of(contract) if contract.openapi_path else ()
+        written = {one.template for one in operations if one.method in {"PUT", "PATCH"}}
+        self._reads = {one.template: one for one in operations if one.method == "GET" and one.template in written}
+        self._collections = collections_of(operations)
+        self._states: dict[str, _State] = {}
+        self._writes: dict[str, list[Occasion]] = defaultdict(list)
+        self._moving: set[tuple[str, str]] = set()
+        # What may be chance: by operation and member, the bodies that showed it.
+        self._doubts: dict[tuple[str, str], set[bytes]] = defaultdict(set)
+        self._precise: set[tuple[str, str]] = set()
+
+    def forget(self) -> None:
+        """Forget all reads: something else may have changed the resources."""
+        self._states.clear()
+        self._writes.clear()
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        request, status = occasion.request, occasion.response.status
+        operation, path = occasion.operation, occasion.context.target
+        item = self._reads.get(operation.template) if operation is not None else None
+        if request.method in SAFE:
+            if request.method == "GET" and status == HTTPStatus.OK and item is not None and "?" not in path:
+                yield from self._read(occasion, item, path)
+            return
+        if status in _REFUSED and status not in _UNCLEAR:
+            if item is not None and path in self._states:
+                self._writes[path].append(occasion)
+            return
+        state = self._states.get(path) if item is not None else None
+        writes = self._writes.get(path, [])
+        self.forget()
+        if state is not None and occasion.response.ok and request.method in {"PUT", "PATCH"} and request.raw is None:
+            self._states[path], self._writes[path] = state, [*writes, occasion]
+
+    def _read(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
+        response = occasion.response
+        value = read_json(response.body).value if is_json(response.media_type) and not response.cut else None
+        now = represented(value, {plain_name(name) for name in _parts(item.shape)})
+        state, writes = self._states.pop(path, None), self._writes.pop(path, [])
+        sent_s = response.received_s - response.elapsed_ms / 1000
+        if state is not None and state.at_s <= sent_s and len(response.body) <= _MOST_OCTETS:
+            names = {*now, *state.members}
+            if not writes:
+                self._moving |= {
+                    (item.template, one) for one in names if not same(now.get(one), state.members.get(one))
+                }
+            write = writes[0] if len(writes) == 1 else None
+            if write is not None and state.at_s <= _sent_s(write) and write.response.received_s <= sent_s:
+                moving = frozenset(one for one in names if (item.template, one) in self._moving)
+                yield from self._judged(occasion, item, write, state.members, now, moving)
+        if len(self._states) < _MOST:
+            self._states[path] = _State(now, response.received_s)
+
+    def _judged(
+        self,
+        occasion: Occasion,
+        item: Operation,
+        write: Occasion,
+        before: dict[str, Any],
+        now: dict[str, Any],
+        moving: frozenset[str],
+    ) -> Iterator[Case]:
+        operation, request = write.operation, write.request
+        is_readable = is_json(request.media_type) and len(request.body) <= _MOST_OCTETS
+        if operation is None or request.media_type not in operation.bodies or not is_readable or not now:
+            return
+        change = _Change(write, operation, before, now, moving)
+        if write.response.status in _REFUSED:
+            yield from self._refused(occasion, change)
+            return
+        if write.response.status == _NOT_NOW:
+            return
+        if JSON_PATCH in request.media_type:
+            yield from self._patched(occasion, change)
+        elif isinstance(change.sent, dict):
+            yield from self._owned(occasion, item, change)
+            # A schema of a merge patch need not say that null removes.
+            if MERGE in request.media_type:
+                yield from self._merged(occasion, item, change)
+            if not write.is_valid:
+                return
+            yield from self._values(occasion, item, change)
+            if request.method == "PUT":
+                yield from self._left_out(occasion, item, change)
+            else:
+                yield from self._others(occasion, item, change)
+
+    def _refused(self, occasion: Occasion, change: _Change) -> Iterator[Case]:
+        """Judge whether a refused request has changed nothing, not even in part."""
+        sent = change.sent
+        if JSON_PATCH in change.write.request.media_type:
+            made = [one for one in partly_patched(change.before, sent) if isinstance(one, dict)]
+        else:
+            made = [sent] if isinstance(sent, dict) else []
+        wrong = ""
+        for name in sorted({name for one in made for name in one} - change.moving):
+            was, now = change.before.get(name), change.now.get(name)
+            if not same(was, now) and any(name in one and same(one[name], now) for one in made):
+                wrong = f"{shown(now)} as {name}, and {shown(was)} before"
+                break
+        expected = f"the members as they were before {change.label}"
+        if made:
+            yield occasion.case(_KEPT, not wrong, expected, wrong, cause=f"{change.operation.label} refused")
+
+    def _patched(self, occasion: Occasion, change: _Change) -> Iterator[Case]:
+        """Judge a JSON patch that was accepted."""
+        operations = change.sent
+        try:
+            made = patched(change.before, operations)
+        except PatchError as error:
+            expected = f"a refusal of the whole patch, because an operation of it fails: {error}"
+            found = f"status {change.write.response.status}"
+            cause = f"{change.operation.label} {str(error).partition(' ')[0]}"
+            # What moves may have had the value at that moment.
+            if not change.moving & {str(error).rpartition("/")[2]}:
+                yield Case(False, change.write.exchange, expected, found, cause, requirement=_KEPT)  # noqa: FBT003
+            return
+        yield Case(True, change.write.exchange, "a patch applied as a whole", requirement=_KEPT)  # noqa: FBT003
+        touched = [name for name in made if isinstance(made, dict) and not same(made[name], change.before.get(name))]
+        for name in touched:
+            kept, is_same = change.now.get(name), same(change.now.get(name), change.before.get(name))
+            far = not same(kept, made[name]) and (isinstance(kept, list) or is_same)
+            if name not in change.moving and name in change.now:
+                wrong = f"{shown(kept)} as {name}" if far and (not is_same or change.is_settled(name, touched)) else ""
+                expected = f"{shown(made[name])} as {name}, as {change.label} asked for (RFC 6902)"
+                yield occasion.case(_READ, not wrong, expected, wrong, cause=f"{change.operation.label} {name} patch")
+
+    def _owned(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
+        """Judge whether the request has not written what is the device's."""
+        for name, value in change.sent.items():
+            parts = (_parts(change.schema).get(name), _parts(item.shape).get(name))
+            if name in change.now and any(isinstance(one, dict) and flat(one).get("readOnly") for one in parts):
+                was, now = change.before.get(name), change.now[name]
+                is_taken = same(now, value) and not same(was, value) and name not in change.moving
+                if is_taken and len(str(value)) < 5:  # noqa: PLR2004 - characters: the device may come to it by itself
+                    self._doubts[change.operation.label, name].add(change.write.request.body)
+                    is_taken = len(self._doubts[change.operation.label, name]) >= _SEEN
+                expected = f"{name}, which is readOnly, as the device gave it"
+                found = f"{shown(now)} as {name}, and {shown(was)} before"
+                yield occasion.case(_READ, not is_taken, expected, found, cause=f"{item.label} {name}")
+
+    def _values(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
+        """Judge values that were taken, but not as they were sent: without fraction, rounded, in another order."""
+        parts, shape = _parts(change.schema), _parts(item.shape)
+        for name, value in change.sent.items():
+            part = flat(parts.get(name, {}))
+            if name not in change.now or name in change.moving or is_devices(name, part, self._collections):
+                continue
+            now, key = change.now[name], (change.operation.label, name)
+            wrong = ""
+            if is_number(value) and is_number(now) and "number" in kinds_of(part) and not float(value).is_integer():
+                kept = not float(now).is_integer() or float(part.get("multipleOf", 0.5)).is_integer()
+                self._precise |= {key} if kept else set()
+                if (
+                    not kept
+                    and abs(now - value) < 1
+                    and key not in self._precise
+                    and "integer" not in kinds_of(shape.get(name, {}))
+                ):
+                    self._doubts[key].add(str(value).encode())
+                    wrong = f"{shown(now)} as {name}" if len(self._doubts[key]) >= _SEEN else ""
+            elif isinstance(value, int) and isinstance(now, int) and abs(value) > _EXACT:
+                wrong = f"{now} as {name}" if 0 < abs(now - value) <= abs(value) >> 52 else ""
+            elif isinstance(value, list) and isinstance(now, list) and not same(now, change.before.get(name)):
+                wrong = self._items(name, value, now, part)
+            else:
+                continue
+            expected = f"{shown(value)} as {name}, as {change.label} wrote it"
+            yield occasion.case(_READ, not wrong, expected, wrong, cause=f"{change.operation.label} {name} value")
+
+    def _items(self, name: str, value: list[Any], now: list[Any], part: Schema) -> str:
+        """Return what differs in a list: its length, the order of its numbers, or the members of its objects."""
+        inner = flat(part["items"]) if isinstance(part.get("items"), dict) else {}
+        if all(isinstance(one, dict) for one in (*value, *now)):
+            if len(value) != len(now):
+                return f"{len(now)} items in {name} in place of {len(value)}"
+            for one, other in zip(value, now, strict=True):
+                if text := next(differences(one, other, inner, None, self._collections), ""):
+                    return f"{text} in an item of {name}"
+        is_plain = all(map(is_number, (*value, *now))) and not part.get("uniqueItems")
+        is_other = is_plain and len(value) == len(now) and sorted(value) == sorted(now) and value != now
+        is_fewer = is_plain and len(now) < len(value) and set(value) == set(now)
+        return f"{shown(now)} as {name}" if is_other or is_fewer else ""
+
+    def _left_out(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
+        """Judge whether what a PUT leaves out has its declared default."""
+        for name, part in _parts(change.schema).items():
+            given = flat(part) if isinstance(part, dict) else {}
+            if name in change.sent or "default" not in given or name not in change.before or given.get("readOnly"):
+                continue
+            if is_devices(name, given, self._collections) or is_shared(name) or name in change.moving:
+                continue
+            was, now, default = change.before[name], change.now.get(name), given["default"]
+            if same(was, default):
+                continue
+            is_kept = same(now, was) and change.is_settled(name, change.sent)
+            expected = f"{shown(default)} as {name}, the default of what {change.label} left out"
+            found = f"{shown(now)} as {name}, as before"
+            yield occasion.case(_DEFAULTS, not is_kept, expected, found, cause=f"{item.label} {name}")
+
+    def _merged(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
+        """Judge whether a merge patch removes by null, merges objects and replaces lists (RFC 7396)."""
+        for name, value in change.sent.items():
+            was, now = change.before.get(name), change.now.get(name)
+            if was is None or name in change.moving or (value is not None and name not in change.now):
+                continue
+            wrong, expected = "", f"{name} as {change.label} asked for (RFC 7396 2)"
+            if value is None:
+                default = flat(_parts(item.shape).get(name) or {}).get("default")
+                expected = f"no {name}, which {change.label} removed by null (RFC 7396 2)"
+                is_kept = same(now, was) and not same(was, default)
+                wrong = f"{shown(was)} as {name}" if is_kept and change.is_settled(name, change.sent) else ""
+            elif isinstance(value, dict) and isinstance(was, dict) and isinstance(now, dict):
+                made = merged(was, value)
+                lost = [one for one in was if one in made and one not in value and now.get(one) is None is not was[one]]
+                kept = [one for one in value if value[one] is None and one in was and same(now.get(one), was[one])]
+                kept = kept if any(not same(now.get(one), was.get(one)) for one in value) else []
+                wrong = f"no {lost[0]} in {name}" if lost else f"{kept[0]} in {name}" if kept else ""
+            elif isinstance(value, list) and isinstance(was, list) and isinstance(now, list) and was:
+                is_added = len(now) > len(value) and len(now) >= len(was) and all(one in now for one in (*was, *value))
+                wrong = f"{shown(now)} as {name}" if is_added and not same(was, now) else ""
+            else:
+                continue
+            yield occasion.case(_READ, not wrong, expected, wrong, cause=f"{item.label} {name} merge")
+
+    def _others(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
+        """Judge whether a patch keeps what it does not name: two bodies that reset other members are no chance."""
+        parts, label = _parts(change.schema), change.operation.label
+        for name in change.before.keys() & parts.keys() - change.sent.keys() - change.moving:
+            was, now, given = change.before[name], change.now.get(name), flat(parts[name])
+            if was is None or is_devices(name, given, self._collections) or is_shared(name):
+                continue
+            default = flat(_parts(item.shape).get(name) or {}).get("default", given.get("default"))
+            is_reset = not same(was, now) and (now is None or same(now, default) or now in ("", [], {}, 0, False))
+            if is_reset:
+                self._doubts[label, f"{name} reset"].add(change.write.request.body)
+                if len(self._doubts[label, f"{name} reset"]) >= _SEEN:
+                    expected = f"{shown(was)} as {name}, which {change.label} does not name"
+                    yield occasion.case(_READ, False, expected, f"{shown(now)} as {name}", cause=f"{label} {name} kept")  # noqa: FBT003
+
+
+def _parts(schema: Schema | None) -> Mapping[str, Any]:
+    """Return the members of a schema, or of the object in its envelope that has the most."""
+    outer = flat(schema or {}).get("properties", {})
+    inner = [flat(one).get("properties", {}) for one in outer.values() if isinstance(one, dict)]
+    return max(inner, key=len) if len(outer) == 1 and inner and inner[0] else outer
+
+
+def _sent_s(occasion: Occasion) -> float:
+    return occasion.response.received_s - occasion.response.elapsed_ms / 1000

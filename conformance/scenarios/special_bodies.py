@@ -1,0 +1,224 @@
+"""Bodies that show what a write makes of a resource: what is left out, null, one wrong member, and patches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any, Final
+
+from conformance.api.rest.inputs import Inputs, usual_inputs
+from conformance.api.rest.invalid_variations import invalid_variations
+from conformance.api.rest.patches import JSON_PATCH, MERGE
+from conformance.api.rest.references import is_free_text
+from conformance.api.rest.samples import alike_and_apart, fits
+from conformance.api.rest.things import another, is_devices
+from conformance.api.rest.values import Values
+from conformance.api.rest.variations import Kind
+from conformance.documents.json_schema import Schema, is_number, kinds_of
+from conformance.documents.openapi import Operation
+from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
+
+#: With an umlaut, a combining mark, a character beyond the Basic Multilingual Plane, and what other formats escape.
+TEXTS: Final = ('Zo\u00eb e\u0301 \U0001f916 a+b & %41 \\ "', "Zo\u00eb e\u0301 \U0001f916")
+# Parts of numbers that are no whole ones: of each member several are sent. An integer that is no double.
+_PARTS: Final = (0.375, 0.5, 0.25, 0.1)
+_BEYOND_DOUBLES: Final = 2**53 + 1
+# So many members are removed by null, where a patch may.
+_NULLS: Final = 2
+_TIME: Final = "2026-02-{:02}T12:00:00+02:00"
+
+
+def special_bodies(
+    change: Operation, read: Operation, now: Callable[[], dict[str, Any]], values: Values, may: Callable[[str], bool]
+) -> Iterator[Any]:
+    """Yield bodies for a write, each to be followed by a read; the last one restores what was there.
+
+    Args:
+        change: the write.
+        read: the read.
+        now: returns the members that were last read.
+        values: those that the run knows.
+        may: returns whether a member of this name may get another value.
+    """
+    usual, first = usual_inputs(change, values)[0], now()
+    schema = change.bodies[usual.media_type].schema
+    shown = _parts(read.shape or {})
+    if JSON_PATCH in usual.media_type:
+        yield from _patches(schema, shown, now, values, may)
+        return
+    if not isinstance(usual.body, dict):
+        return
+    if owned := with_owned(change, read, {} if change.method == "PATCH" else usual.body):
+        yield owned
+    parts = _parts(schema)
+    there = {name: one for name, one in first.items() if name in parts and not parts[name].get("readOnly")}
+    there = {name: one for name, one in there.items() if fits(parts[name], one)}
+    changed = {name: one for name, one in telling(schema, there, 1, values.collections).items() if may(name)}
+    if change.method == "PUT":
+        base = {**usual.body, **there}
+        yield from half_valid(change, usual, {**base, **changed})
+        yield from _replacing(schema, base, changed, values, may)
+        return
+    if MERGE in usual.media_type:
+        yield from _nulls(parts, read, now, values, may)
+    else:
+        needed = flat(read.shape or {}).get("required", ())
+        nulls = [name for name in there if name not in needed and there[name] is not None and may(name)]
+        yield from ({name: None} for name in nulls[:_NULLS] if fits(parts[name], None))
+    yield from half_valid(change, usual, changed)
+    restored = {name: one for name, one in there.items() if now().get(name) != one}
+    if restored and fits(schema, restored):
+        yield restored
+
+
+def _replacing(
+    schema: Schema, base: dict[str, Any], changed: dict[str, Any], values: Values, may: Callable[[str], bool]
+) -> Iterator[dict[str, Any]]:
+    """Yield bodies of PUT with other values of all members, with the required members alone, and as it was before."""
+    if fits(schema, {**base, **changed}):
+        yield {**base, **changed}
+        least = {name: base[name] for name in base if name in flat(schema).get("required", ())}
+        other = telling(schema, least, 2, values.collections)
+        least |= {name: one for name, one in other.items() if may(name)}
+        left_out = [flat(one) for name, one in _parts(schema).items() if name not in least]
+        if any("default" in one for one in left_out) and fits(schema, least):
+            yield least
+    if fits(schema, base):
+        yield base
+
+
+def half_valid(change: Operation, usual: Inputs, valid: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield valid bodies with one value that the description forbids: of the last member, and of the first."""
+    names = list(flat(change.bodies[usual.media_type].schema).get("properties", {}))
+    ordered = {name: valid[name] for name in sorted(valid, key=lambda one: names.index(one) if one in names else 0)}
+    by_place: dict[str, Any] = {}
+    for one in invalid_variations(change, replace(usual, body=ordered)):
+        if one.kind is Kind.INVALID and isinstance(one.inputs.body, dict):
+            by_place.setdefault(one.place, one.inputs.body)
+    wrong = [by_place[f"body /{name}"] for name in ordered if f"body /{name}" in by_place]
+    yield from {id(one): one for one in (wrong[-1:] + wrong[:1])}.values()
+
+
+def telling(schema: Schema, body: dict[str, Any], turn: int, collections: frozenset[str]) -> dict[str, Any]:
+    """Return other values for members of a body that show what a device does not keep: fractions, order, time zones."""
+    parts, found = _parts(schema), another(schema, body, turn, collections)
+    for name in found:
+        given = flat(parts.get(name, {}))
+        if is_devices(name, given, collections):
+            continue
+        usable = (one for one in _telling(given, found[name], turn) if one != body[name] and fits(given, one))
+        value = next(usable, found[name])
+        found[name] = value if fits(schema, {**found, name: value}) else found[name]
+    return found
+
+
+def _telling(schema: Schema, value: Any, turn: int) -> Iterator[Any]:
+    kinds = kinds_of(schema)
+    if is_number(value) and "number" in kinds:
+        for part in (*_PARTS[turn % len(_PARTS) :], *_PARTS):
+            yield from (int(value) + part, int(value) - part)
+    elif is_number(value) and (schema.get("format") == "int64" or schema.get("maximum", 0) >= _BEYOND_DOUBLES):
+        yield _BEYOND_DOUBLES
+    elif isinstance(value, list):
+        apart = alike_and_apart(schema)[1][::-1]
+        yield from ([*apart, *apart[:1]], apart)
+    elif schema.get("format") == "date-time":
+        yield _TIME.format(turn)
+    elif isinstance(value, str) and is_free_text(schema):
+        yield from TEXTS
+
+
+def _nulls(
+    parts: Schema, read: Operation, now: Callable[[], dict[str, Any]], values: Values, may: Callable[[str], bool]
+) -> Iterator[dict[str, Any]]:
+    """Yield merge patches that remove members, each beside another change, and one that changes a part of an object."""
+    needed, there = flat(read.shape or {}).get("required", ()), now()
+    usable = {name: one for name, one in there.items() if name in parts and one is not None and may(name)}
+    own = {name for name in usable if is_devices(name, parts[name], frozenset())}
+    nulls = [name for name in usable if name not in needed and name not in own]
+    for turn, name in enumerate(nulls[:_NULLS]):
+        rest = {one: value for one, value in usable.items() if one != name and one not in own}
+        others = another({"properties": parts}, rest, turn + 3, values.collections)
+        beside = next((one for one in others if others[one] != now().get(one)), None)
+        yield {name: None, **({beside: others[beside]} if beside else {})}
+    for name, value in usable.items():
+        inner = telling(parts[name], value, 1, values.collections) if isinstance(value, dict) else {}
+        changed = [one for one in inner if inner[one] != value[one]]
+        if changed and len(value) > 1:
+            yield {name: {changed[0]: inner[changed[0]]}}
+            yield {name: value}
+            break
+
+
+def _patches(
+    schema: Schema, parts: Schema, now: Callable[[], dict[str, Any]], values: Values, may: Callable[[str], bool]
+) -> Iterator[list[dict[str, Any]]]:
+    """Yield JSON patches: right ones, and ones of which an operation fails at the beginning or at the end."""
+    first = {name: one for name, one in now().items() if name in parts and may(name)}
+    first = {name: one for name, one in first.items() if not is_devices(name, parts[name], values.collections)}
+
+    def replacing(name: str, turn: int) -> dict[str, Any]:
+        other = telling({"properties": {name: parts[name]}}, {name: now().get(name)}, turn, values.collections)
+        return {"op": "replace", "path": _pointer(name), "value": other[name]}
+
+    def testing(name: str, value: Any) -> dict[str, Any]:
+        return {"op": "test", "path": _pointer(name), "value": value}
+
+    names = [
+        name for name in first if replacing(name, 1)["value"] != first[name] and fits(schema, [replacing(name, 1)])
+    ]
+    if not names:
+        return
+    one, last = names[0], names[-1]
+    makers: list[Callable[[], list[dict[str, Any]]]] = [
+        lambda: [testing(one, now().get(one)), replacing(one, 1)],
+        lambda: [testing(last, "roaas"), replacing(one, 2)],
+        lambda: [replacing(one, 2), testing(last, replacing(last, 3)["value"])] if one != last else [],
+        lambda: [replacing(last, 1), {"op": "remove", "path": "/roaas-unknown"}],
+        lambda: [{"op": "copy", "from": _pointer(one), "path": _pointer(last)}] if one != last else [],
+    ]
+    for name, value in first.items():
+        item = alike_and_apart(parts[name])[1] if isinstance(value, list) else []
+        new = next((other for other in item if other not in value), None)
+        if new is not None:
+            makers.append(lambda name=name, new=new: [{"op": "add", "path": f"{_pointer(name)}/-", "value": new}])  # type: ignore[misc] # bound in its round
+    for make in makers:
+        if (patch := make()) and fits(schema, patch):
+            yield patch
+    restored = [{"op": "replace", "path": _pointer(name), "value": first[name]} for name in first]
+    restored = [one for one in restored if now().get(one["path"][1:]) != one["value"] and fits(schema, [one])]
+    if restored:
+        yield restored
+
+
+def _pointer(name: str) -> str:
+    return "/" + name.replace("~", "~0").replace("/", "~1")
+
+
+def with_owned(change: Operation, read: Operation, body: Any) -> dict[str, Any] | None:
+    """Return a body with values for what the schemas mark as the device's; None where they do not allow it."""
+    media_type = next(iter(change.bodies), "")
+    if not isinstance(body, dict):
+        return None
+    schema = change.bodies[media_type].schema
+    shown = {**flat(schema).get("properties", {}), **_parts(read.shape or {})}
+    own = {name: _own_value(one) for name, one in shown.items() if isinstance(one, dict) and flat(one).get("readOnly")}
+    identifying = {plain_name(one.name) for one in read.parameter("path")} | {"id"}
+    own = {name: one for name, one in own.items() if one is not None and plain_name(name) not in identifying}
+    changed = {**body, **own}
+    return changed if own and fits(schema, changed) else None
+
+
+def _own_value(schema: Schema) -> Any:
+    """Return a value that a device hardly gives itself; None for what has few values."""
+    given = flat(schema)
+    candidates: tuple[Any, ...] = ("2001-02-03T04:05:06Z", "2001-02-03", "roaas-own", 987_653, 98_765.25)
+    return None if "enum" in given else next((one for one in candidates if fits(schema, one)), None)
+
+
+def _parts(schema: Schema) -> dict[str, Any]:
+    """Return the members of a schema, or of the object in its envelope."""
+    outer: dict[str, Any] = flat(schema).get("properties", {})
+    inner = [flat(one).get("properties", {}) for one in outer.values() if isinstance(one, dict)]
+    return inner[0] if len(outer) == 1 and inner[0] else outer

@@ -1,0 +1,244 @@
+"""A write between two reads: what it must and must not do, by method and media type; freedoms are not judged."""
+
+import json
+
+import pytest
+from small_device import answers, described
+
+from conformance.checkers.rest import RestCheckers
+from conformance.contract.described import write_described_pack
+from conformance.contract.pack import Contract
+from conformance.transport.exchange import Exchange, Request, Response
+
+BASE = "http://device:8000/api"
+_PARTS = {
+    "gain": {"type": "number"},
+    "count": {"type": "integer", "format": "int64", "default": 5},
+    "mode": {"type": "string", "enum": ["off", "on", "auto"], "default": "on"},
+    "loud": {"type": "boolean", "default": False},
+    "note": {"type": ["string", "null"]},
+    "path": {"type": "array", "items": {"type": "number"}},
+    "words": {"type": "array", "items": {"type": "string"}},
+    "stops": {"type": "array", "items": {"type": "object", "properties": {"x": {"type": "integer"}}}},
+    "zone": {"type": "object", "properties": {"a": {"type": "integer"}, "b": {"type": ["integer", "null"]}}},
+    "built": {"type": "string", "readOnly": True},
+    "level": {"type": "integer", "readOnly": True},
+    "uptime": {"type": "integer"},
+}
+_SCHEMA = {"type": "object", "properties": _PARTS}
+_STEPS = {"type": "array", "items": {"type": "object"}}
+_OK = {
+    "200": answers(_SCHEMA),
+    "202": {"description": "later"},
+    "204": {"description": "done"},
+    "4XX": {"description": ""},
+}
+MERGE, STEPS = "application/merge-patch+json", "application/json-patch+json"
+
+
+def _item(kind, schema):
+    body = {"required": True, "content": {kind: {"schema": schema}}}
+    put = {"required": True, "content": {"application/json": {"schema": _SCHEMA}}}
+    return {
+        "get": {"responses": _OK},
+        "put": {"requestBody": put, "responses": _OK},
+        "patch": {"requestBody": body, "responses": _OK},
+    }
+
+
+_ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
+_PATHS = {
+    "/plain": _item("application/json", _SCHEMA),
+    "/merge": _item(MERGE, _SCHEMA),
+    "/steps": _item(STEPS, _STEPS),
+    "/things/{id}": {"parameters": [_ID], **_item(MERGE, _SCHEMA)},
+    "/reset": {"post": {"responses": _OK}},
+}
+READ, KEPT, DEFAULTS = (f"description/{name}" for name in ("written-is-read", "refused-keeps", "defaults"))
+_FIRST = {"gain": 1.5, "count": 7, "mode": "auto", "loud": True, "note": "a", "zone": {"a": 1, "b": 2}, "built": "2026"}
+
+_WHOLE = {name: one for name, one in _FIRST.items() if name != "built"}
+
+
+def _get(at="/plain", **values):
+    return "GET", at, None, 200, {**_FIRST, **values}
+
+
+def _put(at="/plain", status=200, *, told=None, **values):
+    return "PUT", at, values, status, {**_FIRST, **values, **(told or {})}
+
+
+def _patch(at, sent, status=200, **values):
+    return "PATCH", at, sent, status, {**_FIRST, **values}
+
+
+def _op(kind, path, value=None, **more):
+    return {"op": kind, "path": path, **({"value": value} if kind in {"add", "replace", "test"} else {}), **more}
+
+
+_LONG = 2**53 + 1
+_TWICE = [_op("test", "/mode", "off"), _op("replace", "/count", 9)]
+_END = [_op("replace", "/count", 9), _op("test", "/mode", "off")]
+#: Exchanges, and the requirement that they break.
+BROKEN = {
+    "readOnly by PUT": ([_get(), _put(gain=2.5, built="roaas-own"), _get(gain=2.5, built="roaas-own")], READ),
+    "readOnly by a merge patch": (
+        [_get("/merge"), _patch("/merge", {"built": "roaas-own"}), _get("/merge", built="roaas-own")], READ,
+    ),
+    "readOnly of a thing, by a short value, twice": (
+        [
+            *(_get("/things/1", level=1), _patch("/things/1", {"level": 9}), _get("/things/1", level=9)),
+            *(_patch("/things/1", {"level": 4}), _get("/things/1", level=4)),
+        ], READ,
+    ),
+    "a default of PUT, a text": ([_get(), _put(gain=2.5), _get(gain=2.5)], DEFAULTS),
+    "a default of PUT, a truth value": (
+        [_get(), _put(gain=2.5, count=5, mode="on"), _get(gain=2.5, count=5, mode="on")], DEFAULTS,
+    ),
+    "a default of PUT, a number, of a thing, the response shows it": (
+        [_get("/things/1"), _put("/things/1", gain=1.5, mode="on", loud=False, told={"count": 7}),
+         _get("/things/1", mode="on", loud=False)], DEFAULTS,
+    ),
+    "null keeps": ([_get("/merge"), _patch("/merge", {"note": None}), _get("/merge")], READ),
+    "null keeps, seen by another change": (
+        [_get("/merge"), ("PATCH", "/merge", {"note": None, "gain": 2.5}, 204, None), _get("/merge", gain=2.5)], READ,
+    ),
+    "a merge patch replaces an object": (
+        [_get("/merge"), _patch("/merge", {"zone": {"a": 3}}), _get("/merge", zone={"a": 3})], READ,
+    ),
+    "null within an object keeps": (
+        [_get("/merge"), _patch("/merge", {"zone": {"a": 3, "b": None}}), _get("/merge", zone={"a": 3, "b": 2})], READ,
+    ),
+    "a merge patch adds to a list": (
+        [_get("/merge", words=["a"]), _patch("/merge", {"words": ["b"]}), _get("/merge", words=["a", "b"])], READ,
+    ),
+    "a patch resets the others": (
+        [
+            *(_get("/merge"), _patch("/merge", {"gain": 2.5}), _get("/merge", gain=2.5, note=None)),
+            *(_put("/merge", **_WHOLE), _get("/merge")),
+            *(_patch("/merge", {"gain": 3.5}), _get("/merge", gain=3.5, note=None)),
+        ], READ,
+    ),
+    "refused, and the valid members taken, by PUT": (
+        [_get(), _put(status=422, gain=9.5, mode="x"), _get(gain=9.5)],
+        KEPT,
+    ),
+    "refused, and the last member taken": (
+        [_get("/merge"), _patch("/merge", {"mode": "x", "count": 9}, 400), _get("/merge", count=9)], KEPT,
+    ),
+    "refused with 409, and taken, of a thing": (
+        [_get("/things/1"), _patch("/things/1", {"loud": False}, 409), _get("/things/1", loud=False)], KEPT,
+    ),
+    "a test at the beginning is ignored": ([_get("/steps"), _patch("/steps", _TWICE), _get("/steps", count=9)], KEPT),
+    "a test at the end is ignored": ([_get("/steps"), _patch("/steps", _END), _get("/steps", count=9)], KEPT),
+    "a JSON patch in part": ([_get("/steps"), _patch("/steps", _END, 409), _get("/steps", count=9)], KEPT),
+    "what is not there is removed": (
+        [_get("/steps"), _patch("/steps", [_op("remove", "/none"), _TWICE[1]]), _get("/steps", count=9)], KEPT,
+    ),
+    "an item of a JSON patch replaces the list": (
+        [_get("/steps", words=["a", "b"]), _patch("/steps", [_op("add", "/words/-", "c")], words=["c"]),
+         _get("/steps", words=["c"])], READ,
+    ),
+    "an item of a JSON patch comes first": (
+        [_get("/steps", words=["a", "b"]), _patch("/steps", [_op("add", "/words/-", "c")]),
+         _get("/steps", words=["c", "a", "b"])], READ,
+    ),
+    "copy without effect": (
+        [_get("/steps"), _patch("/steps", [_op("copy", "/note", **{"from": "/mode"}), _op("replace", "/count", 9)]),
+         _get("/steps", count=9)], READ,
+    ),
+    "fractions are cut off": (
+        [_get(), _put(**{**_WHOLE, "gain": -72.5}), _get(gain=-72), _put(**{**_WHOLE, "gain": 3.25}), _get(gain=3)],
+        READ,
+    ),
+    "fractions are rounded, by a patch": (
+        [_get("/merge"), _patch("/merge", {"gain": 2.75}), _get("/merge", gain=3),
+         _patch("/merge", {"gain": 6.5}), _get("/merge", gain=6)], READ,
+    ),
+    "an integer as a double": ([_get(), _put(**{**_WHOLE, "count": _LONG}), _get(count=_LONG - 1)], READ),
+    "numbers in another order": ([_get(), _put(**_WHOLE, path=[3, 1, 3]), _get(path=[1, 3, 3])], READ),
+    "equal numbers once": ([_get(), _put(**_WHOLE, path=[3, 1, 3]), _get(path=[3, 1])], READ),
+    "an object of a list is lost": (
+        [_get(), _put(**_WHOLE, stops=[{"x": 1}, {"x": 2}]), _get(stops=[{"x": 1}])], READ,
+    ),
+    "an object of a list is changed": (
+        [_get(), _put(**_WHOLE, stops=[{"x": 1}, {"x": 2}]), _get(stops=[{"x": 1}, {"x": 1}])], READ,
+    ),
+}  # fmt: skip
+#: The same for right devices.
+RIGHT = {
+    "readOnly ignored": [_get(), _put(**{**_FIRST, "built": "x"}), _get()],
+    "readOnly refused": [_get(), _put(status=422, built="roaas-own"), _get()],
+    "a member of the device's that changes": [_get(level=1), _get(level=2), _put(**_FIRST, level=9), _get(level=9)],
+    "defaults applied": [_get(), _put(gain=2.5), _get(gain=2.5, count=5, mode="on", loud=False)],
+    "a PUT that acts later": [_get(), _put(gain=2.5, told={"count": 5, "mode": "on", "loud": False}), _get()],
+    "a PUT that is accepted": [_get(), _put(status=202, gain=2.5), _get(gain=2.5)],
+    "a patch keeps what has a default": [_get(), _patch("/plain", {"gain": 2.5}), _get(gain=2.5)],
+    "null removes": [_get("/merge"), _patch("/merge", {"note": None}), _get("/merge", note=None)],
+    "null sets the default": [_get("/merge"), _patch("/merge", {"mode": None}, mode="on"), _get("/merge", mode="on")],
+    "null in plain JSON": [_get(), _patch("/plain", {"note": None}), _get()],
+    "an object merged": [
+        *(_get("/merge"), _patch("/merge", {"zone": {"a": 3}}), _get("/merge", zone={"a": 3, "b": 2})),
+        *(_patch("/merge", {"zone": {"b": None}}), _get("/merge", zone={"a": 3})),
+    ],
+    "plain JSON replaces an object": [_get(), _patch("/plain", {"zone": {"a": 3}}), _get(zone={"a": 3})],
+    "what counts by itself": [_get(uptime=1), _get(uptime=2), _patch("/plain", {"uptime": 3}, 422), _get(uptime=3)],
+    "another write in between": [
+        _get(), _put(status=422, gain=9.5, mode="x"), _put(**{**_WHOLE, "gain": 9.5}), _get(gain=9.5),
+    ],
+    "something else in between": [
+        _get(), _put(status=422, gain=9.5, mode="x"), ("POST", "/reset", None, 204, None), _get(gain=9.5),
+    ],
+    "not acceptable, and done": [_get(), _put(status=406, gain=9.5), _get(gain=9.5)],
+    "a test that holds": [
+        _get("/steps"), _patch("/steps", [_op("test", "/gain", 1.5), _op("replace", "/mode", "off")]),
+        _get("/steps", mode="off"),
+    ],
+    "a test of what changes by itself": [
+        *(_get("/steps", uptime=1), _get("/steps", uptime=2)),
+        *(_patch("/steps", [_op("test", "/uptime", 3)]), _get("/steps", uptime=4)),
+    ],
+    "a patch that is refused": [_get("/steps"), _patch("/steps", _END, 409), _get("/steps")],
+    "one fraction is cut off": [_get(), _put(**{**_WHOLE, "gain": 2.5}), _get(gain=2)],
+    "steps of a half": [
+        *(_get(), _put(**{**_WHOLE, "gain": 2.375}), _get(gain=2.5), _put(**{**_WHOLE, "gain": 3.1}), _get(gain=3)),
+        *(_put(**{**_WHOLE, "gain": 4.1}), _get(gain=4)),
+    ],
+    "clamped": [
+        _get(), _put(**{**_WHOLE, "gain": 50.5}), _get(gain=10), _put(**{**_WHOLE, "gain": 60.5}), _get(gain=10),
+    ],
+    "words as a set": [_get(), _put(**_WHOLE, words=["b", "a", "b"]), _get(words=["a", "b"])],
+    "one reset by another mode": [_get(), _patch("/plain", {"mode": "off"}), _get(mode="off", loud=False)],
+}  # fmt: skip
+
+
+@pytest.fixture(name="contract", scope="module")
+def _contract(tmp_path_factory):
+    document = described(_PATHS, "3.1.0")
+    return Contract.load(write_described_pack(tmp_path_factory.mktemp("pack"), document, document))
+
+
+def _broken(contract, steps):
+    checkers, now, broken = RestCheckers(contract, BASE), 1000.0, set()
+    for method, path, sent, status, seen in steps:
+        now += 1.0
+        kinds = {"/merge": MERGE, "/steps": STEPS, "/things/1": MERGE} if method == "PATCH" else {}
+        fields = [("Host", "device:8000"), *([("Content-Type", kinds.get(path, "application/json"))] if sent else [])]
+        body = json.dumps(sent).encode() if sent else b""
+        answer = json.dumps(seen).encode() if seen is not None and status < 300 else b""
+        kind = (("Content-Type", "application/json"),) if answer else ()
+        request = Request(method, BASE + path, tuple(fields), body)
+        exchange = Exchange(request, Response(status, kind, answer, 10.0, received_s=now))
+        broken |= {one.requirement for one in checkers(exchange) if not one.holds}
+    return {id_ for id_ in broken if id_ in {READ, KEPT, DEFAULTS}}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_wrong_write_is_blamed(contract, name):
+    steps, requirement = BROKEN[name]
+    assert _broken(contract, steps) == {requirement}
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_a_right_write_is_not_blamed(contract, name):
+    assert _broken(contract, RIGHT[name]) == set()
