@@ -48,6 +48,8 @@ class Lists:
         self._raised: dict[object, dict[int, list[Case]]] = defaultdict(dict)
         # Lists that had fewer items than the default, although there are more: number of items, total, case.
         self._short: dict[object, tuple[int, int, Case]] = {}
+        # How many items there were by each value of a parameter that bounds a member.
+        self._counts: dict[tuple[str, str], dict[float, int]] = defaultdict(dict)
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
@@ -62,12 +64,14 @@ class Lists:
             return
         yield from self._limit(occasion, listing, page, sent)
         yield from self._filters(occasion, listing, page, sent)
+        yield from self._bounds(occasion, listing, page, sent)
         yield from self._order(occasion, listing, page, sent)
         yield from self._totals(occasion, listing, page, sent)
         self._learn(listing, page)
 
     def _learn(self, listing: Listing, page: Page) -> None:
         names = {*listing.filters, *(one.member for one in listing.sortings.values())}
+        names |= {one.member for one in listing.bounds}
         if len(self._seen) < _REMEMBERED:
             for identity, item in zip(page.identities, page.items, strict=True):
                 own = members_of(item)
@@ -134,6 +138,26 @@ class Lists:
                 f"an item with {', '.join(wrong)}",
                 cause=f"{listing.operation.label} {parameter.name}",
             )
+
+    def _bounds(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+        """Judge bounds of members; where no description says that it is one, by its effect in earlier lists."""
+        for bound in listing.bounds:
+            name = bound.parameter.name
+            text, values = sent.get(name), list(self._known(listing, page, bound.member))
+            if not text:
+                continue
+            counts, is_sure = self._counts[listing.operation.label, name], bound.is_said
+            if len(sent) == 1 and (rank := bound.rank(text)) is not None and len(counts) < _COMPARED:
+                counts[rank] = len(page.items)
+                steps = [count for _, count in sorted(counts.items(), reverse=bound.is_least)]
+                is_sure |= steps == sorted(steps) and len(set(steps)) > 1
+            if is_sure and values:
+                wrong = [one for one in values if bound.excludes(text, one)]
+                side = "at least" if bound.is_least else "at most"
+                expected = f"items with {bound.member} {side} {text}, which the parameter {name} asks for"
+                found = f"an item with {text_of(wrong[0])}" if wrong else ""
+                cause = f"{listing.operation.label} {name}"
+                yield occasion.case("description/list-filter", not wrong, expected, found, cause=cause)
 
     def _wrong(self, listing: Listing, name: str, asked: list[str], values: list[Any]) -> list[str] | None:
         """Return a value that was not asked for, or nothing; None where that cannot be told."""

@@ -15,12 +15,14 @@ from http import HTTPStatus
 from typing import Any, Final
 from urllib.parse import quote, unquote, urlsplit
 
+from conformance.api.rest.listing import listed
 from conformance.api.rest.references import collections_of
 from conformance.api.rest.things import (
     as_answered,
     collection_of,
     differences,
     identified,
+    identifier_of,
     is_marked_deleted,
     is_shared,
     represented,
@@ -61,6 +63,7 @@ class _Thing:
         status: how that was answered.
         changed_s: when, s of the monotonic clock.
         gone: whether that deleted it.
+        absent: whether a read has shown that it is not there.
         own: whether this run has created what it deleted.
         made: whether this run created it, and no read has shown it yet.
         body: hash of that of the POST that created it; 0: there was none.
@@ -75,6 +78,7 @@ class _Thing:
     status: int
     changed_s: float
     gone: bool = False
+    absent: bool = False
     own: bool = False
     made: bool = False
     body: int = 0
@@ -140,9 +144,8 @@ class Memory:
         operation, method = occasion.operation, occasion.request.method
         path = _path_in(occasion.context.target)
         if method in SAFE or not self._items:
-            item = self._items.get(operation.template.rstrip("/")) if operation is not None else None
-            if item is not None and method == "GET" and occasion.context.plain:
-                yield from self._read(occasion, item, path)
+            if method == "GET" and operation is not None:
+                yield from self._seen(occasion, operation, path)
             return
         self._acts += 1
         status = occasion.response.status
@@ -166,6 +169,13 @@ class Memory:
                 thing.written.clear()
         else:
             self.forget()
+
+    def _seen(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
+        item = self._items.get(operation.template.rstrip("/"))
+        if item is not None and occasion.context.plain:
+            yield from self._read(occasion, item, path)
+        elif item is None and occasion.response.ok:
+            yield from self._listed(occasion, operation, path)
 
     def _drop(self, concerns: Any) -> None:
         self._things = {key: one for key, one in self._things.items() if not concerns(one.path)}
@@ -319,6 +329,7 @@ class Memory:
     def _deleted(self, occasion: Occasion, item: Operation, thing: _Thing, age_s: float) -> Iterator[Case]:
         """Judge a read of what was deleted."""
         response = occasion.response
+        thing.absent |= response.status in _ABSENT
         if response.ok and age_s > _SETTLES_S and not is_marked_deleted(read_json(response.body).value):
             expected = f"status 404 or 410, {age_s:.0f} s after {thing.change} was answered {thing.status}"
             case = self._case("deleted-is-gone", occasion, expected, cause=item.label)
@@ -330,6 +341,23 @@ class Memory:
         elif response.status in _ABSENT and not thing.own:
             self._gone.add(item.template)
             yield from self._back.pop(item.template, [])
+
+    def _listed(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
+        """Judge whether a list, however it is filtered, has things that were deleted and are not there any more."""
+        item = self._of_collections.get(operation.template.rstrip("/"))
+        gone = {key: one for key, one in self._things.items() if one.absent and one.path.rpartition("/")[0] == path}
+        if item is None or not gone or not is_json(occasion.response.media_type):
+            return
+        for value in listed(read_json(occasion.response.body).value) or ():
+            thing = gone.get(f"{path}/{identifier_of(value, item)}".casefold()) if isinstance(value, dict) else None
+            age_s = _sent_s(occasion) - thing.changed_s if thing is not None else 0.0
+            if thing is not None and age_s > _SETTLES_S and not is_marked_deleted(value):
+                expected = (
+                    f"a list without what {thing.change} has deleted {age_s:.0f} s before, which a GET does not find"
+                )
+                yield self._case(
+                    "deleted-is-gone", occasion, expected, "a list with it", cause=f"{operation.label} listed"
+                )
 
     def _lasts(self, kept: tuple[str, str], age_s: float, value: str) -> Iterator[Case]:
         """Note for how long something has lasted; yield what should have lasted as well."""

@@ -27,6 +27,7 @@ class Parameter:
         media_type: of a parameter with ``content``; empty: it is written by its style.
         reserved: whether reserved characters are written as they are (allowReserved).
         empty: whether it may be written without a value (allowEmptyValue).
+        says: the description of it.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Parameter:
     media_type: str = ""
     reserved: bool = False
     empty: bool = False
+    says: str = ""
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,7 @@ def read_parameter(given: dict[str, Any]) -> Parameter:
         next(iter(by_media_type(given)), ""),
         bool(given.get("allowReserved", False)),
         bool(given.get("allowEmptyValue", False)),
+        " ".join(str(one.get("description", "")) for one in (given, given.get("schema", {})) if isinstance(one, dict)),
     )
 
 

@@ -243,6 +243,14 @@ def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]
     rows: list[dict[str, Any]] = []
     for name, parameter in listing.filters.items():
         rows += [{parameter.name: value} for value in _choices(parameter, name, page)[:most]]
+    for bound in listing.bounds:
+        there = {
+            members_of(one).get(bound.member) for one in page.items if members_of(one).get(bound.member) is not None
+        }
+        ordered = sorted(there, key=lambda one: bound.rank(str(one)) or 0)
+        # The second of several: there are items on both sides, and one is at the bound.
+        middle = ordered[len(ordered) // 2 : len(ordered) // 2 + 1]
+        rows += [{bound.parameter.name: one} for one in middle if len(ordered) > 1 and fitting(bound.parameter, one)]
     if listing.sort is not None:
         directions = flat(listing.direction.schema).get("enum", ()) if listing.direction is not None else ()
         for number, text in enumerate(list(listing.sortings)[:most]):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -12,9 +13,10 @@ from urllib.parse import quote, urlsplit
 from conformance.api.rest.applicable import allowed
 from conformance.api.rest.inputs import Inputs, usual_inputs, whole_body, written
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.listing import Listing, fitting, listing_of, members_of, page_of
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import another, collection_of, identified, path_chosen
+from conformance.api.rest.things import another, collection_of, identified, identifier_of, path_chosen
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation
 from conformance.documents.json_schema import Schema
@@ -36,6 +38,8 @@ from conformance.transport.reach import is_same, joined, path_of
 _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
 # So many members of a resource are written one by one.
 _MEMBERS: Final = 6
+# So many filters of a list are tried; a device may list for so long what was deleted, s, and is asked so often.
+_FILTERS, _SETTLES_S, _PAUSE_S, _MOST_ITEMS = 3, 3.2, 0.4, 1000
 # The turn of an identifier that no other check chooses.
 _TURN: Final = 98
 # So many are written one by one after all together, which shows whether the others stay.
@@ -66,7 +70,7 @@ def own_things(api: RestInterface, values: Values) -> Survey:
                     thing = _Thing(surveyor, read, thing_path)
                     thing.asked()
                     thing.written(changes)
-                    thing.deleted(delete)
+                    thing.deleted(delete, operations.get(("GET", collection_of(path))))
     return surveyor.trace
 
 
@@ -200,10 +204,11 @@ class _Thing:
         """Return If-Match with its entity tag; a weak one matches none (RFC 9110 13.1.1)."""
         return (("If-Match", self.tag),) if self.tag and not self.tag.startswith("W/") else ()
 
-    def deleted(self, delete: Operation | None) -> None:
-        """Delete it by a wrong condition, and then by a right one."""
-        if delete is None:
+    def deleted(self, delete: Operation | None, lister: Operation | None) -> None:
+        """Delete it by a wrong condition, and then by a right one; look for it in the list by each of its filters."""
+        if delete is None or not self.get().ok:
             return
+        was, began = members(self.last, ()) if self.last is not None else {}, time.monotonic()
         if self.tag:
             self.sent(delete, None, ("If-Match", NO_TAG))
             if not self.get().ok:
@@ -213,7 +218,23 @@ class _Thing:
         head = replace(written(self.read, usual_inputs(self.read, self.surveyor.values)[0]), method="HEAD")
         variation = Variation(Kind.ODD, "", "path of what was deleted", Inputs())
         self.surveyor.send(self.read, variation, replace(head, target=self.target), fresh=False)
-        self.get(place="path of what was deleted")
+        is_gone = self.get(place="path of what was deleted").status in ABSENT
+        listing = listing_of(lister) if lister is not None and lister.label not in self.api.streams else None
+        if is_gone and listing is not None and identifier_of(was, self.read):
+            for query in _filters(listing, was):
+                self._look_in(listing, query, identifier_of(was, self.read), began)
+
+    def _look_in(self, listing: Listing, query: dict[str, Any], id_: str, began: float) -> None:
+        """Read a list until what was deleted is not in it, or until a device has had its time."""
+        inputs = usual_inputs(listing.operation, self.surveyor.values)[0]
+        inputs = replace(inputs, query={**inputs.query, **query})
+        while True:
+            is_last = time.monotonic() - began > _SETTLES_S
+            found = self.surveyor.send(listing.operation, Variation(Kind.AGAIN, "", "", inputs)).exchange
+            page = page_of(found.response, listing.operation) if found is not None else None
+            if is_last or page is None or id_ not in {identifier_of(one, self.read) for one in page.items}:
+                return
+            time.sleep(_PAUSE_S)
 
     def _bodies(self, change: Operation, now: dict[str, Any]) -> list[Any]:
         """Return bodies that change one member each, and one at the end that restores them."""
@@ -232,6 +253,16 @@ class _Thing:
             body = {name: value} if change.method == "PATCH" else {**whole, name: value}
             found += [body] if fits(schema, body) else []
         return [*found[:_MEMBERS], *([whole] if found and fits(schema, whole) else [])]
+
+
+def _filters(listing: Listing, thing: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield the queries of a list that choose a thing by one of its members, with as many items as may be."""
+    limit, own = listing.limit, members_of(thing)
+    most = flat(limit.schema).get("maximum") if limit is not None else None
+    many = {limit.name: min(most, _MOST_ITEMS)} if limit is not None and isinstance(most, int) else {}
+    found = [(one, own.get(name)) for name, one in listing.filters.items()]
+    usable = [(one, value) for one, value in found if isinstance(value, str | int) and fitting(one, value)]
+    yield from ({one.name: value, **many} for one, value in usable[:_FILTERS])
 
 
 def _with_texts(create: Operation, body: Any) -> Any:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, Final
 
+from conformance.api.rest.bounds import Bound, bound_of
 from conformance.api.rest.samples import fits
 from conformance.documents.field_reading import pairs_of
 from conformance.documents.json_schema import Schema, kinds_of
@@ -76,6 +77,7 @@ class Listing:
         sort, direction: by which member it is sorted.
         reverses: whether a further parameter may turn the order around.
         filters: the parameters that choose items by a member, by the plain name of both.
+        bounds: those that choose items by the least or greatest value of a member.
     """
 
     operation: Operation
@@ -88,6 +90,7 @@ class Listing:
     direction: Parameter | None = None
     reverses: bool = False
     filters: Mapping[str, Parameter] = field(default_factory=dict)
+    bounds: tuple[Bound, ...] = ()
 
     @cached_property
     def members(self) -> dict[str, Schema]:
@@ -100,7 +103,10 @@ class Listing:
     @cached_property
     def known(self) -> frozenset[str]:
         """The names of all parameters whose part is known."""
-        parts = (self.limit, self.offset, self.page, self.cursor, self.sort, self.direction, *self.filters.values())
+        parts = (
+            self.limit, self.offset, self.page, self.cursor, self.sort, self.direction, *self.filters.values(),
+            *(one.parameter for one in self.bounds),
+        )  # fmt: skip
         return frozenset(one.name for one in parts if one is not None)
 
     @cached_property
@@ -292,6 +298,7 @@ def listing_of(operation: Operation) -> Listing | None:
         for name, one in query.items()
         if name in plain.members and name not in _NO_FILTERS and one not in sorts and name not in directions
     }
+    rest = [one for one in query.values() if one not in (limit, *filters.values())]
     return Listing(
         operation,
         item,
@@ -303,6 +310,7 @@ def listing_of(operation: Operation) -> Listing | None:
         next(iter(directions.values())) if len(directions) == 1 else None,
         len(directions) > 1 or not _REVERSING.isdisjoint(query),
         filters,
+        tuple(bound for one in rest if (bound := bound_of(one, plain.members))),
     )
 
 

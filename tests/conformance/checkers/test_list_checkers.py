@@ -238,6 +238,48 @@ def test_filters(parameter, query, keep, blamed, tmp_path):
     assert (FILTER in seen.read([{**one, "archived": False} for one in VALVES if keep(one)], **query).broken) == blamed
 
 
+def _bound(name, says="", **schema):
+    return {"name": name, "in": "query", "description": says, "schema": {"type": "number", **schema}}
+
+
+_NOON = "2026-01-01T12:00:00Z"
+_WHEN = {"type": "string", "format": "date-time"}
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value", "keep", "blamed"),
+    [
+        (_bound("min_size", "At least this size."), 2, lambda _: True, True),
+        (_bound("sizeMax", "Sizes up to this."), 2, lambda _: True, True),
+        (_bound("size[lte]", "Size <= value."), 2, lambda one: one["size"] >= 2, True),
+        (_bound("since", "Only those at or after this time.", **_WHEN), _NOON, lambda one: one["opened"], True),
+        (_bound("opened_before", "Only those before.", **_WHEN), _NOON, lambda one: one["opened"], True),
+        (_bound("until", "Until then.", **_WHEN), "2025-12-24T00:00:00+02:00", lambda one: one["opened"], True),
+        (_bound("min_size", "At least this size."), 2, lambda one: one["size"] >= 2, False),
+        (_bound("min_size", "More than this."), 2, lambda one: one["size"] > 2, False),
+        (_bound("max_size"), 2, lambda _: True, False),
+        (_bound("max_size", "How large a preview is."), 2, lambda _: True, False),
+        (_bound("min_width", "At least this width."), 2, lambda _: True, False),
+        (_bound("since", "Since then.", **_WHEN), "2026-01-01T00:00:00+02:00", lambda one: one["id"] in {1, 3}, False),
+        (_bound("from", "From this item on.", type="string"), "3", lambda one: one["id"] > 3, False),
+    ],
+)
+def test_bounds(parameter, value, keep, blamed, tmp_path):
+    kept = [one for one in VALVES if keep(one)]
+    seen = Seen(tmp_path, [parameter]).read(VALVES).read(kept, **{parameter["name"]: value})
+    assert seen.broken == ({FILTER} if blamed else set())
+
+
+@pytest.mark.parametrize(
+    ("counts", "blamed"), [([(1, 4), (2, 3), (3, 2)], True), ([(1, 2), (2, 4), (3, 3)], False), ([(1, 4)], False)]
+)
+def test_a_bound_that_nobody_describes_shows_by_its_effect(counts, blamed, tmp_path):
+    seen = Seen(tmp_path, [_bound("min_size")]).read(VALVES)
+    for bound, count in counts:
+        seen.read(sorted(VALVES, key=lambda one: -one["size"])[:count], min_size=bound)
+    assert seen.broken == ({FILTER} if blamed else set())
+
+
 def test_a_filter_that_takes_a_list_allows_each_of_it(tmp_path):
     parameter = {**_text("state"), "schema": {"type": "array", "items": _MEMBERS["state"]}, "explode": False}
     seen = Seen(tmp_path, [parameter]).read(VALVES)

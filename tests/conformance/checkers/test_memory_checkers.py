@@ -22,7 +22,13 @@ _BODY = {"required": True, "content": {"application/json": {"schema": _JOB}}}
 _ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
 _OK = {"200": answers(_JOB), "201": answers(_JOB), "204": {"description": "done"}, "4XX": {"description": "refused"}}
 _PATHS = {
-    "/jobs": {"post": {"requestBody": _BODY, "responses": _OK}},
+    "/jobs": {
+        "post": {"requestBody": _BODY, "responses": _OK},
+        "get": {
+            "parameters": [{"name": "rank", "in": "query", "schema": {"type": "integer"}}],
+            "responses": {"200": answers({"type": "array", "items": _JOB})},
+        },
+    },
     "/jobs/{id}": {
         "parameters": [_ID],
         "get": {"responses": _OK},
@@ -82,6 +88,10 @@ _KEY_GONE = ("DELETE", f"/keys/{_U1}", None, 204, None)
 _NULLED = ("PATCH", "/notes/1", {"name": None}, 200, _job("1"))
 
 
+def _jobs(query, *jobs):
+    return "GET", f"/jobs{query}", None, 200, list(jobs)
+
+
 def _note(**values):
     return "GET", "/notes/1", None, 200, _job("1", **values)
 
@@ -133,6 +143,13 @@ BROKEN = {
     "a member of the device's that POST writes": ([_post("1", built="roaas-own"), _get("1", built="roaas-own")], READ),
     "null without effect": ([_note(name="a"), _NULLED, _note(name="a")], READ),
     "a UUID twice": ([_key(_U1), _KEY_GONE, _key(_U1)], THERE),
+    "a list has what was deleted": ([_post("1"), _delete("1"), _get("1", 404), 5.0, _jobs("", _job("1"))], GONE),
+    "a filtered list has what was deleted": (
+        [_post("1"), _post("2"), _delete("2"), _get("2", 404), 5.0, _jobs(""), _jobs("?rank=1", _job("2"))], GONE,
+    ),
+    "a list has what was deleted, at last": (
+        [_post("1"), _delete("1"), 5.0, _get("1", 404), _jobs("?rank=1"), _jobs("", _job("9"), _job("1"))], GONE,
+    ),
     "a default that is not applied": ([_post("1"), _KEPT, _post("3"), _KEPT], DEFAULTS),
 }  # fmt: skip
 #: The same for right devices.
@@ -147,6 +164,11 @@ RIGHT = {
     "null removes": [_note(name="a"), _NULLED, ("GET", "/notes/1", None, 200, {"id": "1"})],
     "null, and written again": [
         *(_note(name="a"), _NULLED, ("PATCH", "/notes/1", {"name": "a"}, 200, _job("1")), _note(name="a")),
+    ],
+    "a list that is late": [_post("1"), _delete("1"), _get("1", 404), _jobs("", _job("1")), 5.0, _jobs("")],
+    "a list of the deleted": [_post("1"), _delete("1"), _get("1", 404), 5.0, _jobs("", _job("1", state="deleted"))],
+    "a list with what was created again": [
+        *(_post("1"), _delete("1"), _get("1", 404), _put("1", 201), 5.0, _jobs("", _job("1"))),
     ],
     "a UUID of the client's twice": [_key(_U1, id=_U1), _KEY_GONE, _key(_U1, id=_U1)],
     "two UUIDs": [_key(_U1), _KEY_GONE, _key(_U2)],
