@@ -7,6 +7,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from typing import Final
 
 from conformance.documents.openapi import Operation
@@ -100,13 +101,14 @@ def is_literal(pattern: str, operation: Operation) -> bool:
     return pattern.strip() in {operation.label, operation.id}
 
 
-def harmful_words(operation: Operation) -> list[str]:
+@lru_cache(maxsize=1024)
+def harmful_words(operation: Operation) -> tuple[str, ...]:
     """Return the words in an operation's path, id and tags that say that it may do harm."""
     text = f"{_PARAMETER.sub(' ', operation.template)} {operation.id}"
     # Tags name a group: of what only reads in it, nothing is to be feared.
     text += "" if operation.safe else f" {' '.join(operation.tags)}"
     words = words_of(text) - _OF_METHODS.get(operation.method, frozenset())
-    return sorted(words & (HARMFUL | _SEVERAL))
+    return tuple(sorted(words & (HARMFUL | _SEVERAL)))
 
 
 def words_of(text: str) -> set[str]:

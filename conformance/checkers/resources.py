@@ -81,7 +81,7 @@ class Resources:
         content = hashlib.sha256(answer.body).digest()
         shown = _Shown(answer.status, _opaque(answer.header("etag")), answer.media_type, len(answer.body), content)
         head, before = self._heads.pop(key, None), self._got.get(key)
-        if before not in {None, shown}:
+        if before is not None and before != shown:
             self._varies.add(occasion.request.url)
         if len(self._got) < _MOST:
             self._got[key] = shown

@@ -70,6 +70,10 @@ class Contract:
     only: tuple[str, ...] = ()
     manifest: _Manifest | None = field(default=None, repr=False, compare=False)
 
+    def __hash__(self) -> int:
+        """Return a hash that costs little: what is cached by contract is looked up several times for each request."""
+        return hash(self.directory)
+
     @classmethod
     @cache  # reading openapi.yaml takes a third of a second
     def load(cls, pack: Path | str = DEFAULT_PACK, *, only: tuple[str, ...] = ()) -> Contract:

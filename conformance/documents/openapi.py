@@ -89,7 +89,7 @@ class Operation:
     stop: bool = False
     reads: bool = False
 
-    @property
+    @cached_property
     def label(self) -> str:
         """Method and path."""
         return f"{self.method} {self.template}"

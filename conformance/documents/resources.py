@@ -27,7 +27,7 @@ class Resource:
         parts[::2] = map(sendable, parts[::2])
         return re.compile("".join(re.escape(part) if i % 2 == 0 else "[^/]*" for i, part in enumerate(parts)))
 
-    @property
+    @cached_property
     def methods(self) -> frozenset[str]:
         """The methods that the description declares, and HEAD if it declares GET."""
         given = frozenset(self.operations)

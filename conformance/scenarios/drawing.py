@@ -47,11 +47,17 @@ def drawn(
         "invalid": list(islice(invalid_variations(operation, usual), _CASES)),
         "odd": list(islice(odd_variations(operation, usual), _CASES)),
     }
+    sent = set[str]()
     for name, variations in groups.items():
         standard = max(_MOST[name], round(_LEAST[name] / effort.factor))
         standard //= SLOW_SHARE if operation.label in slow else 1
+        if name == "odd":
+            # As values that are valid or invalid, some were sent already.
+            variations = [one for one in variations if repr(one.inputs) not in sent]  # noqa: PLW2901 - fewer of them
         own, common = ([one for one in variations if one.is_common is is_common] for is_common in (False, True))
-        yield effort.draw_first(own, common, standard, f"{seed}/{name} {operation.label}")
+        found = effort.draw_first(own, common, standard, f"{seed}/{name} {operation.label}")
+        sent.update(repr(one.inputs) for one in found)
+        yield found
 
 
 def order_of(operation: Operation) -> tuple[int, int]:

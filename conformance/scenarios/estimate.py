@@ -26,10 +26,9 @@ from conformance.verdict.run import Run
 from conformance.verdict.time_limit import TimeIsOverError
 
 # Of the cases that Schemathesis is asked for, it makes about this share: some are alike, some cannot be sent. It covers
-# an operation by about so many cases for each parameter or member of the body, and one without any by so many.
+# an operation by about so many cases for each parameter or member of the body.
 _MADE: Final = 0.7
 _COVERING: Final = 15
-_WITHOUT_INPUT: Final = 3
 # The checks of HTTP use up to so many operations, each with about so many requests; and each operation is sent OPTIONS.
 _READS: Final = 8
 _EACH_READ: Final = 18
@@ -114,7 +113,7 @@ def _generated(operation: Operation, effort: Effort) -> tuple[int, int]:
     """Return how many requests of an operation Schemathesis makes to cover it, and how many Hypothesis draws."""
     inputs = len(operation.parameters) + sum(_members(body.schema) for body in operation.bodies.values())
     if not inputs:
-        return _WITHOUT_INPUT, 0
+        return 0 if operation.safe else 1, 0
     fuzzed = 0 if effort.name == "quick" or effort.slow else 2 * effort.cases(FUZZED)
     return round(_MADE * min(effort.cases(COVERAGE), _COVERING * inputs)), round(_MADE * fuzzed)
 

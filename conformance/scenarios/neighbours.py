@@ -13,6 +13,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation, valid_variations
 from conformance.documents.openapi import Operation, operations_of
+from conformance.scenarios.estimate import TIMED_AGAIN
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import REFUSALS, Survey, Surveyor
@@ -24,8 +25,8 @@ NO_TAG: Final = '"roaas-nothing-has-this-tag"'
 _TRIED, _QUERIES, _AT_QUICK = 3, 3, 8
 # Each operation is read after so many refusals at standard effort, and after two at quick.
 _REFUSALS: Final = 8
-# Each operation has been read so often by then: with the reads that come later, one wrong response in twenty is met.
-_READS: Final = 17
+# Each operation has been read so often by then: with the timed reads at the end, one wrong response in twenty is met.
+_READS: Final = 20 - TIMED_AGAIN
 # Operations are read more often where the device usually responds in so many ms.
 _QUICK_MS: Final = 50.0
 _FEW_READS: Final = 2

@@ -66,6 +66,8 @@ REFUSALS: Final = frozenset({400, 404, 405, 409, 411, 412, 413, 415, 422})
 # Those by which a device may refuse a second thing of one name, and the requests that ask for acceptance.
 _DOUBTED: Final = frozenset({400, 409, 422})
 _ACCEPTED: Final = frozenset({Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL, Kind.BOUND, Kind.GENERATED})
+# What is judged of a request in the same way when it is generated: it need not be sent again.
+_JUDGED: Final = frozenset({Kind.OPTIONAL, Kind.BOUND, Kind.INVALID, Kind.MISSING})
 # What differs between two responses to one request: times, and ids of requests.
 _VARYING: Final = re.compile(r"[0-9a-fA-F]*\d[0-9a-fA-F]*")
 # How often one request is sent again and again; and cases of Schemathesis, as many of each kind, of one operation.
@@ -252,12 +254,14 @@ class Surveyor:
         if doubted and by_inputs and self._reaching.finds_new(operation, self.usual[operation.label]):
             return self.send(operation, variation, fresh=fresh)
         self.probes.append(replace(probe, exchange=exchange, invents=probe.invents or doubted))
-        self._note(operation, request, exchange)
+        self._note(operation, variation.kind, request, exchange)
         return self.probes[-1]
 
-    def _note(self, operation: Operation, request: Outgoing, exchange: Exchange) -> None:
+    def _note(self, operation: Operation, kind: Kind, request: Outgoing, exchange: Exchange) -> None:
         """Remember what a response says for later requests."""
         status = exchange.response.status
+        if operation.safe and kind in _JUDGED:
+            self.api.judged.add(request)
         if exchange.response.cut:
             # An endless response says nothing new the second time, and costs its time each time.
             self.given_up.add(operation.label)
@@ -313,10 +317,10 @@ class Surveyor:
 
     def look_elsewhere(self, operation: Operation) -> None:
         """Where an operation's usual requests were all answered 404, get a path beside it that is not described."""
-        if not has_input(operation):
+        if not has_input(operation) or self.api.usual_status.get(operation.label) != _NOT_FOUND:
             return
         usual = [one for one in self.probes if one.kind is Kind.USUAL and one.operation == operation.label]
-        if not usual or any(one.status != _NOT_FOUND for one in usual):
+        if any(one.status != _NOT_FOUND for one in usual):
             return
         path = f"{operation.template.partition('{')[0].rstrip('/').rpartition('/')[0]}/{UNKNOWN}"
         path = f"{path}/{UNKNOWN}" if known_path(self.api.run.contract, path) else path
@@ -561,14 +565,13 @@ def _send_generated(surveyor: Surveyor, operation: Operation, target: Target, ex
     from conformance.api.rest.generated import NOT_GENERATED  # noqa: PLC0415 - see generated_requests()
 
     run = surveyor.api.run
+    if operation.safe and not target.has_input:
+        return  # there is one such request, and the survey has sent it
     until = time.monotonic() + _BUDGETS * run.effort.budget_s
     count = COVERAGE // (SLOW_SHARE if operation.label in surveyor.api.slow else 1)
     chosen = run.effort.draw_passing(target.covering(), count, f"{run.seed}/coverage {target.label}")
     run.tally.planned += len(chosen)
     for case in chosen:
-        if run.limit.is_past(_GENERATED_SHARE):
-            run.limit.shortened.add(target.label)
-            break
         if time.monotonic() > until:
             surveyor.cut_short(f"generated requests of {target.label}")
             continue
@@ -584,15 +587,12 @@ def _send_case(surveyor: Surveyor, operation: Operation, case: Any) -> None:
     """Send a case of Schemathesis, and record it."""
     from conformance.api.rest.generated import as_request, own_headers  # noqa: PLC0415 - see generated_requests()
 
+    if surveyor.api.run.limit.is_past(_GENERATED_SHARE):
+        surveyor.api.run.limit.shortened.add(operation.label)
+        return
     request, headers = as_request(case), own_headers(case)
     if request is None or headers is None or operation.label in surveyor.given_up:
         return
-    limit = surveyor.api.run.limit
-    if limit.is_past(_GENERATED_SHARE):
-        limit.shortened.add(operation.label)
-        return
-    # A method that the description does not have may act on the device.
-    if request.method not in {operation.method, "OPTIONS"}:
-        return
     whole = replace(request, headers=headers)
-    surveyor.send(operation, Variation(Kind.GENERATED, "", "", Inputs()), whole)
+    if whole not in surveyor.api.judged:
+        surveyor.send(operation, Variation(Kind.GENERATED, "", "", Inputs()), whole)

@@ -245,8 +245,8 @@ class HttpClient:
             return self._drafted(
                 method, target, tuple(pair for pair in sent if pair[0] != "Connection"), request, drafts
             )
-        endpoint = request.endpoint
-        if sum(time.monotonic() - at < _HANGS_WITHIN_S for at in self._hangs[endpoint]) >= _HANGS:
+        endpoint = request.endpoint if self._hangs else ""
+        if sum(time.monotonic() - at < _HANGS_WITHIN_S for at in self._hangs.get(endpoint, ())) >= _HANGS:
             hung = endpoint.replace(f"{self.scheme}://{self.authority}", "", 1)
             problem = f"the request was not sent, because {hung} did not respond {_HANGS} times"
             raise NoAnswerError(Unanswered(request, problem, NoAnswer.CIRCUIT_OPEN))
@@ -262,7 +262,7 @@ class HttpClient:
         except _SilenceError as none:
             self.connection.note(method)
             if none.kind is NoAnswer.TIMEOUT:
-                self._hangs[endpoint].append(time.monotonic())
+                self._hangs[request.endpoint].append(time.monotonic())
                 self.connection.pace.took(time.monotonic() - started, len(body))
             raise self._unanswered(request, str(none), none.kind) from none
         self.connection.pace.took(response.elapsed_ms / 1000, len(body) + len(response.body))

@@ -7,6 +7,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from conformance.contract.classes import CauseKind, Level
 from conformance.contract.ledger import Requirement, renamed, twins
@@ -404,10 +405,15 @@ def occasion_of(attempt: Attempt) -> str:
     media_type = request.media_type if request.body else ""
     if not request.body and isinstance(attempt, Exchange):
         media_type = attempt.response.media_type
+    return _occasion(request.method, media_type)
+
+
+@lru_cache(maxsize=256)
+def _occasion(method: str, media_type: str) -> str:
     kinds = {"JSON": is_json(media_type), "XML": media_type.endswith("xml"), "text": media_type == "text/plain"}
     # Others are one kind: a device may name as many as it likes.
     kind = next((name for name, fits in kinds.items() if fits), "other" if media_type else "without body")
-    return f"{request.method} {kind}"
+    return f"{method} {kind}"
 
 
 def _likeness(kind: CauseKind, exchange: Attempt | None) -> str:

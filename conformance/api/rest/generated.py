@@ -76,14 +76,18 @@ class Target:
         return strategy
 
 
-def targets(contract: Contract) -> tuple[Target, ...]:
+def targets(contract: Contract, *, undeclared: bool = False) -> tuple[Target, ...]:
     """Return the operations of a contract, except those that Schemathesis cannot read.
 
     The schema is loaded anew each time, because Schemathesis stores in it which cases it has generated.
+
+    Args:
+        contract: the contract.
+        undeclared: whether to cover methods that a path does not declare, which may act on a device that has them.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        schema = _loaded(contract.openapi)
+        schema = _loaded(contract.openapi, undeclared=undeclared)
         found = []
         for result in schema.get_all_operations():
             operation: Any = result.ok() if isinstance(result, Ok) else None
@@ -93,12 +97,13 @@ def targets(contract: Contract) -> tuple[Target, ...]:
         return tuple(found)
 
 
-def _loaded(document: dict[str, Any]) -> Any:
+def _loaded(document: dict[str, Any], *, undeclared: bool = False) -> Any:
     """Return the Schemathesis schema of a document without its credentials: the client adds those of the run.
 
     A case that left them out would be judged by a request that was sent with them.
     """
-    config = SchemathesisConfig.from_dict({"generation": {"with-security-parameters": False}})
+    phases: dict[str, Any] = {} if undeclared else {"coverage": {"unexpected-methods": []}}
+    config = SchemathesisConfig.from_dict({"generation": {"with-security-parameters": False}, "phases": phases})
     # What generates values would fetch the metaschema that the document names.
     document = {key: value for key, value in document.items() if key != "$schema"}
     return schemathesis.openapi.from_dict(_without_pointers(with_python_patterns(document)), config=config)

@@ -33,6 +33,7 @@ class RestInterface:
         refused: requests that the survey of a described API found to be refused, by status and operation.
         single: whether each operation that creates refuses the same request the second time.
         reads: how often each operation that reads was answered.
+        judged: requests that only read, which were sent as allowed or forbidden values.
         streams: operations whose responses do not end.
         slow: operations that once took more than a second to respond.
         stop_device: stops a device by its motion map, and returns why it may still move, or an empty text; None: it has
@@ -56,6 +57,7 @@ class RestInterface:
     refused: dict[tuple[int, str], Any] = field(default_factory=dict)
     single: dict[str, bool] = field(default_factory=dict)
     reads: Counter[str] = field(default_factory=Counter)
+    judged: set[Outgoing] = field(default_factory=set)
     streams: set[str] = field(default_factory=set)
     slow: set[str] = field(default_factory=set)
     stop_device: Callable[[], str] | None = None

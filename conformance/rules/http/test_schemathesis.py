@@ -75,7 +75,7 @@ def _send_generated(api: RestInterface, judge: Judge, explore: Explorer, *, movi
             _judge_generated(api, judge, guard, item)
 
     labels = {item.label for item in operations_of(api.run.contract) if item.motion == moving and allowed(api, item)}
-    for target in (one for one in targets(api.run.contract) if one.label in labels):
+    for target in (one for one in targets(api.run.contract, undeclared=True) if one.label in labels):
         coverage = effort.draw_passing(target.covering(), _COVERAGE, f"{api.run.seed}/coverage {target.label}")
         for case in effort.subsample(coverage, 1):
             send(case)
