@@ -10,15 +10,14 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Final
 
 from conformance.api.rest.interface import RestInterface
-from conformance.api.soap.messages import declarations, simple_leaves, with_text
+from conformance.api.soap.mutations import STRANGE, invalid_ones, mutations
 from conformance.documents.multipart import root_of
 from conformance.documents.openapi import operations_of
-from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl
+from conformance.documents.wsdl import SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import each, label_of, services_of
-from conformance.documents.xml import NotXmlError, elements, parse
+from conformance.documents.xml import NotXmlError, elements
 from conformance.documents.xml_names import clark
 from conformance.documents.xml_node import Node
-from conformance.documents.xsd_lexical import outside, unreadable
 from conformance.documents.xsd_shapes import Element
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of, values_in
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
@@ -32,9 +31,10 @@ from conformance.verdict.time_limit import TimeIsOverError
 if TYPE_CHECKING:
     from lxml import etree
 
-_STRANGE: Final = "urn:example:roaas"
+# In what an invalid message is wrong: what services differ in otherwise, such as the order, is not tried.
+_FORBIDDEN: Final = ("missing", "unknown", "lexical", "range")
 # Of one operation, at standard: invalid messages of each kind; and how often the usual one is sent.
-_MOST: Final = 12
+_MOST: Final = 4
 _USUAL: Final = 6
 # One operation may take so long, s.
 _BUDGET_S: Final = 20.0
@@ -52,7 +52,7 @@ def requests_of(effort: Effort) -> int:
     """Return about how many messages an operation is sent."""
     usual = 1 if effort.name == "quick" else _USUAL
     # A usual message follows each wrong one.
-    return usual + min(_USUALLY_INVALID, effort.cases(_MOST)) + 2 * _WRONG
+    return usual + min(_USUALLY_INVALID, len(_FORBIDDEN) * effort.cases(_MOST)) + 2 * _WRONG
 
 
 class NotSoapError(ValueError):
@@ -238,10 +238,16 @@ def _groups(caller: _Caller, port: SoapPort, operation: SoapOperation) -> Iterat
             caller.send(port, operation, kind, "a valid message", message)
     yield
     until = time.monotonic() + _BUDGET_S
-    invalid = list(_invalid(caller.messages.found, declared, node)) if declared and node else []
-    for says, wrong in effort.draw(invalid, _MOST, f"{caller.api.run.seed}/{label_of(port, operation)}"):
+    tried = list(mutations(declared, node)) if declared and node else []
+    drawn = [
+        one
+        for kind in _FORBIDDEN
+        for one in effort.draw([each for each in tried if each.kind == kind], _MOST, f"{caller.api.run.seed}/{kind}")
+    ]
+    for wrong in invalid_ones(drawn, caller.messages.found.types):
         if time.monotonic() < until and label_of(port, operation) not in caller.lost:
-            caller.send(port, operation, Kind.INVALID, says, caller.messages.message(port, operation, wrong))
+            message = caller.messages.message(port, operation, wrong.made[0])
+            caller.send(port, operation, Kind.INVALID, wrong.what, message)
     yield
     for kind, says, octets in _odd(caller, port, operation, node):
         if time.monotonic() < until and label_of(port, operation) not in caller.lost:
@@ -281,23 +287,6 @@ def _usual(caller: _Caller, port: SoapPort, operation: SoapOperation) -> tuple[E
     return declared, node, kind
 
 
-def _invalid(found: Wsdl, declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
-    """Yield messages that the schema forbids, each wrong in one thing."""
-    tried: list[tuple[str, Node]] = []
-    for path, part in declarations(declared, node):
-        if part.minimum:
-            tried.append((f"a message without {node.at(path).name}", node.replaced(path)))
-    for path, simple in simple_leaves(declared, node):
-        for text in [*unreadable(simple)[:2], *outside(simple)[:2]]:
-            name = node.at(path).name if path else node.name
-            tried.append((f"{text!r} as {name}", with_text(node, path, text)))
-    strange = Node(clark(_STRANGE, "Unknown"), "1")
-    tried.append(("a message with an element more", replace(node, children=(*node.children, strange))))
-    for says, wrong in tried:
-        if found.types.invalid(parse(wrong.written())):
-            yield says, wrong
-
-
 def _odd(
     caller: _Caller, port: SoapPort, operation: SoapOperation, node: Node | None
 ) -> Iterator[tuple[Kind, str, bytes]]:
@@ -309,9 +298,9 @@ def _odd(
     yield (
         Kind.VERSION,
         "an Envelope of an unknown namespace",
-        caller.messages.message(port, operation, node, space=_STRANGE),
+        caller.messages.message(port, operation, node, space=STRANGE),
     )
-    block = Node(clark(_STRANGE, "Strange"), "1", (), ((clark(port.envelope, "mustUnderstand"), "1"),))
+    block = Node(clark(STRANGE, "Strange"), "1", (), ((clark(port.envelope, "mustUnderstand"), "1"),))
     yield (
         Kind.UNDERSTAND,
         "a header block that must be understood",

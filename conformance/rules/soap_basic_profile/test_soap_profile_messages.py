@@ -7,7 +7,6 @@ import pytest
 from conformance.api.soap.callable_services import SoapServices, accepted_messages, callable_services, is_gone
 from conformance.api.soap.calls import call, expect_answer, send
 from conformance.api.soap.envelope import envelope
-from conformance.api.soap.mutations import invalid_ones, mutations
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import candidates, example, require_valid_document, typed
 from conformance.api.soap.xml_style import XmlStyle, serialize
@@ -117,23 +116,4 @@ def test_encodings(soap: SoapServices, judge: Judge, effort: Effort) -> None:
                 right = answer.accepted and answer.payload == operation.response
                 expect_answer(judge, f"soap-basic-profile/{id_}", answer).that(
                     right, f"status 2xx for a message in {what}"
-                )
-
-
-@pytest.mark.requirement("soap-basic-profile/R2724")
-def test_invalid_messages(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """Send messages that break the description's schema."""
-    for service in callable_services(soap, "soap-basic-profile/R2724"):
-        for operation, message in accepted_messages(soap, service, "soap-basic-profile/R2724"):
-            declared = service.contract.shape(operation.request) if operation.request else None
-            if declared is None:
-                continue
-            wrong = [item for item in mutations(declared, message) if item.kind not in {"body", "non-finite"}]
-            # Spread over all kinds and elements, rather than the first of them.
-            step = max(1, len(wrong) // effort.cases(40))
-            for mutant in invalid_ones(wrong[::step], service.contract.types):
-                answer = call(service, *mutant.made)
-                cause = f"{mutant.kind} {answer.status} {answer.code}"
-                expect_answer(judge, "soap-basic-profile/R2724", answer).fault(
-                    "Client", f"there is {mutant.what}", cause=cause
                 )

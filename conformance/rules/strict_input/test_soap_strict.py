@@ -20,8 +20,8 @@ from conformance.verdict.explorer import Explorer
 
 pytestmark = pytest.mark.phase("acting")
 _KINDS = ("missing", "unknown", "duplicate", "order", "namespace", "lexical", "range", "non-finite", "nil", "body")
-_FAULT = "strict-input/soap-fault"
-_IDS = (*(f"strict-input/soap-{kind}" for kind in _KINDS), _FAULT)
+_FAULT, _CLIENT = "strict-input/soap-fault", "soap-basic-profile/R2724"
+_IDS = (*(f"strict-input/soap-{kind}" for kind in _KINDS), _FAULT, _CLIENT)
 
 
 def _targets(soap: SoapServices, service: SoapService) -> list[tuple[Element, Node]]:
@@ -34,6 +34,9 @@ def _targets(soap: SoapServices, service: SoapService) -> list[tuple[Element, No
 def _judged(judge: Judge, mutant: Mutation[Payload], answer: SoapResponse) -> bool:
     """Judge whether the robot rejected an invalid message, and with which fault; return whether that was right."""
     why = f" ({mutant.reason})" if mutant.reason else ""
+    if mutant.reason:
+        cause = f"{mutant.kind} {answer.status} {answer.code}"
+        expect_answer(judge, _CLIENT, answer).fault("Client", f"there is {mutant.what}", cause=cause)
     refused = expect_answer(judge, f"strict-input/soap-{mutant.kind}", answer).that(
         answer.refused,
         f"a fault or status 4xx for {mutant.what}{why}",

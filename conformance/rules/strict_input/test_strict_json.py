@@ -7,7 +7,7 @@ import pytest
 from conformance.api.expectation import expect
 from conformance.api.mutations import Mutation
 from conformance.api.rest.applicable import applicable_operations
-from conformance.api.rest.calls import JSON, Call, example_call
+from conformance.api.rest.calls import JSON, XML, Call, example_call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.json_mutations import KINDS, mutations
 from conformance.api.rest.refusals import judge_refusal
@@ -25,7 +25,9 @@ _HOSTILE = ("strict-input/json-depth", "strict-input/json-huge-number")
 _EACH = 50
 
 
-@pytest.mark.requirement(*_IDS, *_STATUSES, "http/problem-detail", "http/problem-value", "http/no-server-error")
+@pytest.mark.requirement(
+    *_IDS, *_STATUSES, "http/problem-detail", "http/problem-value", "http/no-server-error", "rest-formats/problem-xml"
+)
 def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort) -> None:
     """Send each named mutation of a valid body, and a valid one after them."""
     possible: set[str] = set()
@@ -43,6 +45,9 @@ def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort)
             drawn = effort.draw(made, _count(effort, kind), f"{api.run.seed}/{operation.id} {kind}")
             for item in effort.alternatives(drawn, 1):
                 _try(api, judge, call, item)
+        for item in by_kind["type"][:1]:
+            # The observers judge the format of the refusal.
+            call.carrying(item.made).send(api, ("Accept", XML))
         api.device.halt(api)
         when = f"a valid {operation.id} follows invalid ones"
         expect(judge, "http/no-server-error", call.send(api)).taken(when)

@@ -6,17 +6,18 @@ from functools import partial
 import pytest
 
 from conformance.api.rest.applicable import applicable_operations, readable
-from conformance.api.rest.calls import Call, example_call
+from conformance.api.rest.calls import JSON, XML, Call, example_call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.parameters import Wrong, wrong_texts
 from conformance.api.rest.refusals import judge_refusal
 from conformance.api.rest.statuses import is_taken
-from conformance.documents.openapi import Operation
+from conformance.documents.openapi import Operation, operations_of
 
 pytestmark = pytest.mark.needs("rest")
 _QUERY = "strict-input/query-parameter"
 _MISSING = "strict-input/query-missing"
 _PATH = "strict-input/path-parameter"
+_PROBLEMS = ("http/problem-detail", "http/problem-value")
 # Wrong texts of one operation at standard effort.
 _STANDARD = 120
 
@@ -26,12 +27,20 @@ def _has(where: str, operation: Operation) -> bool:
 
 
 @pytest.mark.phase("settling")
-@pytest.mark.requirement(_QUERY, "http/problem-detail", "http/problem-value")
+@pytest.mark.requirement(_QUERY, *_PROBLEMS, "rest-formats/problem-xml")
 def test_query_parameters(api: RestInterface) -> None:
     """Send text, nothing, NaN, Infinity and 1e400 in place of a number in a query."""
     for call in _valid_calls(api, _QUERY, partial(_has, "query"), "takes numbers in its query"):
-        for item in _chosen(api, call.operation, "query"):
+        chosen = _chosen(api, call.operation, "query")
+        for item in chosen:
             _try(api, call, item, _QUERY)
+        for item in chosen[:1]:
+            # The observers judge the format of the refusal.
+            call.having(item.name, item.text).send(api, ("Accept", XML))
+    operations = operations_of(api.run.contract)
+    if not any(JSON in item.bodies or _has("query", item) or _has("path", item) for item in operations):
+        for id_ in _PROBLEMS:
+            api.run.judge.unclaimed(id_, "the contract has no input in which a field could be wrong")
 
 
 @pytest.mark.phase("settling")
@@ -53,7 +62,7 @@ def test_missing_query_parameters(api: RestInterface) -> None:
 
 
 @pytest.mark.phase("acting")
-@pytest.mark.requirement(_PATH, "http/problem-detail", "http/problem-value")
+@pytest.mark.requirement(_PATH, *_PROBLEMS)
 def test_path_parameters(api: RestInterface) -> None:
     """Send text, NaN, Infinity, 1e400 and values that are not allowed in a path."""
     for call in _valid_calls(api, _PATH, partial(_has, "path"), "takes numbers in its path"):
