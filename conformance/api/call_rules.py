@@ -1,4 +1,4 @@
-"""Which operations of a described API a run may call, and why not the others."""
+"""Which operations of an API a run may call, and why not the others."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ from dataclasses import dataclass
 from enum import StrEnum
 from fnmatch import fnmatchcase
 from functools import lru_cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from conformance.documents.openapi import Operation
 from conformance.statement.motion_map import shape_of
 from conformance.verdict.finding import counted
+
+if TYPE_CHECKING:
+    from conformance.verdict.run import Run
 
 #: Words in a path or operationId that say that a call may do harm, whatever its method.
 HARMFUL: Final = frozenset(
@@ -59,14 +62,25 @@ class CallRules:
         allow: patterns of operations that may be called although they are not safe.
         never: patterns of operations that must not be called.
         motion: whether the device may be moved.
+        by_author: whether the author of a contract says what moves the device, and permits all else.
     """
 
     allow: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
     motion: bool = False
+    by_author: bool = False
+
+    @classmethod
+    def of(cls, run: Run) -> CallRules:
+        """Return the rules of a run."""
+        calls = run.statement.calls
+        return cls(calls.allow, calls.never, run.allow_motion, run.contract.is_claimed)
 
     def decide(self, operation: Operation) -> Reason:
         """Return whether an operation may be called, with the reason."""
+        allowed = Reason.ALLOWED if self.motion or not operation.motion else Reason.MOVES
+        if self.by_author:
+            return allowed
         if operation.never:
             return Reason.EXCLUDED
         if any(matches(pattern, operation) for pattern in self.never):
@@ -76,9 +90,8 @@ class CallRules:
             return Reason.HARMFUL
         if operation.safe and not operation.motion:
             return Reason.READS if operation.reads else Reason.SAFE
-        if not any(matches(pattern, operation) for pattern in self.allow) and not operation.safe:
-            return Reason.CHANGES
-        return Reason.ALLOWED if self.motion or not operation.motion else Reason.MOVES
+        is_permitted = operation.safe or any(matches(pattern, operation) for pattern in self.allow)
+        return allowed if is_permitted else Reason.CHANGES
 
     def unused(self, operations: Sequence[Operation]) -> list[str]:
         """Return the patterns that match no operation."""

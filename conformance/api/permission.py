@@ -82,8 +82,7 @@ class Permission:
         base = (self._run.statement.endpoints.rest or "").rstrip("/")
         sent = _place(url).removeprefix(base)
         path = _SLASHES.sub("/", unquote(sent)) or "/"
-        calls = self._run.statement.calls
-        rules = CallRules(calls.allow, calls.never, motion=self._run.allow_motion)
+        rules = CallRules.of(self._run)
         declared = matching(self._run.contract, method, path)
         if declared is None and is_normal(path) and is_normal(sent):
             # A value with a slash in it, written as %2F: another path only for a server that decodes it and has that.

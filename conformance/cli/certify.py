@@ -31,7 +31,6 @@ from conformance.transport.reach import UnreachableError
 from conformance.verdict.effort import DEEP_MINUTES, EFFORTS, Effort
 
 if TYPE_CHECKING:
-    from conformance.documents.openapi import Operation
     from conformance.engine.certification import Certification
     from conformance.verdict.run import Run
 
@@ -243,7 +242,8 @@ def _certify(door: FrontDoor | None, judged: Judged, options: CertifyOptions, st
     notes = (*remarks, *_notes(run))
     command = command_without_folders(sys.argv[1:], ("--call", "--never"))
     moves = run.statement.motion_map.calls if run.allow_motion and run.statement.motion_map else ()
-    robot, calls = (RobotUnderTest(run, connection), () if contract.is_claimed else tuple(told(*_rules(run), moves)))
+    robot = RobotUnderTest(run, connection)
+    calls = () if contract.is_claimed else tuple(told(CallRules.of(run), operations_of(contract), moves))
     progress, bar = None if options.progress == "none" else sys.stderr, options.progress == "auto"
     said: dict[str, Any] = {"progress": progress, "bar": bar, "notes": notes, "announced": calls}
     return judge(robot, options.out, command=command, baseline=baseline, **said)
@@ -266,11 +266,6 @@ def _run(chosen: Statement, options: CertifyOptions, contract: Contract) -> Run:
     )
 
 
-def _rules(run: Run) -> tuple[CallRules, tuple[Operation, ...]]:
-    calls = run.statement.calls
-    return CallRules(calls.allow, calls.never, motion=run.allow_motion), operations_of(run.contract)
-
-
 def _notes(run: Run) -> tuple[str, ...]:
     notes = []
     if run.statement.claims is None and run.contract.is_claimed:
@@ -279,10 +274,8 @@ def _notes(run: Run) -> tuple[str, ...]:
         f"Class {name} is not claimed: the robot's {' and '.join(missing)} interface has no address."
         for name, missing in run.statement.lacking(run.contract).items()
     ]
-    if not run.contract.is_claimed:
-        rules, operations = _rules(run)
-        unused = rules.unused(operations)
-        notes += [f"The pattern {one!r} matches no operation of the description." for one in unused]
-    elif not run.allow_motion:
+    unused = CallRules.of(run).unused(operations_of(run.contract)) if run.contract.openapi_path else ()
+    notes += [f"The pattern {one!r} matches no operation of the description." for one in unused]
+    if run.contract.is_claimed and not run.allow_motion:
         notes.append("Without --allow-motion nothing was sent that moves the robot; what needs motion is skipped.")
     return tuple(notes)

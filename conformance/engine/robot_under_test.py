@@ -300,8 +300,7 @@ class RobotUnderTest:
         # Imported late: the survey and what it needs cost time that --help need not pay.
         from conformance.scenarios.estimate import estimate  # noqa: PLC0415
 
-        rules = CallRules(run.statement.calls.allow, run.statement.calls.never, motion=run.allow_motion)
-        operations = [one for one in operations_of(run.contract) if rules.decide(one).may]
+        operations = [one for one in operations_of(run.contract) if CallRules.of(run).decide(one).may]
         # The first requests call no operation of a WSDL, and show nothing of how long one takes.
         measured = measured and SOAP not in run.contract.classes
         said = estimate(run, operations).text(run.effort.usual_ms if measured else None)

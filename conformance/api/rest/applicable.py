@@ -84,8 +84,6 @@ def answered(api: RestInterface, *ids: str) -> list[Call]:
 
 def allowed(api: RestInterface, operation: Operation) -> bool:
     """Return whether the operation may be sent in this run."""
-    if api.run.contract.is_claimed:
-        return api.run.allow_motion or not operation.motion
     return api.call_rules.decide(operation).may
 
 

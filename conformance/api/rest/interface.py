@@ -77,9 +77,8 @@ class RestInterface:
 
     @cached_property
     def call_rules(self) -> CallRules:
-        """What may be called of an API of which only its description is known."""
-        calls = self.run.statement.calls
-        return CallRules(calls.allow, calls.never, motion=self.run.allow_motion)
+        """What may be called."""
+        return CallRules.of(self.run)
 
     def send(self, request: Outgoing, *, fresh: bool = False, timeout_s: float | None = None) -> Exchange:
         """Send a request; PUT and DELETE on a connection of their own.

@@ -48,6 +48,10 @@ _READ = Operation("", "GET", "/state/{id}")
         (Operation("", "GET", "/a", motion=True), CallRules(), Reason.MOVES),
         (Operation("", "GET", "/a", motion=True), CallRules(motion=True), Reason.ALLOWED),
         (Operation("", "GET", "/a", never=True), CallRules(("GET /a",)), Reason.EXCLUDED),
+        # The author of a contract has decided.
+        (Operation("", "POST", "/system/shutdown"), CallRules(by_author=True), Reason.ALLOWED),
+        (Operation("", "GET", "/a", motion=True), CallRules(by_author=True), Reason.MOVES),
+        (Operation("", "PUT", "/a", motion=True), CallRules(motion=True, by_author=True), Reason.ALLOWED),
     ],
 )
 def test_decisions(operation, rules, reason):

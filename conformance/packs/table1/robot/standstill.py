@@ -14,7 +14,7 @@ from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.observe.polling import poll
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import GOAL_PATH, STILL, Robot
-from conformance.packs.table1.robot.standstill_trace import Attempt, Rest, Standing
+from conformance.packs.table1.robot.standstill_trace import GOAL, Attempt, Rest, Standing
 from conformance.packs.table1.robot.stopping import bring_to_rest, halt
 
 
@@ -142,7 +142,7 @@ def read_rest(drive: Drive, after: str, *, goal: bool = False) -> Rest:
     if still is False:
         return Rest(after, exchange, f"the velocity ({seen})")
     active, shown = drive.robot.goal() if goal else (None, exchange)
-    return Rest(after, shown, "" if active is None else "an active goal")
+    return Rest(after, shown, "" if active is None else GOAL)
 
 
 def watch_rest(drive: Drive, after: str, seconds: float, *, goal: bool = False) -> Rest:

@@ -2,10 +2,14 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Final
 
 from conformance.scenarios.rule import NotTested
 from conformance.transport.exchange import Exchange
 from conformance.verdict.case import Case
+
+#: What is found of a robot that rests and has a goal.
+GOAL: Final = "an active goal"
 
 
 @dataclass(frozen=True)

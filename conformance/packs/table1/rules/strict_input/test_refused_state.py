@@ -7,7 +7,7 @@ from typing import Final
 from conformance.packs.table1.robot.delivery_trace import key_of
 from conformance.packs.table1.robot.goal import CANCELED, NEW, outcome_fault
 from conformance.packs.table1.robot.robot import GOAL_PATH
-from conformance.packs.table1.robot.standstill_trace import Rest, Standing, stays
+from conformance.packs.table1.robot.standstill_trace import GOAL, Rest, Standing, stays
 from conformance.packs.table1.scenarios.invalid_velocities import invalid_velocities
 from conformance.packs.table1.scenarios.refused_again import DuringGoal, RefusedAgain, refused_again
 from conformance.packs.table1.scenarios.standing import standing
@@ -38,8 +38,9 @@ def refused_again_at_rest(trace: RefusedAgain) -> Iterator[Outcome]:
 
 @rule("strict-input/goal-refused", on=(refused_again,))
 def goal_refused_again(trace: RefusedAgain) -> Iterator[Outcome]:
-    """Judge that the robot keeps its goal when goals and cancels that it has refused are sent again."""
-    return (_kept(one) for one in trace.during if _about_goal(one))
+    """Judge that the robot sets, keeps or loses no goal by goals and cancels that it has refused, sent again."""
+    yield from (rest.case for rest in trace.rests if rest.found in {"", GOAL})
+    yield from (_kept(one) for one in trace.during if _about_goal(one))
 
 
 @rule("rest-resources/goal-get", on=(refused_again,))
