@@ -120,7 +120,10 @@ def test_a_file_that_is_none(well_made, tmp_path, place, what):
     else:
         what(sent / place)
     before = _tree(tmp_path)
-    for command, codes in READERS[place].items():
+    # Whatever stands there instead of a file meets each command; wrong contents are read by one reader, and meet one.
+    commands = [*READERS[place].items()]
+    turn = [*CONTENTS].index(what) % len(commands) if isinstance(what, str) else None
+    for command, codes in commands if turn is None else [commands[turn]]:
         done = run(command, sent)
         check(done, *codes)
         assert SECRET not in done.output
@@ -186,8 +189,7 @@ def test_a_pack_that_a_result_names_is_no_path(well_made, tmp_path, monkeypatch,
         document.pop("api", None)
         document |= {} if api is None else {"api": api}
         (sent / "result" / "result.json").write_text(json.dumps(document))
-        commands = ("replay {}/result", "judge {}/result", "report {}/result", "diff {}/result {}/result")
-        for command in commands:
+        for command in ("replay {}/result", "judge {}/result"):
             check(run(command, sent), 0, 1, 2, 4)
     assert not marker.exists()
 
