@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 from http import HTTPStatus
 
-from conformance.api.rest.formats import quality
+from conformance.api.rest.formats import are_data, quality
 from conformance.api.rest.statuses import CRASHES, is_cut_off
 from conformance.api.rest.validity import INVALID, VALID
 from conformance.checkers.occasion import METHODS, Occasion
@@ -165,7 +165,9 @@ def negotiation(occasion: Occasion) -> Iterator[Case]:
             f"status {answer.status} with {answer.media_type}",
             cause="not acceptable",
         )
-    if len(operation.formats) > 1 and not context.is_head:
+    # Of formats that may be there for other values, the response to Accept shows that the device chooses.
+    is_chosen = answer.media_type == (context.accept or "") != operation.formats[0]
+    if len(operation.formats) > 1 and (is_chosen or are_data(operation.formats)) and not context.is_head:
         vary = (answer.header("vary") or "").lower()
         names_accept = "*" in vary or "accept" in [name.strip() for name in vary.split(",")]
         found = f"Vary: {answer.header('vary')}" if vary else "no header field Vary"

@@ -1,21 +1,27 @@
-"""What an item's path leads to: the item with the identifier in the path (RFC 9110 9.3.1)."""
+"""What tells the things of a collection apart: each path leads to its own (RFC 9110 9.3.1); what is unique stays so."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
-from typing import Final
+from http import HTTPStatus
+from typing import Any, Final
 from urllib.parse import unquote
 
 from conformance.api.rest.listing import listed
-from conformance.api.rest.things import collection_of, identifier_of
+from conformance.api.rest.things import collection_of, identifier_of, represented
 from conformance.checkers.occasion import Occasion
-from conformance.documents.json_text import read_json
+from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
+from conformance.documents.parameters import plain_name
 from conformance.verdict.case import Case
 
 # So many identifiers of a run are remembered.
 _REMEMBERED: Final = 50_000
+# Statuses by which a creation with a taken value is refused; so many refused bodies of so many octets are remembered.
+_TAKEN: Final = frozenset({HTTPStatus.BAD_REQUEST, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY})
+_FEW: Final = 8
+_OCTETS: Final = 16_384
 
 
 class Identities:
@@ -76,3 +82,65 @@ class Identities:
                 f"the item with the identifier {text}",
                 cause=operation.label,
             )
+
+
+class Uniques:
+    """Judges whether two things have the same value of a member that has to be new in each creation.
+
+    That a member has to be new shows from a creation that was refused, and accepted with another value of it alone.
+    """
+
+    def __init__(self) -> None:
+        # By the path of a collection: values that creations had, bodies that were refused, and members that are unique.
+        self._made: dict[str, set[tuple[str, str]]] = defaultdict(set)
+        self._refused: dict[str, list[dict[str, Any]]] = defaultdict(list)
+        self._unique: dict[str, set[str]] = defaultdict(set)
+        # Members of things by collection and identifier, as they were read since one of them was changed.
+        self._read: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        operation, answer, method = occasion.operation, occasion.response, occasion.request.method
+        if operation is None or occasion.request.raw is not None:
+            return
+        path = occasion.context.target.partition("?")[0].rstrip("/")
+        above, _, last = path.rpartition("/")
+        if method == "POST" and is_json(occasion.request.media_type):
+            self._created(occasion, path)
+        elif method in {"PUT", "PATCH", "DELETE"} and answer.ok:
+            self._read[above].clear()
+        elif method == "GET" and answer.ok and self._unique[above] and occasion.context.plain:
+            value = read_json(answer.body).value if is_json(answer.media_type) else None
+            now = {name: one for name, one in represented(value, self._unique[above]).items() if _is_plain(one)}
+            yield from self._judged(occasion, operation, above, last, now)
+            self._read[above][last] = now
+
+    def _created(self, occasion: Occasion, path: str) -> None:
+        body = read_json(occasion.request.body).value if len(occasion.request.body) < _OCTETS else None
+        if not isinstance(body, dict):
+            return
+        refused, made = self._refused[path], self._made[path]
+        if occasion.response.status == HTTPStatus.CREATED:
+            for one in refused:
+                other = [name for name in {*body, *one} if body.get(name) != one.get(name)]
+                if len(other) == 1 and (other[0], str(one.get(other[0]))) in made:
+                    self._unique[path].add(plain_name(other[0]))
+            made |= {(name, str(one)) for name, one in body.items() if _is_plain(one) and len(made) < _REMEMBERED}
+        elif occasion.response.status in _TAKEN and occasion.is_valid:
+            self._refused[path] = [*refused, body][-_FEW:]
+
+    def _judged(
+        self, occasion: Occasion, operation: Operation, above: str, last: str, now: dict[str, Any]
+    ) -> Iterator[Case]:
+        for name, value in now.items():
+            if plain_name(name) in self._unique[above]:
+                twice = next(
+                    (key for key, one in self._read[above].items() if key != last and one.get(name) == value), ""
+                )
+                expected = f"another {name} than {above}/{twice} has, because creations with a taken one are refused"
+                found, cause = f"{name} {shown(value)}, as {above}/{twice} has", f"{operation.label} {name} twice"
+                yield occasion.case("description/own-identifier", not twice, expected, found, cause=cause)
+
+
+def _is_plain(value: Any) -> bool:
+    return isinstance(value, str | int) and not isinstance(value, bool) and value != ""

@@ -6,7 +6,7 @@ from typing import Final
 from conformance.api.rest.request_context import RequestContext
 from conformance.checkers import conditional, declared, fields, problem
 from conformance.checkers.entity_tags import EntityTags
-from conformance.checkers.identities import Identities
+from conformance.checkers.identities import Identities, Uniques
 from conformance.checkers.lists import Lists
 from conformance.checkers.memory import Memory
 from conformance.checkers.occasion import Occasion
@@ -41,7 +41,7 @@ class RestCheckers:
         self._memory, self._writes = Memory(contract), Writes(contract)
         self._over_time = (
             conditional.Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
-            self._writes,
+            self._writes, Uniques(),
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:

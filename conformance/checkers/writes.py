@@ -29,6 +29,8 @@ _REFUSED: Final = range(400, 500)
 _UNCLEAR: Final = frozenset({HTTPStatus.NOT_ACCEPTABLE, HTTPStatus.REQUEST_TIMEOUT})
 _NOT_NOW: Final = HTTPStatus.ACCEPTED
 _MOST: Final = 1_000
+# A device that acts later has so long, s.
+_SETTLES_S: Final = 3.0
 _MOST_OCTETS: Final = 65_536
 # What looks like a habit of the device counts when it is seen by so many requests.
 _SEEN: Final = 2
@@ -44,6 +46,15 @@ class _State(NamedTuple):
     at_s: float
 
 
+class _Sandwich(NamedTuple):
+    """Members before and after a write, those of them that change by themselves, and whether it was long ago."""
+
+    before: dict[str, Any]
+    now: dict[str, Any]
+    moving: frozenset[str]
+    is_old: bool
+
+
 class _Change(NamedTuple):
     """A write between two reads, as it is judged by the second one."""
 
@@ -52,6 +63,7 @@ class _Change(NamedTuple):
     before: dict[str, Any]
     now: dict[str, Any]
     moving: frozenset[str]
+    is_old: bool
 
     @property
     def sent(self) -> Any:
@@ -71,8 +83,10 @@ class _Change(NamedTuple):
     def is_settled(self, name: str, names: Any) -> bool:
         """Return whether the device has acted by the second read, which a device that acts later has not.
 
-        Its response shows the member as that read does, or another member of the request has changed.
+        It was long ago, its response shows the member as that read does, or another member of it has changed.
         """
+        if self.is_old:
+            return True
         response = self.write.response
         answer = read_json(response.body).value if is_json(response.media_type) else None
         told = represented(answer, {plain_name(one) for one in self.now})
@@ -96,6 +110,8 @@ class Writes:
         self._collections = collections_of(operations)
         self._states: dict[str, _State] = {}
         self._writes: dict[str, list[Occasion]] = defaultdict(list)
+        # Writes that no read has shown so far.
+        self._late: dict[str, Occasion] = {}
         self._moving: set[tuple[str, str]] = set()
         # What may be chance: by operation and member, the bodies that showed it.
         self._doubts: dict[tuple[str, str], set[bytes]] = defaultdict(set)
@@ -105,6 +121,7 @@ class Writes:
         """Forget all reads: something else may have changed the resources."""
         self._states.clear()
         self._writes.clear()
+        self._late.clear()
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
@@ -130,34 +147,32 @@ class Writes:
         value = read_json(response.body).value if is_json(response.media_type) and not response.cut else None
         now = represented(value, {plain_name(name) for name in _parts(item.shape)})
         state, writes = self._states.pop(path, None), self._writes.pop(path, [])
-        sent_s = response.received_s - response.elapsed_ms / 1000
+        sent_s, late = response.received_s - response.elapsed_ms / 1000, self._late.pop(path, None)
         if state is not None and state.at_s <= sent_s and len(response.body) <= _MOST_OCTETS:
             names = {*now, *state.members}
+            is_same = all(same(now.get(one), state.members.get(one)) for one in names)
             if not writes:
                 self._moving |= {
                     (item.template, one) for one in names if not same(now.get(one), state.members.get(one))
                 }
-            write = writes[0] if len(writes) == 1 else None
-            if write is not None and state.at_s <= _sent_s(write) and write.response.received_s <= sent_s:
+            write = writes[0] if len(writes) == 1 else late if not writes and is_same else None
+            if write is not None and (state.at_s <= _sent_s(write) or write is late):
                 moving = frozenset(one for one in names if (item.template, one) in self._moving)
-                yield from self._judged(occasion, item, write, state.members, now, moving)
+                is_old = sent_s - write.response.received_s > _SETTLES_S
+                if is_old or write is not late:
+                    yield from self._judged(occasion, item, write, _Sandwich(state.members, now, moving, is_old))
+                if write.response.ok and is_same and not is_old:
+                    # A device may act later: a later read is compared as well.
+                    self._late[path] = write
         if len(self._states) < _MOST:
             self._states[path] = _State(now, response.received_s)
 
-    def _judged(
-        self,
-        occasion: Occasion,
-        item: Operation,
-        write: Occasion,
-        before: dict[str, Any],
-        now: dict[str, Any],
-        moving: frozenset[str],
-    ) -> Iterator[Case]:
+    def _judged(self, occasion: Occasion, item: Operation, write: Occasion, reads: _Sandwich) -> Iterator[Case]:
         operation, request = write.operation, write.request
         is_readable = is_json(request.media_type) and len(request.body) <= _MOST_OCTETS
-        if operation is None or request.media_type not in operation.bodies or not is_readable or not now:
+        if operation is None or request.media_type not in operation.bodies or not is_readable or not reads.now:
             return
-        change = _Change(write, operation, before, now, moving)
+        change = _Change(write, operation, *reads)
         if write.response.status in _REFUSED:
             yield from self._refused(occasion, change)
             return

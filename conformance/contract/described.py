@@ -30,8 +30,6 @@ SOAP: Final = "soap"
 #: What a web server does by itself, for a device of either kind.
 WEB_SERVER: Final = "web-server"
 _CLASSES: Final = ("description", "robustness", "http", WEB_SERVER)
-# Formats in which one value can be written.
-_DATA: Final = re.compile(r"[/+](?:x-)?(?:json|xml|yaml)\b")
 _NO_NAME: Final = re.compile(r"[^a-z0-9]+")
 
 
@@ -60,7 +58,7 @@ def write_described_pack(
     info = info if isinstance(info, dict) else {}
     name = _NO_NAME.sub("-", str(info.get("title", "api")).lower()).strip("-") or "api"
     taken, sent = _formats(document)
-    more = {MOTION: moves, "rest-formats": len(sent) > 1, "xml-security": any("xml" in name for name in taken)}
+    more = {MOTION: moves, "rest-formats": sent > 1, "xml-security": any("xml" in name for name in taken)}
     classes = [*_CLASSES, *(name for name, there in more.items() if there)]
     lines = [
         f"name = {basic_string(name)}",
@@ -106,10 +104,10 @@ def copy_as_data(pack: Path, folder: Path, readable: Callable[[dict[str, Any]], 
     return folder
 
 
-def _formats(document: Mapping[str, Any]) -> tuple[set[str], set[str]]:
-    """Return the media types that the operations take, and the formats of data that one of them sends, if several."""
+def _formats(document: Mapping[str, Any]) -> tuple[set[str], int]:
+    """Return the media types that the operations take, and the most that one response of a success has."""
     taken: set[str] = set()
-    sent: set[str] = set()
+    sent = 0
     for item in document.get("paths", {}).values():
         for operation in item.values() if isinstance(item, dict) else ():
             if not isinstance(operation, dict):
@@ -117,8 +115,7 @@ def _formats(document: Mapping[str, Any]) -> tuple[set[str], set[str]]:
             taken |= _content(operation.get("requestBody"))
             responses = operation.get("responses")
             for status, response in responses.items() if isinstance(responses, dict) else ():
-                formats = {name for name in _content(response) if str(status)[0] == "2" and _DATA.search(name)}
-                sent = max(sent, formats, key=len)
+                sent = max(sent, len(_content(response)) if str(status)[0] == "2" else 0)
     return taken, sent
 
 

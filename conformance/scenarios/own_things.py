@@ -28,7 +28,7 @@ from conformance.scenarios.living import ABSENT
 from conformance.scenarios.neighbours import NO_TAG
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.singletons import is_changeable, is_free
-from conformance.scenarios.special_bodies import TEXTS, special_bodies, with_owned
+from conformance.scenarios.special_bodies import TEXTS, is_list_of_changes, special_bodies, with_owned
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey, Surveyor
 from conformance.scenarios.writing import Writer, members
@@ -70,6 +70,8 @@ def own_things(api: RestInterface, values: Values) -> Survey:
                     thing = _Thing(surveyor, read, thing_path)
                     thing.asked()
                     thing.written(changes)
+                    if values.unique.knows(create) and changes:
+                        thing.made_alike(create, changes, delete)
                     thing.deleted(delete, operations.get(("GET", collection_of(path))))
     return surveyor.trace
 
@@ -180,9 +182,19 @@ class _Thing:
             for body in alone if self.tag else [one for one in bodies if _is_beyond_ascii(one)][:1] + alone:
                 if self.sent(change, body, *self._current()).ok:
                     self.get()
+            waits = True
             for body in self._special(change):
-                self.sent(change, body, *self._current(), place="body")
+                before, until = self._members(), time.monotonic() + _SETTLES_S
+                is_done = self.sent(change, body, *self._current(), place="body").ok
                 self.get()
+                # A JSON patch says what it changes; a device may do it later.
+                while waits and is_done and is_list_of_changes(before, body) and self._members() == before:
+                    waits = time.monotonic() < until
+                    time.sleep(_PAUSE_S if waits else 0)
+                    self.get()
+
+    def _members(self) -> dict[str, Any]:
+        return members(self.last, ()) if self.last is not None else {}
 
     def _special(self, change: Operation) -> Iterator[Any]:
         """Yield bodies with other values for what the device sets itself, with what is left out, null or wrong."""
@@ -199,6 +211,30 @@ class _Thing:
             yield from special_bodies(
                 change, self.read, lambda: members(self.last, parts) if self.last else {}, values, may
             )
+
+    def made_alike(self, create: Operation, changes: list[Operation], delete: Operation | None) -> None:
+        """Give it what only one thing may have, from another thing that is created for that."""
+        unique = self.surveyor.values.unique
+        path = created_path(self.surveyor, create, self.read)
+        other = _Thing(self.surveyor, self.read, path)
+        if not path or path == self.target or not other.get().ok or not self.get().ok:
+            return
+        for change in changes:
+            parts = flat(change.bodies[next(iter(change.bodies))].schema).get("properties", {}) if change.bodies else {}
+            own, theirs = (
+                members(self.last, parts) if self.last else {},
+                members(other.last, parts) if other.last else {},
+            )
+            taken = {name: theirs[name] for name in unique.names(create) if name in theirs and name in parts}
+            kept = {name: one for name, one in own.items() if name in parts and not parts[name].get("readOnly")}
+            if taken:
+                self.sent(
+                    change, taken if change.method == "PATCH" else {**kept, **taken}, *self._current(), place="body"
+                )
+                self.get()
+                other.get()
+        if delete is not None:
+            other.sent(delete, None, *other._current())
 
     def _current(self) -> tuple[tuple[str, str], ...]:
         """Return If-Match with its entity tag; a weak one matches none (RFC 9110 13.1.1)."""

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from conformance.api.rest.inputs import Inputs, usual_inputs
 from conformance.api.rest.invalid_variations import invalid_variations
-from conformance.api.rest.patches import JSON_PATCH, MERGE
+from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, patched, same
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.samples import alike_and_apart, fits
 from conformance.api.rest.things import another, is_devices
@@ -137,17 +137,21 @@ def _nulls(
     usable = {name: one for name, one in there.items() if name in parts and one is not None and may(name)}
     own = {name for name in usable if is_devices(name, parts[name], frozenset())}
     nulls = [name for name in usable if name not in needed and name not in own]
-    for turn, name in enumerate(nulls[:_NULLS]):
-        rest = {one: value for one, value in usable.items() if one != name and one not in own}
+    together = [name for name in nulls if fits(parts[name], None)]
+    for turn, names in enumerate([together, *([name] for name in nulls[:_NULLS])]):
+        gone = [name for name in names if now().get(name) is not None]
+        rest = {one: value for one, value in usable.items() if one not in nulls and one not in own}
         others = another({"properties": parts}, rest, turn + 3, values.collections)
-        beside = next((one for one in others if others[one] != now().get(one)), None)
-        yield {name: None, **({beside: others[beside]} if beside else {})}
-    for name, value in usable.items():
-        inner = telling(parts[name], value, 1, values.collections) if isinstance(value, dict) else {}
-        changed = [one for one in inner if inner[one] != value[one]]
-        if changed and len(value) > 1:
-            yield {name: {changed[0]: inner[changed[0]]}}
-            yield {name: value}
+        beside = next((one for one in others if others[one] not in (None, now().get(one))), None)
+        if gone:
+            yield {**dict.fromkeys(gone), **({beside: others[beside]} if beside else {})}
+    changed = telling({"properties": parts}, {name: usable[name] for name in usable if name not in own}, 1, frozenset())
+    for name in [one for one in changed if isinstance(changed[one], list) and changed[one] != usable[one]][:1]:
+        yield from ({name: usable[name]}, {name: changed[name]})
+    for name, value in changed.items():
+        inner = [one for one in value if value[one] != usable[name].get(one)] if isinstance(value, dict) else []
+        if inner and len(value) > 1:
+            yield from ({name: usable[name]}, {name: {inner[0]: value[inner[0]]}})
             break
 
 
@@ -178,11 +182,15 @@ def _patches(
         lambda: [replacing(last, 1), {"op": "remove", "path": "/roaas-unknown"}],
         lambda: [{"op": "copy", "from": _pointer(one), "path": _pointer(last)}] if one != last else [],
     ]
-    for name, value in first.items():
-        item = alike_and_apart(parts[name])[1] if isinstance(value, list) else []
-        new = next((other for other in item if other not in value), None)
-        if new is not None:
-            makers.append(lambda name=name, new=new: [{"op": "add", "path": f"{_pointer(name)}/-", "value": new}])  # type: ignore[misc] # bound in its round
+    for name in (one for one, part in parts.items() if may(one) and "array" in kinds_of(part)):
+        *rest, last_item = alike_and_apart(parts[name])[1] or [None]
+        whole, added = (
+            {"op": "add", "path": _pointer(name), "value": rest},
+            {"op": "add", "path": f"{_pointer(name)}/-", "value": last_item},
+        )
+        if rest and fits(parts[name], [*rest, last_item]) and not flat(parts[name]).get("readOnly"):
+            makers.append(lambda whole=whole, added=added: [whole, added])  # type: ignore[misc] # bound in its round
+            break
     for make in makers:
         if (patch := make()) and fits(schema, patch):
             yield patch
@@ -190,6 +198,14 @@ def _patches(
     restored = [one for one in restored if now().get(one["path"][1:]) != one["value"] and fits(schema, [one])]
     if restored:
         yield restored
+
+
+def is_list_of_changes(document: Any, patch: Any) -> bool:
+    """Return whether a JSON patch makes another document of this one."""
+    try:
+        return isinstance(patch, list) and not same(patched(document, patch), document)
+    except PatchError:
+        return False
 
 
 def _pointer(name: str) -> str:

@@ -19,7 +19,7 @@ from conformance.api.rest.statuses import HELD
 from conformance.api.rest.things import collection_of
 from conformance.api.rest.validity import UNCLEAR, VALID, Validity, validity
 from conformance.api.rest.values import Values
-from conformance.api.rest.variations import UNKNOWN, Kind, Variation
+from conformance.api.rest.variations import UNKNOWN, Kind, Variation, least_inputs, most_references
 from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.documents.patterns import SlowPatternError
 from conformance.documents.resources import known_path
@@ -407,11 +407,23 @@ class Surveyor:
             self._time(operation, usual, effort, until)
             left -= time.monotonic() - began
             yield
+        self._end(operation, usual)
+
+    def _end(self, operation: Operation, usual: Inputs) -> None:
+        """Send as many references as a list may have, the usual request with a charset, and as it was at first."""
+        is_usable = operation.label not in self.given_up
+        for fewer, most in most_references(operation, usual, self.values) if is_usable else ():
+            # If the device takes all but one, and takes that one alone, it knows each of them.
+            if self.send(operation, Variation(Kind.AGAIN, "", "", fewer)).ok:
+                self.send(operation, most)
         if is_json(usual.media_type) and operation.label not in self.given_up:
             shown = Variation(Kind.OPTIONAL, "with a charset", CHARSET, usual)
             request = self._reaching.request(operation, shown).having_type(f"{usual.media_type}; charset=utf-8")
             self.send(operation, shown, request)
-        self.send(operation, Variation(Kind.AGAIN, "", "", usual))
+        # What is left out has its default, more than once.
+        least = least_inputs(operation, usual)
+        for inputs in [usual] if least is None else [least] * 2:
+            self.send(operation, Variation(Kind.AGAIN, "", "", inputs))
 
     def create_and_delete(self, operations: Sequence[Operation]) -> None:
         """At standard, create things and delete them, so often that a failure in one call of twenty is met."""

@@ -3,10 +3,10 @@
 import itertools
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Final
 
 from conformance.api.expectation import expect
 from conformance.api.rest.calls import JSON, Call
@@ -189,6 +189,14 @@ def _compare(
 
 def _same(value: Any, other: Any) -> bool:
     return type(value) is type(other) and bool(value == other)
+
+
+_DATA: Final = re.compile(r"[/+](?:x-)?(?:json|xml|yaml)\b")
+
+
+def are_data(formats: Sequence[str]) -> bool:
+    """Return whether one value can be written in several of these formats; others may be there for other values."""
+    return sum(bool(_DATA.search(name)) for name in formats) > 1
 
 
 _QUALITY = re.compile(r"0(?:\.\d{0,3})?|1(?:\.0{0,3})?", re.ASCII)

@@ -17,6 +17,8 @@ from conformance.documents.representation import flat
 
 # A longer array is a load test.
 _MOST_ITEMS: Final = 100
+# Of so many formats of a response each is asked for with a wrong value.
+_FORMATS: Final = 3
 # What frameworks refuse in any place.
 _OTHER_TYPE: Final = "which has another type"
 _NOT_ASCII: Final = "which is none of its values, and beyond ASCII"
@@ -26,19 +28,7 @@ _COMMON: Final = frozenset({_OTHER_TYPE, _NOT_ASCII})
 
 def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
     """Yield requests that the description forbids: each breaks one rule of it, clearly also as it is written."""
-    for item in operation.parameters:
-        place = f"{item.where} {item.name}"
-        if item.required and item.where != "path" and parameter_verdict(operation, item, NOTHING) == INVALID:
-            without = usual.having(item.where, item.name, NOTHING)
-            yield Variation(Kind.MISSING, f"no {place}", place, without)
-        for value, why in _wrong_values(item.schema, usual.at(item.where).get(item.name)):
-            if parameter_verdict(operation, item, value) == INVALID:
-                changed = usual.having(item.where, item.name, value)
-                says = f"{shown(value)} as {place}, {why}"
-                yield Variation(Kind.INVALID, says, place, changed, is_common=why in _COMMON)
-                if item.where == "query" and why in _BEYOND:
-                    beside = _beside(operation, changed)
-                    yield from (Variation(Kind.INVALID, f"{says}, with {name}", place, one) for name, one in beside)
+    yield from _invalid_parameters(operation, usual)
     if usual.media_type in {FORM, MULTIPART} and isinstance(usual.body, dict):
         found = _invalid_fields(usual, usual.body, flat(operation.bodies[usual.media_type].schema))
         yield from (one for one in found if body_verdict(operation, one.inputs) == INVALID)
@@ -60,6 +50,29 @@ def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
     yield from (
         one for one in found if not fits(body.schema, one.inputs.body) and (is_whole or one.kind is Kind.INVALID)
     )
+
+
+def _invalid_parameters(operation: Operation, usual: Inputs) -> Iterator[Variation]:
+    """Yield requests without a required parameter, and with a wrong value of one."""
+    for item in operation.parameters:
+        place = f"{item.where} {item.name}"
+        if item.required and item.where != "path" and parameter_verdict(operation, item, NOTHING) == INVALID:
+            without = usual.having(item.where, item.name, NOTHING)
+            yield Variation(Kind.MISSING, f"no {place}", place, without)
+        formats = operation.formats[1:_FORMATS]
+        for value, why in _wrong_values(item.schema, usual.at(item.where).get(item.name)):
+            if parameter_verdict(operation, item, value) == INVALID:
+                changed = usual.having(item.where, item.name, value)
+                says = f"{shown(value)} as {place}, {why}"
+                yield Variation(Kind.INVALID, says, place, changed, is_common=why in _COMMON)
+                if item.where == "query" and why in _BEYOND:
+                    beside = _beside(operation, changed)
+                    yield from (Variation(Kind.INVALID, f"{says}, with {name}", place, one) for name, one in beside)
+                # What writes another format may be another path through the code.
+                for name in formats:
+                    other = replace(changed, accept=name)
+                    yield Variation(Kind.INVALID, f"{says}, with Accept: {name}", place, other)
+                formats = ()
 
 
 def _beside(operation: Operation, inputs: Inputs) -> Iterator[tuple[str, Inputs]]:

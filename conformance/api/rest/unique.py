@@ -47,6 +47,10 @@ class Unique:
         """Return whether members of an operation's body are known that must be new."""
         return bool(self._names.get(_collection(operation)))
 
+    def names(self, operation: Operation) -> tuple[str, ...]:
+        """Return the members of an operation's body that must be new."""
+        return self._names.get(_collection(operation), ())
+
     def trials(self, operation: Operation, body: Any, schema: Schema) -> Iterator[tuple[tuple[str, ...], Any]]:
         """Yield members that may have to be new, and the body with new values of them: first all, then each alone."""
         parts = flat(schema).get("properties", {})

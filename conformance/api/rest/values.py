@@ -19,7 +19,7 @@ from conformance.documents.writing import text_of
 from conformance.transport.exchange import Exchange, Outgoing
 
 # As many values of one name are remembered, and as many are tried in one place.
-_REMEMBERED, _TRIED = 8, 4
+_REMEMBERED, _TRIED = 16, 4
 _DEPTH = 6
 #: What identifies an item of a collection, by the usual names of such members.
 IDS = ("id", "uuid", "name", "key", "slug")

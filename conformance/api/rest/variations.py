@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import Any, Final
 
 from conformance.api.rest.inputs import NOTHING, Inputs, parameter_verdict, whole_body
-from conformance.api.rest.references import is_free_text
+from conformance.api.rest.references import is_free_text, refers
 from conformance.api.rest.samples import alike_and_apart, fits, sample
 from conformance.api.rest.validity import VALID
 from conformance.api.rest.values import Values
@@ -105,6 +105,31 @@ def valid_variations(operation: Operation, usual: Inputs, values: Values) -> Ite
         yield Variation(Kind.OPTIONAL, "all members of the body", "body", replace(usual, body=whole))
     for name in operation.formats[:_FEW] if len(operation.formats) > 1 else ():
         yield Variation(Kind.FORMAT, f"Accept: {name}", "header Accept", replace(usual, accept=name))
+
+
+def most_references(operation: Operation, usual: Inputs, values: Values) -> Iterator[tuple[Inputs, Variation]]:
+    """Yield a request with as many known references as a list may have, and inputs with all but the first of them."""
+    if not is_json(usual.media_type) or not isinstance(usual.body, dict):
+        return
+    for name, part in flat(operation.bodies[usual.media_type].schema).get("properties", {}).items():
+        most = flat(part).get("maxItems")
+        if "array" in kinds_of(part) and isinstance(most, int) and 1 < most <= _FEW:
+            known = values.references(operation, name, part)[:most] if refers(name, part, values.collections) else []
+            if len(known) == most and fits(part, known):
+                fewer, whole = (
+                    replace(usual, body=with_member(usual.body, (name,), one)) for one in (known[1:], known)
+                )
+                place = place_of((name,))
+                yield fewer, Variation(Kind.BOUND, f"{most} items in {place}", place, whole)
+
+
+def least_inputs(operation: Operation, usual: Inputs) -> Inputs | None:
+    """Return inputs of a creation with the required members alone; None where these are all, or a choice of them."""
+    if operation.method != "POST" or not is_json(usual.media_type) or not isinstance(usual.body, dict):
+        return None
+    schema = operation.bodies[usual.media_type].schema
+    least = {name: one for name, one in usual.body.items() if name in flat(schema).get("required", ())}
+    return replace(usual, body=least) if least != usual.body and fits(schema, least) else None
 
 
 def together(operation: Operation, usual: Inputs, variations: list[Variation]) -> list[Variation]:

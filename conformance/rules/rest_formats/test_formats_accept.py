@@ -10,7 +10,7 @@ import pytest
 from conformance.api.expectation import expect
 from conformance.api.rest.applicable import answered
 from conformance.api.rest.calls import Call
-from conformance.api.rest.formats import quality
+from conformance.api.rest.formats import are_data, quality
 from conformance.api.rest.interface import RestInterface
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge
@@ -19,6 +19,8 @@ pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _Q = "rest-formats/q-values"
 _SPECIFIC = "rest-formats/specific-range"
 _DEFAULT = "rest-formats/json-default"
+# So many resources have other formats than data, and are asked for.
+_OTHERS = 2
 # A finding names as many further values.
 _NAMED = 11
 # {a} is the default format, {b} and {c} the others (or the default again), {A} to {C} in capitals.
@@ -51,6 +53,14 @@ _MATRIX = (
     (_SPECIFIC, "text/*, {a};q=0.5"),
     (_SPECIFIC, "text/*;q=0.3, text/plain;q=0, application/xml;q=0.2"),
 )
+# The same in few lines, for formats that may be there for other values.
+_FEW = (
+    (_Q, "{a};q=0.5, {b}"),
+    (_Q, "{b};q=0.2, {a};q=0.9"),
+    (_Q, "{b};q=0.9, {a};q=0.2"),
+    (_SPECIFIC, "{b};q=0.9, */*;q=0.1"),
+    (_SPECIFIC, "*/*, {a};q=0.1"),
+)
 
 
 @pytest.mark.requirement(_DEFAULT)
@@ -68,20 +78,29 @@ def test_default_format(api: RestInterface, judge: Judge) -> None:
 @pytest.mark.requirement(_Q, _SPECIFIC)
 def test_preferred_format(api: RestInterface, judge: Judge) -> None:
     """Send Accept with preferences: the client gets the format that it prefers."""
-    calls = [call for call in api.run.effort.subsample(answered(api), 3) if len(call.operation.formats) > 1]
-    if not calls:
+    found = answered(api)
+    calls = [call for call in api.run.effort.subsample(found, 3) if are_data(call.operation.formats)]
+    others = [one for one in found if len(one.operation.formats) > 1 and not are_data(one.operation.formats)]
+    others = [one for one in others if _offers(api, one)]
+    if not calls and not others:
         for id_ in (_Q, _SPECIFIC):
             judge.unclaimed(id_, "the contract has no responses in more than one format")
     cases = [(call, id_, text) for call in calls for id_, text in _MATRIX]
+    few = [(call, id_, text) for call in others[:_OTHERS] for id_, text in _FEW]
     # At little effort each line of the matrix is tried with one resource, another one for each line.
     once = [(calls[index % len(calls)], *_MATRIX[index]) for index in range(len(_MATRIX))] if calls else []
-    chosen = once + api.run.effort.draw(cases, len(cases), f"{api.run.seed}/accept")
+    chosen = few + once + api.run.effort.draw(cases, len(cases), f"{api.run.seed}/accept")
     preferred: list[Preferred] = []
     try:
         for call, id_, text in chosen:
             preferred.append(Preferred(id_, call.operation.formats, *_sent(api, call, text)))
     finally:
         judge_preferred(judge, preferred)
+
+
+def _offers(api: RestInterface, call: Call) -> bool:
+    """Return whether a resource is there in its first two formats, asked for by name."""
+    return all(call.send(api, ("Accept", name)).response.media_type == name for name in call.operation.formats[:2])
 
 
 def judge_preferred(judge: Judge, preferred: list[Preferred]) -> None:

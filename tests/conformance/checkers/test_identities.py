@@ -72,3 +72,46 @@ def test_a_right_device_is_not_blamed(style, contract):
 def test_another_item_is_found(fault, contract):
     reads, expected = _WRONG[fault]
     assert _wrong(contract, reads) == expected
+
+
+_CODE = {"type": "object", "properties": {"code": {"type": "string"}, "size": {"type": "integer"}}}
+_TAKEN = ("POST", "", {"code": "A", "size": 2}, 409)
+_MADE = [("POST", "", {"code": "A", "size": 1}, 201), _TAKEN, ("POST", "", {"code": "B", "size": 2}, 201)]
+_A, _B = ("GET", "1", {"code": "A", "size": 1}, 200), ("GET", "2", {"code": "B", "size": 2}, 200)
+_TWICE = [*_MADE, _A, _B, ("PUT", "2", {"code": "A", "size": 2}, 200), ("GET", "2", {"code": "A", "size": 2}, 200), _A]
+_UNIQUE = {
+    "by PUT": (_TWICE, True),
+    "by PATCH": ([*_MADE, ("PATCH", "2", {"code": "A"}, 200), _A, ("GET", "2", {"code": "A"}, 200)], True),
+    "by a second creation": (
+        [*_MADE, ("POST", "", {"code": "A", "size": 3}, 201), _A, ("GET", "3", {"code": "A"}, 200)], True,
+    ),
+    "refused": ([*_MADE, ("PUT", "2", {"code": "A"}, 409), _A, _B], False),
+    "never refused": ([_MADE[0], ("PUT", "2", {"code": "A"}, 200), ("GET", "2", {"code": "A"}, 200), _A], False),
+    "given to another one": ([*_TWICE[:-1], ("GET", "1", {"code": "C", "size": 1}, 200)], False),
+    "gone": ([*_TWICE[:-1], ("DELETE", "2", None, 204), _A], False),
+    "refused for two reasons": (
+        [_MADE[0], _TAKEN, ("POST", "", {"code": "B", "size": 3}, 201), *_TWICE[-2:]], False,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", _UNIQUE)
+def test_what_is_unique_stays_unique(name, tmp_path):
+    steps, blamed = _UNIQUE[name]
+    paths = _paths("id", {"type": "integer"})
+    body = {"content": {"application/json": {"schema": _CODE}}}
+    paths["/things"]["post"] = {"requestBody": body, **paths["/things"]["get"]}
+    document = {"openapi": "3.1.0", "info": {"title": "t", "version": "1"}, "paths": paths}
+    checkers, wrong = (
+        RestCheckers(Contract.load(write_described_pack(tmp_path / "pack", document, document)), _BASE),
+        [],
+    )
+    for method, last, value, status in steps:
+        sent = json.dumps(value).encode() if method in {"POST", "PUT", "PATCH"} else b""
+        fields = (("Host", "device"), ("Content-Type", "application/json")) if sent else (("Host", "device"),)
+        request = Request(method, f"{_BASE}/things/{last}".rstrip("/"), fields, sent)
+        answer = Response(status, (("Content-Type", "application/json"),), json.dumps(value).encode(), 1.0)
+        wrong += [
+            one for one in checkers(Exchange(request, answer)) if not one.holds and "another code" in one.expected
+        ]
+    assert bool(wrong) == blamed

@@ -147,6 +147,12 @@ BROKEN = {
         [_get("/steps"), _patch("/steps", [_op("copy", "/note", **{"from": "/mode"}), _op("replace", "/count", 9)]),
          _get("/steps", count=9)], READ,
     ),
+    "a JSON patch without effect": (
+        [_get("/steps"), _patch("/steps", [_op("replace", "/count", 9)]), *[_get("/steps")] * 5], READ,
+    ),
+    "a default of PUT, at last": (
+        [_get(), _put(gain=1.5, told={"count": 5, "mode": "on", "loud": False}), *[_get()] * 5], DEFAULTS,
+    ),
     "fractions are cut off": (
         [_get(), _put(**{**_WHOLE, "gain": -72.5}), _get(gain=-72), _put(**{**_WHOLE, "gain": 3.25}), _get(gain=3)],
         READ,
@@ -203,6 +209,10 @@ RIGHT = {
     "steps of a half": [
         *(_get(), _put(**{**_WHOLE, "gain": 2.375}), _get(gain=2.5), _put(**{**_WHOLE, "gain": 3.1}), _get(gain=3)),
         *(_put(**{**_WHOLE, "gain": 4.1}), _get(gain=4)),
+    ],
+    "a JSON patch that acts later": [
+        *(_get("/steps"), _patch("/steps", [_op("replace", "/count", 9)], count=9), *[_get("/steps")] * 2),
+        _get("/steps", count=9),
     ],
     "clamped": [
         _get(), _put(**{**_WHOLE, "gain": 50.5}), _get(gain=10), _put(**{**_WHOLE, "gain": 60.5}), _get(gain=10),

@@ -2,6 +2,7 @@
 
 import pytest
 
+from conformance.api.rest.formats import are_data
 from conformance.contract.generic import generic_ledger
 from conformance.rules.rest_formats.test_formats_accept import Preferred, judge_preferred
 from conformance.transport.exchange import Exchange, Request, Response
@@ -38,3 +39,17 @@ def test_other_formats_in_place_of_the_preferred_one_are_other_findings():
     judge = Judge(generic_ledger())
     judge_preferred(judge, [*wrong, _got("image/png", "", 406), _got("*/*", "text/plain")])
     assert (len(judge.evidence[_ID].findings), judge.evidence[_ID].failures) == (3, 3)
+
+
+@pytest.mark.parametrize(
+    ("formats", "data"),
+    [
+        (("application/json", "application/xml"), True),
+        (("application/hal+json", "application/yaml"), True),
+        (("application/json", "text/csv"), False),
+        (("text/plain", "image/svg+xml"), False),
+        (("application/json",), False),
+    ],
+)
+def test_formats_of_one_value(formats, data):
+    assert are_data(formats) == data

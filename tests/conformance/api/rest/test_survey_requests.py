@@ -8,8 +8,17 @@ from conformance.api.rest.inputs import NOTHING, Inputs, usual_inputs, written
 from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.samples import fits
 from conformance.api.rest.values import Values
-from conformance.api.rest.variations import Kind, odd_variations, together, unknown_variations, valid_variations
+from conformance.api.rest.variations import (
+    Kind,
+    least_inputs,
+    most_references,
+    odd_variations,
+    together,
+    unknown_variations,
+    valid_variations,
+)
 from conformance.documents.openapi import read_operations
+from conformance.transport.exchange import Exchange, Request, Response
 
 _POSE = {
     "type": "object",
@@ -119,6 +128,41 @@ def test_a_bound_is_exceeded_beside_a_filter_too():
     assert {(one["limit"], one.get("open")) for one in sent} >= {
         (0, None), (10, None), (10, True),
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("more", [[], ["text/csv"], ["text/csv", "text/html"]])
+def test_a_wrong_value_is_sent_for_each_format_of_the_response(more):
+    answer = {"content": {name: {"schema": {}} for name in ("application/json", *more)}}
+    given = {"parameters": [_item("max", {"type": "integer", "maximum": 9})], "responses": {"200": answer}}
+    (operation,) = read_operations({"paths": {"/a": {"get": given}}}, closed=True)
+    found = [one.inputs.accept for one in _variations(operation, invalid_variations) if one.inputs.query == {"max": 10}]
+    assert sorted(found) == ["", *more]
+
+
+@pytest.mark.parametrize(("known", "sent"), [(3, [2, 3]), (2, [])])
+def test_as_many_known_references_as_may_be_are_sent_after_all_but_one(known, sent):
+    body = {"type": "object", "properties": {"lamp_ids": {"type": "array", "items": {"type": "string"}, "maxItems": 3}}}
+    operation, values = _operation("post", "/orders", body=body), Values({}, frozenset({"lamp"}))
+    (lamps,) = read_operations({"paths": {"/lamps": {"get": {"responses": {}}}}}, closed=True)
+    listed = json.dumps([{"id": f"l{number}"} for number in range(known)]).encode()
+    answer = Response(200, (("Content-Type", "application/json"),), listed, 1.0)
+    values.learn(lamps, Exchange(Request("GET", "http://device/lamps", (), b""), answer))
+    (usual, *_) = usual_inputs(operation, values)
+    found = [
+        (len(fewer.body["lamp_ids"]), len(most.inputs.body["lamp_ids"]))
+        for fewer, most in most_references(operation, usual, values)
+    ]
+    assert found == ([tuple(sent)] if sent else [])
+
+
+def test_the_least_creation_has_what_is_required_alone():
+    body = {"type": "object", "required": ["a"], "properties": {"a": {"type": "integer"}, "b": {"type": "integer"}}}
+    usual = Inputs(body={"a": 1, "b": 2}, media_type="application/json")
+    least = least_inputs(_operation("post", "/a", body=body), usual)
+    assert least is not None
+    assert least.body == {"a": 1}
+    assert least_inputs(_operation("put", "/a", body=body), usual) is None
+    assert least_inputs(_operation("post", "/a", body=body), least) is None
 
 
 def test_invalid_variations_do_not_fit():

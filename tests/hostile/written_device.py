@@ -1,0 +1,313 @@
+"""A device with items and settings that are written by PUT, merge patch and JSON patch, with one fault or none."""
+
+import itertools
+import json
+from contextlib import closing
+
+from aiohttp import web
+from small_device import REFUSED, answers, described, error, small_device
+
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.patches import PatchError, merged, partly_patched, patched
+from conformance.api.rest.references import collections_of
+from conformance.api.rest.samples import fits
+from conformance.api.rest.values import Values
+from conformance.checkers.rest import RestCheckers
+from conformance.contract.described import write_described_pack
+from conformance.contract.pack import Contract
+from conformance.documents.openapi import operations_of
+from conformance.scenarios.own_things import own_things
+from conformance.scenarios.survey import survey
+from conformance.statement.endpoints import Endpoints
+from conformance.statement.statement import Calls, Statement
+from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import Listener
+from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
+
+_PARTS = {
+    "code": {"type": "string", "pattern": "^[A-Z]{2}[0-9]{3}$", "examples": ["AB100"]},
+    "kind": {"type": "string", "enum": ["belt", "roller", "chute"]},
+    "speed": {"type": "number", "minimum": -40, "maximum": 90},
+    "note": {"type": ["string", "null"], "maxLength": 80},
+    "steps": {"type": "array", "items": {"type": "number", "maximum": 99}, "maxItems": 6},
+    "loud": {"type": "boolean", "default": False},
+    "lane": {"type": "integer", "minimum": 1, "maximum": 8, "default": 2},
+    "box": {"type": "object", "properties": {"x": {"type": "integer"}, "y": {"type": "integer"}}},
+}
+_OWN = {
+    "id": {"type": "integer", "readOnly": True},
+    "built_at": {"type": "string", "format": "date-time", "readOnly": True},
+    "maker": {"type": "string", "readOnly": True},
+}
+_EXAMPLE = {"code": "AB100", "kind": "belt", "speed": 3.5, "note": "a", "steps": [3, 1], "loud": True, "lane": 5}
+_EXAMPLE |= {"box": {"x": 1, "y": 2}}
+_SETTINGS = {name: one for name, one in _PARTS.items() if name != "code"}
+_MERGE, _STEPS = "application/merge-patch+json", "application/json-patch+json"
+
+
+def _object(parts, needed=(), **more):
+    return {"type": "object", "properties": parts, "required": list(needed), "additionalProperties": False, **more}
+
+
+def _body(kind, schema):
+    return {"required": True, "content": {kind: {"schema": schema}}}
+
+
+class Written:
+    """The device.
+
+    Args:
+        style: what a right device may do in its own way.
+        fault: what is wrong with it, in words, of which a part may be the member or the method.
+    """
+
+    def __init__(self, style=(), fault=""):
+        self.style, self.fault, self.numbers = set(style), fault, itertools.count(3)
+        self.items = {n: {"id": n, **_EXAMPLE, "code": f"AB10{n}", **self._made()} for n in (1, 2)}
+        self.deleted = {}
+        self.settings = {name: one for name, one in _EXAMPLE.items() if name != "code"}
+
+    @staticmethod
+    def _made():
+        return {"built_at": "2026-01-01T00:00:00Z", "maker": "acme"}
+
+    def description(self):
+        """Return the OpenAPI description and the routes."""
+        own = _OWN if "marked" in self.style else {}
+        write = _object({**_PARTS, **own}, ("code", "kind", "speed"), example=_EXAMPLE)
+        patch = _object({**{k: {**one, "type": list({*_types(one), "null"})} for k, one in _PARTS.items()}, **own})
+        patch["properties"]["kind"] = {"enum": [*_PARTS["kind"]["enum"], None]}
+        shown = {"200": answers(_object({**_PARTS, **_OWN}, ("id", "code", "kind", "speed"))), "4XX": REFUSED}
+        told = {"200": answers(_object(_SETTINGS)), "4XX": REFUSED}
+        many = {"200": answers({"type": "array", "items": _object({**_PARTS, **_OWN})}), "4XX": REFUSED}
+        id_ = {"in": "path", "name": "id", "required": True, "schema": {"type": "integer", "minimum": 1}}
+        query = [{"in": "query", "name": name, "schema": _PARTS[name]} for name in ("kind", "loud")]
+        steps = {"type": "array", "items": {"type": "object", "required": ["op", "path"]}}
+        paths = {
+            "/items": {
+                "get": {"parameters": query, "responses": many},
+                "post": {"requestBody": _body("application/json", write), "responses": {**shown, "201": shown["200"]}},
+            },
+            "/items/{id}": {
+                "parameters": [id_],
+                "get": {"responses": shown},
+                "put": {"requestBody": _body("application/json", write), "responses": shown},
+                "patch": {"requestBody": _body(_MERGE, patch), "responses": shown},
+                "delete": {"responses": {"204": {"description": "gone"}, "4XX": REFUSED}},
+            },
+            "/settings": {
+                "get": {"responses": told},
+                "put": {"requestBody": _body("application/json", _object(_SETTINGS, ("speed",))), "responses": told},
+                "patch": {"requestBody": _body(_STEPS, steps), "responses": told},
+            },
+        }
+        self.write, self.change, self.whole = write, patch, _object(_SETTINGS, ("speed",))
+        item = {"GET": self.get, "PUT": self.put, "PATCH": self.patch, "DELETE": self.delete}
+        routes = {"/items": {"GET": self.list, "POST": self.post}, "/items/{id}": item}
+        return described(paths, "3.1.0"), {
+            **routes, "/settings": {"GET": self.told, "PUT": self.set, "PATCH": self.step},
+        }  # fmt: skip
+
+    def lost(self, value, before):
+        """Return what the device keeps of values, by its fault."""
+        kept = dict(value)
+        for name, one in value.items():
+            if self.fault == f"{name} cut off" and isinstance(one, float):
+                kept[name] = int(one)
+            if self.fault == f"{name} sorted" and isinstance(one, list):
+                kept[name] = sorted(one)
+            if self.fault == f"{name} added" and isinstance(one, list) and isinstance(before.get(name), list):
+                kept[name] = [*before[name], *one]
+            if self.fault == f"{name} escaped" and isinstance(one, str):
+                kept[name] = one.replace("&", "&amp;")
+        return kept
+
+    def owned(self, thing, value, method):
+        """Return a thing with what the device takes of what is its own."""
+        names = [one for one in ("built_at", "maker") if self.fault == f"{one} by {method}"]
+        return thing | {name: value[name] for name in names if name in value}
+
+    def filled(self, value, before, where):
+        """Return what PUT or POST makes of a body."""
+        defaults = {name: one["default"] for name, one in _PARTS.items() if "default" in one}
+        for name in list(defaults):
+            if self.fault == f"default of {name} by {where}":
+                defaults[name] = before.get(name, not defaults[name])
+        base = dict(before) if "shown" in self.style else {}
+        return {**defaults, **base, **value} if self.fault == "PUT merges" else {**defaults, **value}
+
+    async def body(self, request):
+        """Return the JSON of a request; None where it is none."""
+        try:
+            return json.loads(await request.read())
+        except ValueError:
+            return None
+
+    def refused(self, value, schema, thing):
+        """Return a refusal, or None where the schema allows the value; the fault applies a part of it."""
+        if isinstance(value, dict) and fits(schema, value):
+            return None
+        parts = _PARTS.items() if isinstance(value, dict) and thing is not None else ()
+        right = {name: value[name] for name, one in parts if name in value and fits(one, value[name])}
+        if self.fault == "refused in part":
+            thing.update(right)
+        if self.fault == "refused and the first" and right:
+            thing.update(dict(list(right.items())[:1]))
+        if self.fault.startswith("refused and ") and (name := self.fault.split()[-1]) in right:
+            thing[name] = right[name]
+        return error(422, "not valid")
+
+    def taken(self, code, but=None):
+        """Return whether another item has a code."""
+        return any(one["code"] == code for key, one in self.items.items() if key != but)
+
+    def of(self, request):
+        """Return the item of a request, or None."""
+        text = request.match_info["id"]
+        return self.items.get(int(text)) if text.isascii() and text.isdecimal() and len(text) < 9 else None
+
+    async def list(self, request):
+        """List the items."""
+        query = {name: text for name, text in request.query.items() if name in {"kind", "loud"}}
+        if not all(
+            text in {"true", "false"} if name == "loud" else fits(_PARTS[name], text) for name, text in query.items()
+        ):
+            return error(400, "not valid")
+        every = list(self.items.values())
+        every += (
+            self.deleted.values()
+            if self.fault in {"lists the deleted", *(f"lists the deleted by {q}" for q in query)}
+            else []
+        )
+        wanted = {name: text == "true" if name == "loud" else text for name, text in query.items()}
+        return web.json_response([one for one in every if all(one.get(k) == v for k, v in wanted.items())])
+
+    async def post(self, request):
+        """Create an item."""
+        value = await self.body(request)
+        if refusal := self.refused(value, self.write, None):
+            return refusal
+        if self.taken(value["code"]):
+            return error(409, "the code is taken")
+        number, own = next(self.numbers), {name: one for name, one in value.items() if name not in _OWN}
+        thing = {"id": number, **self.filled(self.lost(own, {}), {}, "POST"), **self._made()}
+        self.items[number] = self.owned(thing, value, "POST")
+        return web.json_response(self.items[number], status=201, headers={"Location": f"/items/{number}"})
+
+    async def get(self, request):
+        """Read an item."""
+        thing = self.of(request)
+        return web.json_response(thing) if thing else error(404, "no such item")
+
+    async def put(self, request):
+        """Replace an item."""
+        thing, value = self.of(request), await self.body(request)
+        if thing is None:
+            return error(404, "no such item")
+        if refusal := self.refused(value, self.write, thing):
+            return refusal
+        if self.taken(value["code"], thing["id"]) and self.fault != "code twice by PUT":
+            return error(409, "the code is taken")
+        own = self.lost({name: one for name, one in value.items() if name not in _OWN}, thing)
+        kept = {name: thing[name] for name in _OWN}
+        self.items[thing["id"]] = self.owned({**self.filled(own, thing, "PUT"), **kept}, value, "PUT")
+        return web.json_response(self.items[thing["id"]])
+
+    async def patch(self, request):
+        """Change an item by a merge patch."""
+        thing, value = self.of(request), await self.body(request)
+        if thing is None:
+            return error(404, "no such item")
+        if refusal := self.refused(value, self.change, thing):
+            return refusal
+        own = self.lost({name: one for name, one in value.items() if name not in _OWN}, thing)
+        if self.fault == "null keeps":
+            own = {name: one for name, one in own.items() if one is not None}
+        if self.fault.startswith("null keeps ") and own.get(name := self.fault.split()[-1], 0) is None:
+            del own[name]
+        new = {**merged(thing, own)}
+        if self.fault == "objects replaced":
+            new |= {name: one for name, one in own.items() if isinstance(one, dict)}
+        if self.fault == "others reset":
+            new |= {name: one["default"] for name, one in _PARTS.items() if "default" in one and name not in own}
+        missing = [name for name in ("code", "kind", "speed") if name not in new]
+        if missing or (self.taken(new["code"], thing["id"]) and self.fault != "code twice by PATCH"):
+            return error(409, "not possible")
+        self.items[thing["id"]] = self.owned(new, value, "PATCH")
+        return web.json_response(self.items[thing["id"]])
+
+    async def delete(self, request):
+        """Delete an item."""
+        if (thing := self.of(request)) is None:
+            return error(404, "no such item")
+        self.deleted[thing["id"]] = self.items.pop(thing["id"])
+        return web.Response(status=204)
+
+    async def told(self, _):
+        """Read the settings."""
+        return web.json_response(self.settings)
+
+    async def set(self, request):
+        """Replace the settings."""
+        value = await self.body(request)
+        if refusal := self.refused(value, self.whole, self.settings):
+            return refusal
+        self.settings = self.filled(self.lost(value, self.settings), self.settings, "PUT")
+        return web.json_response(self.settings)
+
+    async def step(self, request):
+        """Change the settings by a JSON patch."""
+        operations, made = await self.body(request), list[dict]()
+        if not isinstance(operations, list) or not all(isinstance(one, dict) for one in operations) or not operations:
+            return error(422, "not valid")
+        tests = [one for one in operations if one.get("op") == "test"]
+        if self.fault == "test ignored" or (self.fault == "last test ignored" and operations[-1:] == tests[-1:]):
+            operations = [one for one in operations if one not in tests]
+        try:
+            made = [patched(self.settings, operations)]
+        except PatchError:
+            if self.fault in {"applied in part", "failing ignored"}:
+                made = list(partly_patched(self.settings, operations))[-1:]
+            if self.fault != "failing ignored":
+                self.settings = made[0] if made and fits(self.whole, made[0]) else self.settings
+                return error(409, "an operation fails")
+        if not made or not fits(self.whole, made[0]):
+            return error(422, "not valid")
+        self.settings = self.settings if self.fault == "patch without effect" else made[0]
+        if self.fault == "added first" and str(operations[-1].get("path")).endswith("/-"):
+            steps = self.settings["steps"]
+            self.settings = {**self.settings, "steps": [steps[-1], *steps[:-1]]}
+        return web.json_response(made[0])
+
+
+def _types(schema):
+    return schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
+
+
+class _Kept(Listener):
+    def __init__(self):
+        self.exchanges = []
+
+    def answered(self, exchange):
+        """Keep an exchange."""
+        self.exchanges.append(exchange)
+
+
+def blamed(device, folder):
+    """Return what is wrong in a device by the survey and the things that the run has created: texts by requirement."""
+    description, routes = device.description()
+    contract = Contract.load(write_described_pack(folder, description, description))
+    with small_device(description, routes) as url, closing(HttpClient(url, Connection(timeout_s=30.0))) as client:
+        statement = Statement(
+            endpoints=Endpoints(rest=url), calls=Calls(allow=("POST *", "PUT *", "PATCH *", "DELETE *"))
+        )
+        run = Run(statement=statement, contract=contract, effort=Effort("quick"))
+        api = RestInterface(run, client, alive=lambda: True)
+        client.connection.listeners += [kept := _Kept()]
+        values = Values({}, collections_of(operations_of(contract)))
+        survey.play(api, values)
+        own_things.play(api, values)
+    checkers = RestCheckers(contract, url)
+    cases = [one for exchange in kept.exchanges for one in checkers(exchange) if not one.holds]
+    return {one.requirement: f"{one.expected}: {one.observed}" for one in cases if one.requirement[:5] != "http/"}
