@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Final
-from urllib.parse import unquote
 
 from conformance.api.rest.applicable import allowed
 from conformance.api.rest.calls import Call, value_text
 from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.statuses import HELD
+from conformance.api.rest.statuses import HELD, differ
 from conformance.api.rest.things import collection_of
 from conformance.api.rest.validity import UNCLEAR, VALID, Validity, validity
 from conformance.api.rest.values import Values
@@ -68,8 +66,6 @@ _DOUBTED: Final = frozenset({400, 409, 422})
 _ACCEPTED: Final = frozenset({Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL, Kind.BOUND, Kind.GENERATED})
 # What is judged of a request in the same way when it is generated: it need not be sent again.
 _JUDGED: Final = frozenset({Kind.OPTIONAL, Kind.BOUND, Kind.INVALID, Kind.MISSING})
-# What differs between two responses to one request: times, and ids of requests.
-_VARYING: Final = re.compile(r"[0-9a-fA-F]*\d[0-9a-fA-F]*")
 # How often one request is sent again and again; and cases of Schemathesis, as many of each kind, of one operation.
 REPEATS: Final = 200
 FEWEST_REPEATS: Final = 60
@@ -173,22 +169,9 @@ class Survey:
         absent = _NOT_THERE - {_NOT_FOUND} if named else _NOT_THERE
         usual = self.of(operation.label, Kind.USUAL)
         unknown = self.elsewhere.get(operation.label)
-        if unknown is not None and any(one.exchange and _differ(one.exchange, unknown) for one in usual):
+        if unknown is not None and any(one.exchange and differ(one.exchange, unknown) for one in usual):
             return False
         return bool(usual) and all(one.status in absent for one in usual)
-
-
-def _differ(one: Exchange, other: Exchange) -> bool:
-    """Return whether two responses differ in more than what they repeat of their requests, and in numbers."""
-    return _without_request(one) != _without_request(other)
-
-
-def _without_request(exchange: Exchange) -> tuple[int, str, str]:
-    answer, target = exchange.response, exchange.request.target
-    text = unquote(answer.body.decode("utf-8", "replace"))
-    for part in (target, *target.split("?", 1), exchange.request.method):
-        text = text.replace(unquote(part), "")
-    return answer.status, answer.media_type, _VARYING.sub("", text)
 
 
 @dataclass

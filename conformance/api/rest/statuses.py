@@ -1,8 +1,10 @@
 """Whether a request was refused, accepted or cut off, by the status of its response, and what it would have needed."""
 
+import re
 from collections.abc import Callable, Collection
 from http import HTTPStatus
 from typing import Final
+from urllib.parse import unquote
 
 from conformance.contract.classes import LIMIT_OCTETS
 from conformance.documents.json_schema import Schema
@@ -15,6 +17,8 @@ CRASHES = frozenset({500, 502, 504})
 #: By these a device says that its present state keeps it from acting, whatever the request contains: a conflict, a
 #: condition, a lock, a rate, no room (RFC 9110 15.5.10, 15.5.13; RFC 4918 11.3, 11.5; RFC 6585 3, 4).
 HELD: Final = frozenset({409, 412, 423, 428, 429, 503, 507})
+# What differs between two responses to one request: times, and ids of requests.
+_VARYING: Final = re.compile(r"[0-9a-fA-F]*\d[0-9a-fA-F]*")
 # As many operations are named in one sentence; the table of the operations has all.
 _NAMED = 4
 # Statuses that refuse a request for another reason than its content.
@@ -111,3 +115,16 @@ def _members(schema: Schema) -> list[str]:
     whole = flat(schema)
     required = whole.get("required", ())
     return [name for name in whole.get("properties", {}) if name in required]
+
+
+def differ(one: Exchange, other: Exchange) -> bool:
+    """Return whether two responses differ in more than what they repeat of their requests, and in numbers."""
+    return _without_request(one) != _without_request(other)
+
+
+def _without_request(exchange: Exchange) -> tuple[int, str, str]:
+    answer, target = exchange.response, exchange.request.target
+    text = unquote(answer.body.decode("utf-8", "replace"))
+    for part in (target, *target.split("?", 1), exchange.request.method):
+        text = text.replace(unquote(part), "")
+    return answer.status, answer.media_type, _VARYING.sub("", text)
