@@ -193,15 +193,16 @@ class _Twice:
         return response
 
 
-@_mutant("soap-goal-lingers-cancelled", "equivalence/goal", "GetGoal goes on returning a goal that was cancelled.",
-         interface="both")  # fmt: skip
 class _Lingering:
-    def __init__(self) -> None:
+    """GetGoal returns a goal that is no more, until something ends it for this one too."""
+
+    def __init__(self, ends: Callable[[Request], bool]) -> None:
+        self._ends = ends
         self._last: Response | None = None
 
     def __call__(self, request: Request, forward: Forward) -> Response:
         response = forward(request)
-        if _PUT_GOAL(request) and success(response):
+        if self._ends(request) and success(response):
             self._last = None
         if soap("GetGoal")(request):
             if b"target_pose" in response.body:

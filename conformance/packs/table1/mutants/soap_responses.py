@@ -6,11 +6,11 @@ from typing import Any
 
 from lxml import etree
 
-from conformance.mutation.changes import SOAP, Make, altered, instead, plain, rest, soap, success, text, wsdls
+from conformance.mutation.changes import SOAP, Make, altered, instead, plain, soap, success, text, wsdls
 from conformance.mutation.messages import Forward, HangUpError, Request, Response
 from conformance.mutation.table import Table
 from conformance.mutation.xml_trees import each, gone, named, says, tree
-from conformance.packs.table1.mutants.paths import GOAL, TNS
+from conformance.packs.table1.mutants.paths import TNS
 
 TRACE = (
     "java.lang.NullPointerException\n\tat org.mybot.turtlebot.soap.Publishers.execute(Publishers.java:41)\n"
@@ -196,23 +196,6 @@ def _elsewhere(request: Request) -> None:
 
 def _in_map(request: Request) -> None:
     request.body = request.body.replace(b"no_such_frame", b"map")
-
-
-@_reading("soap-goal-lingers", "equivalence/goal", "GetGoal returns a goal that was reached.", interface="both")
-class _Lingering:
-    def __init__(self) -> None:
-        self._last: Response | None = None
-
-    def __call__(self, request: Request, forward: Forward) -> Response:
-        response = forward(request)
-        if rest("DELETE PUT", GOAL)(request):
-            self._last = None
-        if soap("GetGoal")(request):
-            if b"target_pose" in response.body:
-                self._last = response.copy()
-            elif self._last is not None:
-                return self._last.copy()
-        return response
 
 
 @_reading("soap-plan-from-the-first-place", "plan", "GetPlan starts where the robot was when it was called first.")
