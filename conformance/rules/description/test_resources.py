@@ -9,33 +9,19 @@ from conformance.api.rest.values import Values
 from conformance.scenarios.lists import Paged, pages_of_lists, vary_lists
 from conformance.scenarios.neighbours import neighbours
 from conformance.scenarios.own_things import own_things
-from conformance.scenarios.rule import Outcome, rule
-from conformance.scenarios.survey import Survey
+from conformance.scenarios.rule import Outcome, Rule, rule
+from conformance.scenarios.scenario import Scenario
 from conformance.verdict.case import Case
 
 
-@rule("description/head", on=(neighbours,))
-def head(_trace: Survey) -> tuple[Outcome, ...]:
-    """Play the reads by HEAD; `checkers.resources` judges them."""
-    return ()
+def _played(name: str, scenario: Scenario) -> Rule:
+    """Return the rule that plays requests; `checkers.resources` and `checkers.entity_tags` judge each of the run."""
+    return rule(f"description/{name}", on=(scenario,))(lambda _trace: ())
 
 
-@rule("description/method-refused", on=(own_things,))
-def method_refused(_trace: Survey) -> tuple[Outcome, ...]:
-    """Play the requests by undeclared methods; `checkers.resources` judges them."""
-    return ()
-
-
-@rule("description/entity-tag", on=(own_things,))
-def entity_tag(_trace: Survey) -> tuple[Outcome, ...]:
-    """Play the writes of single members; `checkers.entity_tags` judges the tags."""
-    return ()
-
-
-@rule("description/if-match", on=(own_things,))
-def if_match(_trace: Survey) -> tuple[Outcome, ...]:
-    """Play the writes by conditions; `checkers.entity_tags` judges them."""
-    return ()
+head = _played("head", neighbours)
+method_refused, entity_tag = _played("method-refused", own_things), _played("entity-tag", own_things)
+if_match = _played("if-match", own_things)
 
 
 @pytest.mark.phase("late")
