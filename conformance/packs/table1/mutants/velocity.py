@@ -19,7 +19,6 @@ _GET_LINEAR, _PUT_LINEAR = rest("GET", LINEAR), rest("PUT", LINEAR)
 _LIMITS = (0.7, 2.5)
 _SMALL = 0.05
 _STILL = {"linear": {"x": 0.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
-_CRAWL = {**_STILL, "linear": {"x": 0.123, "y": 0.0, "z": 0.0}}
 
 
 def times(factor: float) -> Callable[[Any], None]:
