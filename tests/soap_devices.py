@@ -171,7 +171,7 @@ class Device:
     def respond(self, octets: bytes) -> tuple[int, bytes]:
         """Return status and content of the response to a message."""
         try:
-            root = etree.fromstring(octets, etree.XMLParser(resolve_entities=False))
+            root = etree.fromstring(octets, etree.XMLParser(resolve_entities=False, remove_comments=True))
         except etree.XMLSyntaxError:
             return self.fault("Client", "no XML")
         if problem := self._problem(root):

@@ -4,7 +4,9 @@ Source: XML Schema 1.0 Part 2; each type names its clause. White space around a 
 string (4.3.6).
 """
 
-from decimal import Decimal
+from datetime import datetime
+from decimal import Decimal, InvalidOperation
+from math import isclose
 from typing import Final
 
 from conformance.documents.xsd_shapes import Simple
@@ -29,6 +31,7 @@ INTEGERS: Final = frozenset(
 )
 # 3.2.4 and 3.2.5: those that know INF and NaN.
 FLOATS: Final = frozenset({"double", "float"})
+NUMBERS: Final = INTEGERS | FLOATS | {"decimal"}
 STRINGS: Final = frozenset({"string", "normalizedString", "token"})
 # Where an integer has no bounds of its own, values stay within what a robot can be asked to hold.
 _WIDEST: Final = 2**31 - 1
@@ -128,3 +131,27 @@ def plain(simple: Simple) -> str:
     # A text longer than any message cannot be sent.
     short = min(simple.min_length or 0, _LONGEST) - len(text)
     return (text + "a" * max(0, short))[: simple.max_length]
+
+
+def is_alike(simple: Simple, one: str, two: str) -> bool:
+    """Return whether two texts are the same value of a type (2.2)."""
+    one, two = one.strip(), two.strip()
+    if simple.builtin == "boolean":
+        one, two = ({"1": "true", "0": "false"}.get(text, text) for text in (one, two))
+    first, second = (number_in(text) if simple.builtin in NUMBERS else None for text in (one, two))
+    if first is not None and second is not None:
+        return first == second or (simple.builtin in FLOATS and isclose(first, second, rel_tol=1e-5, abs_tol=1e-9))
+    if simple.builtin == "dateTime":
+        try:
+            return datetime.fromisoformat(one) == datetime.fromisoformat(two)
+        except (TypeError, ValueError):
+            return one == two
+    return one == two
+
+
+def number_in(text: str) -> Decimal | None:
+    """Return the number that a text is, or None."""
+    try:
+        return Decimal(text)
+    except InvalidOperation:
+        return None

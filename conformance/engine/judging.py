@@ -10,7 +10,9 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.service import SoapService
 from conformance.checkers.rest import RestCheckers
 from conformance.checkers.soap import SoapCheckers, answers_of
+from conformance.checkers.soap_memory import SoapMemory
 from conformance.contract.interfaces import Interface
+from conformance.documents.wsdl_pack import services_of
 from conformance.engine.certification import draw_verdicts
 from conformance.engine.planning import collected
 from conformance.engine.robot_under_test import RobotUnderTest
@@ -124,6 +126,8 @@ def _listeners(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[Lis
         checkers.append(RestCheckers(run.contract, api.client.base_url, [one.endpoint for one in services]))
     if services:
         checkers.append(SoapCheckers({one.endpoint: answers_of(one.contract) for one in services}))
+    if (found := services_of(run.contract)) is not None:
+        checkers.append(SoapMemory(found))
     yield Observers(run.judge, checkers)
 
 

@@ -17,8 +17,10 @@ from conformance.api.rest.values import Values
 from conformance.api.soap.service import SoapService
 from conformance.checkers.rest import RestCheckers
 from conformance.checkers.soap import PASSIVE, SoapCheckers, answers_of
+from conformance.checkers.soap_memory import SoapMemory
 from conformance.documents.openapi import operations_of
 from conformance.documents.wsdl import Wsdl
+from conformance.documents.wsdl_pack import services_of
 from conformance.scenarios.motion.binding import binding_of
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.other_exchanges import OtherExchanges
@@ -61,6 +63,8 @@ def _watched(
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
         answers = {service.endpoint: answers_of(*_descriptions(service)) for service in services}
         checkers.append(SoapCheckers(answers))
+    if (found := services_of(run.contract)) is not None:
+        checkers.append(SoapMemory(found))
     listeners.append(Observers(run.judge, checkers))
     connection.listeners.extend(listeners)
     for exchange in api.looked if api is not None else ():

@@ -75,6 +75,19 @@ class DescribedMessages:
         space: str = "",
         authorized: bool = True,
     ) -> bytes:
+        """Return a message as bytes; see `whole`."""
+        made = self.whole(port, operation, node, *more, space=space, authorized=authorized)
+        return b'<?xml version="1.0" encoding="utf-8"?>\n' + made.written()
+
+    def whole(
+        self,
+        port: SoapPort,
+        operation: SoapOperation,
+        node: Node | None,
+        *more: Node,
+        space: str = "",
+        authorized: bool = True,
+    ) -> Node:
         """Return a message, with further header blocks, or in another namespace than that of the port's Envelope.
 
         It has the header blocks that the WSDL demands.
@@ -86,11 +99,14 @@ class DescribedMessages:
         own = (self._made(tag, operation)[1] for tag in operation.headers)
         addressed = addressing_blocks(operation.addressed, port.url) if operation.addressed else ()
         blocks = (*([block_of(token, space or port.envelope)] if token else ()), *own, *addressed, *more)
-        whole = envelope((node,) if node else (), blocks or None, space or port.envelope)
-        return b'<?xml version="1.0" encoding="utf-8"?>\n' + whole.written()
+        return envelope((node,) if node else (), blocks or None, space or port.envelope)
 
     def usual(
-        self, operation: SoapOperation, turn: int = 0, given: Mapping[str, Sequence[str]] = _NONE
+        self,
+        operation: SoapOperation,
+        turn: int = 0,
+        given: Mapping[str, Sequence[str]] = _NONE,
+        current: Mapping[str, str] = MappingProxyType({}),
     ) -> tuple[Element | None, Node | None]:
         """Return the declaration of an operation's request, and a valid message of it; None if its Body is empty.
 
@@ -98,11 +114,20 @@ class DescribedMessages:
             operation: the operation.
             turn: which of the given values to use, in rotation.
             given: further values, which the device gave, by what they are called.
+            current: values to keep, by name in lower case, as far as they are valid together.
 
         Raises:
             NotPossibleError: none can be made.
         """
-        return self._made(operation.request, operation, turn, given) if operation.request else (None, None)
+        if not operation.request:
+            return None, None
+        declared, made = self._made(operation.request, operation, turn, given)
+        kept = made
+        for path, _ in simple_leaves(declared, made) if current else ():
+            name = made.at(path).name
+            if name not in self.values and (text := current.get(name.lower())) is not None:
+                kept = with_text(kept, path, text)
+        return declared, made if self.found.types.invalid(parse(kept.written())) else kept
 
     def invented(self, declared: Element, node: Node) -> list[str]:
         """Return the names of values that only the device can know: texts, and numbers that are ids."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.mutations import STRANGE, invalid_ones, mutations
+from conformance.api.soap.roles import Role, role_of, texts_of
 from conformance.documents.multipart import root_of
 from conformance.documents.openapi import operations_of
 from conformance.documents.wsdl import SoapOperation, SoapPort
@@ -65,6 +66,7 @@ class Kind(StrEnum):
     USUAL = "usual"
     TRIED = "tried"
     AGAIN = "again"
+    VARIED = "varied"
     INVALID = "invalid"
     UNREADABLE = "unreadable"
     VERSION = "version"
@@ -130,10 +132,11 @@ class SoapProbe:
 
 
 @dataclass
-class _Caller:
+class Caller:
     """Sends messages and records them; ``left_out`` are operations with the reason why they are not called.
 
-    ``given`` are values that the device gave, by what they are called.
+    ``given`` are values that the device gave, by what they are called; ``current`` those that an operation that reads
+    told once, so that what writes them first leaves the device as it is.
     """
 
     api: RestInterface
@@ -142,6 +145,7 @@ class _Caller:
     left_out: list[tuple[str, str]] = field(default_factory=list)
     lost: set[str] = field(default_factory=set)
     given: dict[str, list[str]] = field(default_factory=dict)
+    current: dict[str, str] = field(default_factory=dict)
 
     def asks(self, operation: SoapOperation) -> int:
         """Return how many values the message of an operation has that only the device can know."""
@@ -157,6 +161,9 @@ class _Caller:
             for element in probe.inside():
                 for name, values in values_in(element).items():
                     self.given.setdefault(name, []).extend(values)
+                if role_of(probe.operation.rpartition("/")[2]) is Role.READS:
+                    told = texts_of(element).items()
+                    self.current |= {name: texts[0] for name, texts in told if len(texts) == 1}
 
     def send(self, port: SoapPort, operation: SoapOperation, kind: Kind, says: str, octets: bytes) -> SoapProbe:
         """Send octets to a port.
@@ -201,7 +208,7 @@ def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
     messages = DescribedMessages.of(api)
     if messages is None:
         raise NotPossibleError("the device has no WSDL")
-    found, caller = messages.found, _Caller(api, messages)
+    found, caller = messages.found, Caller(api, messages)
     described = {item.label: api.call_rules.decide(item) for item in operations_of(api.run.contract)}
     steps: dict[str, Iterator[None]] = {}
     # What one operation answers, another asks for: those that ask for nothing that must be known come first.
@@ -220,7 +227,7 @@ def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
     return tuple(caller.probes)
 
 
-def _explore(caller: _Caller, port: SoapPort, operation: SoapOperation) -> Iterator[None]:
+def _explore(caller: Caller, port: SoapPort, operation: SoapOperation) -> Iterator[None]:
     """Send the messages of one operation; yield after the usual one and after each group of others."""
     try:
         yield from _groups(caller, port, operation)
@@ -228,11 +235,13 @@ def _explore(caller: _Caller, port: SoapPort, operation: SoapOperation) -> Itera
         caller.left_out.append((label_of(port, operation), str(error)))
 
 
-def _groups(caller: _Caller, port: SoapPort, operation: SoapOperation) -> Iterator[None]:
-    declared, node, kind = _usual(caller, port, operation)
+def _groups(caller: Caller, port: SoapPort, operation: SoapOperation) -> Iterator[None]:
+    declared, node, kind = usual_message(caller, port, operation)
     yield
     effort = caller.api.run.effort
-    for _ in range(0 if effort.name == "quick" else _USUAL - 1):
+    # What was created may be there only once, and what was removed is not there any more.
+    is_once = role_of(operation.name) in {Role.CREATES, Role.REMOVES}
+    for _ in range(0 if effort.name == "quick" or is_once else _USUAL - 1):
         if label_of(port, operation) not in caller.lost:
             message = caller.messages.message(port, operation, node)
             caller.send(port, operation, kind, "a valid message", message)
@@ -252,6 +261,8 @@ def _groups(caller: _Caller, port: SoapPort, operation: SoapOperation) -> Iterat
     for kind, says, octets in _odd(caller, port, operation, node):
         if time.monotonic() < until and label_of(port, operation) not in caller.lost:
             caller.send(port, operation, kind, says, octets)
+            if is_once:
+                continue
             caller.send(
                 port,
                 operation,
@@ -261,14 +272,15 @@ def _groups(caller: _Caller, port: SoapPort, operation: SoapOperation) -> Iterat
             )
 
 
-def _usual(caller: _Caller, port: SoapPort, operation: SoapOperation) -> tuple[Element | None, Node | None, Kind]:
+def usual_message(caller: Caller, port: SoapPort, operation: SoapOperation) -> tuple[Element | None, Node | None, Kind]:
     """Send valid messages until one is accepted; return the declaration, the last message and its kind.
 
     Where the device refuses a value that the suite invented, it is asked with values that it gave. That it refuses an
     invented one is no fault: the message is recorded as tried.
     """
     messages, tried = caller.messages, list[Node | None]()
-    declared, node = messages.usual(operation)
+    current = caller.current if role_of(operation.name) is Role.WRITES else {}
+    declared, node = messages.usual(operation, current=current)
     invented = bool(declared and node and messages.invented(declared, node))
     kind = Kind.TRIED if invented else Kind.USUAL
     for turn in range(_TRIED + 1 if invented else 1):
@@ -288,7 +300,7 @@ def _usual(caller: _Caller, port: SoapPort, operation: SoapOperation) -> tuple[E
 
 
 def _odd(
-    caller: _Caller, port: SoapPort, operation: SoapOperation, node: Node | None
+    caller: Caller, port: SoapPort, operation: SoapOperation, node: Node | None
 ) -> Iterator[tuple[Kind, str, bytes]]:
     """Yield messages that are wrong whatever the operation is."""
     whole = caller.messages.message(port, operation, node)

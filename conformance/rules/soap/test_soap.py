@@ -13,6 +13,7 @@ from conformance.documents.wsdl_pack import services_of
 from conformance.documents.xml import elements, text_of
 from conformance.documents.xml_names import local
 from conformance.scenarios.rule import Note, Outcome, rule
+from conformance.scenarios.soap_changes import soap_changes
 from conformance.scenarios.soap_survey import Kind, NotSoapError, SoapProbe, soap_survey, wsdl_faults
 from conformance.transport.exchange import NoAnswer
 from conformance.verdict.case import Case
@@ -22,7 +23,7 @@ from conformance.verdict.run import Run
 if TYPE_CHECKING:
     from lxml import etree
 
-_ON = (soap_survey,)
+_ON = (soap_survey, soap_changes)
 _OK, _BAD, _FAILED = 200, 400, 500
 # SOAP 1.2 Part 1, 5.4.6.
 _CODES_12 = frozenset({"VersionMismatch", "MustUnderstand", "DataEncodingUnknown", "Sender", "Receiver"})
@@ -211,8 +212,9 @@ def valid_accepted(trace: Trace, run: Run) -> Iterator[Outcome]:
     """Judge whether a message that the WSDL allows is accepted; a device need not have all that a standard's has."""
     found = services_of(run.contract)
     lacking = {one for one in trace if found is not None and found.foreign and _OPTIONAL.search(_came(one))}
-    usual = [one for one in trace if one.kind is Kind.USUAL and one.exchange is not None and one not in lacking]
-    yield from _told(usual, "success", lambda one: "" if one.succeeded else _came(one))
+    asked = [one for one in trace if one.kind in {Kind.USUAL, Kind.VARIED} and one.exchange and one not in lacking]
+    yield from _told(asked, "success", lambda one: "" if one.succeeded else _came(one))
+    usual = [one for one in asked if one.kind is Kind.USUAL]
     accepted = {one.operation for one in usual}
     for label in dict.fromkeys(one.operation for one in trace if one.kind in _VALID):
         if label not in accepted:
@@ -301,3 +303,27 @@ def no_internals(trace: Trace) -> Iterator[Outcome]:
         return f"{shown!r}" if shown else ""
 
     return _told(trace, "an error that shows nothing of the program", wrong)
+
+
+@rule("soap/written-is-read", on=(soap_changes,))
+def written_is_read(_trace: Trace) -> tuple[Outcome, ...]:
+    """Play the changes; `checkers.soap_memory` judges what is read after them."""
+    return ()
+
+
+@rule("soap/refused-keeps", on=(soap_changes,))
+def refused_keeps(_trace: Trace) -> tuple[Outcome, ...]:
+    """Play the refused changes; `checkers.soap_memory` judges what is read after them."""
+    return ()
+
+
+@rule("soap/created-is-there", on=(soap_changes,))
+def created_is_there(_trace: Trace) -> tuple[Outcome, ...]:
+    """Play the creations; `checkers.soap_memory` judges the lists."""
+    return ()
+
+
+@rule("soap/deleted-is-gone", on=(soap_changes,))
+def deleted_is_gone(_trace: Trace) -> tuple[Outcome, ...]:
+    """Play the removals; `checkers.soap_memory` judges the lists."""
+    return ()

@@ -1,0 +1,308 @@
+"""What SOAP operations wrote, created and removed, by what others tell later: SetGain beside GetGain.
+
+Names alone blame nobody. A value has to be read as it was written only where two other values were, for as long, and
+only within what was kept so far: a device may limit a number, reach a target slowly, or let a command expire.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from math import isclose
+from typing import TYPE_CHECKING, Final
+from urllib.parse import urlsplit
+
+from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, acts_of, texts_of
+from conformance.documents.wsdl import Wsdl
+from conformance.documents.xml import NotXmlError, elements, parse
+from conformance.documents.xml_names import local
+from conformance.documents.xsd_lexical import INTEGERS, NUMBERS, is_alike, number_in
+from conformance.documents.xsd_shapes import Simple
+from conformance.transport.exchange import Attempt, Exchange
+from conformance.verdict.case import Case, case
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+# Other values that have to be kept before one has to be, and how often another one is read before it counts.
+_KEPT: Final = 2
+_SEEN: Final = 2
+# So often one and the same value is read, whatever is written, before it counts as never written.
+_LOST: Final = 6
+# Of so many values that are read at once, one may be read later: by a read that went wrong.
+_FEW: Final = 3
+_LONGEST: Final = 65_536
+_MOST: Final = 1_000
+# Nouns of what is kept as it is given, and is no state of the world.
+_KEEPS: Final = re.compile(r"settings?$|config(?:uration)?$|options?$|preferences?$|parameters?$|profile$|limits?$")
+_WORDS: Final = re.compile(r"[\w ]*", re.ASCII)
+
+
+@dataclass
+class _Write:
+    """What one request wrote: ``key`` names the thing, ``values`` are texts by name; both of names in lower case.
+
+    ``shown`` are those that were read so since, ``late`` those that first were not; ``refused`` what was refused since.
+    """
+
+    key: dict[str, str]
+    values: dict[str, str]
+    at_s: float
+    shown: set[str] = field(default_factory=set)
+    late: set[str] = field(default_factory=set)
+    refused: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
+
+
+@dataclass
+class _Thing:
+    """What one request created, by the value by which the device knows it."""
+
+    creator: Act
+    name: str
+    id: str
+    at_s: float
+    gone: bool = False
+
+
+@dataclass
+class _Past:
+    """What is known of one value of a reading operation.
+
+    ``kept`` are texts that were read as written, with for how long, s; ``lost`` is what was read of others.
+    ``pending`` are failures if another value was kept as long, each with its age, s, and what was read.
+    ``prompt`` and ``late`` are how many writes were read at once, and later.
+    """
+
+    kept: dict[str, float] = field(default_factory=dict)
+    lost: list[str] = field(default_factory=list)
+    pending: list[tuple[float, str, Case]] = field(default_factory=list)
+    misses: int = 0
+    prompt: int = 0
+    late: int = 0
+
+    @property
+    def moves(self) -> bool:
+        """Whether it comes to what is written by and by, so that another value may take any time."""
+        return self.late * _FEW > self.prompt
+
+    def longest(self, text: str) -> float:
+        """Return for how long another value was kept, s."""
+        return max((age for other, age in self.kept.items() if other != text), default=0.0)
+
+    def lasted(self, age_s: float, text: str) -> Iterator[Case]:
+        """Yield what should have been kept, as another value was for so long, s; once it was seen again."""
+        waiting, self.pending = self.pending, []
+        for one in waiting:
+            if one[0] > age_s or one[1] == text:
+                self.pending.append(one)
+                continue
+            self.misses += 1
+            if self.misses >= _SEEN:
+                yield one[2]
+
+
+class SoapMemory:
+    """Judges each response of an operation that reads by what others have done before.
+
+    Args:
+        found: what the WSDL describes.
+    """
+
+    def __init__(self, found: Wsdl) -> None:
+        self._types, self._paths = found.types, {urlsplit(port.url).path for port in found.ports}
+        acts = acts_of(found)
+        self._acts = {(urlsplit(act.port.url).path, act.operation.request): act for act in acts}
+        self._writers = {act.label: [one for one in acts if act.shows(one)] for act in acts}
+        # The values by which a writing operation names the thing that it is for.
+        self._keys = {
+            writer.label: {name for act in acts if act.shows(writer) for name in act.sent.keys() & writer.sent.keys()}
+            for writer in acts
+        }
+        self._written: dict[str, list[_Write]] = defaultdict(list)
+        self._things: list[_Thing] = []
+        self._past: dict[tuple[str, str, str], _Past] = defaultdict(_Past)
+
+    def __call__(self, attempt: Attempt) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        request = attempt.request
+        path = urlsplit(request.url).path
+        if request.method != "POST" or path not in self._paths:
+            return
+        payload = _payload(request.body)
+        act = self._acts.get((path, str(payload.tag))) if payload is not None else None
+        if payload is None or act is None or not isinstance(attempt, Exchange):
+            if not isinstance(attempt, Exchange) and not (act and act.role is Role.READS):
+                self._forget()
+            return
+        answer, sent = _payload(attempt.response.body), texts_of(payload)
+        is_fault = answer is not None and local(str(answer.tag)) == "Fault"
+        if act.role is Role.READS:
+            if answer is not None and attempt.response.ok and not is_fault:
+                told = texts_of(answer)
+                yield from self._values(act, attempt, sent, told)
+                yield from self._listed(act, attempt, told)
+        elif is_fault:
+            self._refused(act, sent)
+        elif not attempt.response.ok or self._types.invalid(payload):
+            self._forget()
+        else:
+            self._done(act, attempt, sent, texts_of(answer) if answer is not None else {})
+
+    def _forget(self) -> None:
+        self._written.clear()
+        self._things.clear()
+
+    def _refused(self, act: Act, sent: dict[str, list[str]]) -> None:
+        for write in self._written[act.label]:
+            for name, texts in sent.items():
+                write.refused[name].update(texts)
+
+    def _done(self, act: Act, exchange: Exchange, sent: dict[str, list[str]], told: dict[str, list[str]]) -> None:
+        """Keep what a successful request did."""
+        at_s, keys = exchange.response.received_s, self._keys[act.label]
+        if act.role is Role.WRITES:
+            single = {name: texts[0] for name, texts in sent.items() if len(texts) == 1}
+            key = {name: text for name, text in single.items() if name in keys}
+            values = {name: told.get(name, [text])[0] for name, text in single.items() if name not in keys}
+            others = [one for one in self._written[act.label] if one.key != key][-_MOST:]
+            self._written.clear()
+            self._written[act.label] = [*others, _Write(key, values, at_s)]
+            return
+        self._written.clear()
+        if act.role is Role.CREATES:
+            new = [(name, texts[0]) for name, texts in told.items() if len(texts) == 1 and name not in sent]
+            new = [one for one in new if REFERS.search(one[0])] or (new if len(new) == 1 else [])
+            self._things += [_Thing(act, name, text, at_s) for name, text in new[:1]]
+            del self._things[:-_MOST]
+        elif act.role is Role.REMOVES:
+            for thing in self._things:
+                if thing.creator.noun == act.noun and any(thing.id in texts for texts in sent.values()):
+                    thing.gone, thing.at_s = True, at_s
+        else:
+            self._things.clear()
+
+    def _values(
+        self, act: Act, exchange: Exchange, sent: dict[str, list[str]], told: dict[str, list[str]]
+    ) -> Iterator[Case]:
+        """Judge what was written before."""
+        for writer in self._writers[act.label]:
+            if not sent.keys() <= self._keys[writer.label]:
+                continue
+            for write in self._written[writer.label]:
+                if any(sent.get(name, told.get(name)) != [text] for name, text in write.key.items()):
+                    continue
+                for name, text in write.values.items():
+                    if len(told.get(name, ())) == 1:
+                        yield from self._compared(act, writer, write, name, exchange, told[name][0], text)
+
+    def _compared(
+        self, act: Act, writer: Act, write: _Write, name: str, exchange: Exchange, got: str, text: str
+    ) -> Iterator[Case]:
+        """Judge one value."""
+        past, simple = self._past[writer.label, act.label, name], writer.sent[name]
+        age_s = exchange.response.received_s - write.at_s
+        expected = f"{name} {text!r}, which {writer.operation.name} wrote"
+        if is_alike(simple, text, got):
+            if name not in write.shown:
+                write.shown.add(name)
+                is_late = name in write.late and age_s > SETTLES_S / 2
+                past.prompt += not is_late
+                past.late += is_late
+            past.kept[text] = max(past.kept.get(text, 0.0), age_s)
+            if len(past.kept) >= _KEPT:
+                yield case("soap/written-is-read", True, exchange, expected)  # noqa: FBT003 - see Case
+            yield from past.lasted(age_s, text)
+            return
+        if _is_near(simple, text, got):
+            return  # a measured value is noisy
+        is_shown = name in write.shown
+        if not is_shown:
+            write.late.add(name)
+        is_refused = is_shown and any(is_alike(simple, one, got) for one in write.refused.get(name, ()))
+        if age_s < SETTLES_S and not is_shown:
+            return
+        past.lost = [*past.lost, got][-_LOST:]
+        others = [other for other in past.kept if other != text]
+        has_to = (
+            not past.moves
+            and len(others) + is_shown >= _KEPT
+            and (is_shown or text in past.kept or _is_usual(simple, text, others))
+        )
+        is_ignored = self._is_ignored(act, writer, past)
+        if has_to or is_ignored:
+            requirement = "soap/refused-keeps" if is_refused else "soap/written-is-read"
+            expected += ": what was written later was refused" if is_refused else ""
+            cause = f"{writer.label} {name}"
+            found = case(requirement, False, exchange, expected, f"{name} {got!r}", cause)  # noqa: FBT003 - see Case
+            past.pending = [*past.pending, (0.0 if is_ignored else age_s, got, found)][-_MOST:]
+            yield from past.lasted(past.longest(got), "")
+
+    def _is_ignored(self, act: Act, writer: Act, past: _Past) -> bool:
+        """Return whether a device keeps what was written beside a value, and never the value itself."""
+        beside = [self._past[writer.label, act.label, name] for name in writer.sent.keys() & act.told - act.sent.keys()]
+        return (
+            len(past.lost) == _LOST
+            and len({*past.lost, *past.kept}) == 1
+            and act.noun == writer.noun
+            and bool(_KEEPS.search(act.noun))
+            and any(len(other.kept) >= _KEPT and not other.moves for other in beside)
+        )
+
+    def _listed(self, act: Act, exchange: Exchange, told: dict[str, list[str]]) -> Iterator[Case]:
+        """Judge whether a list has what was created, and not what was removed."""
+        ids = {text for name, texts in told.items() if REFERS.search(name) for text in texts}
+        for thing in self._things:
+            if not act.lists(thing.creator):
+                continue
+            past = self._past[thing.creator.label, act.label, ""]
+            is_there, age_s = thing.id in ids, exchange.response.received_s - thing.at_s
+            name = "deleted-is-gone" if thing.gone else "created-is-there"
+            expected = f"{thing.name} {thing.id!r}, which {thing.creator.operation.name} created"
+            if thing.gone:
+                expected = f"a list without {thing.id!r}, which was removed {age_s:.1f} s before"
+            if is_there is not thing.gone:
+                if is_there:
+                    past.kept[thing.id] = max(past.kept.get(thing.id, 0.0), age_s)
+                if len(past.kept) >= _KEPT:
+                    yield case(f"soap/{name}", True, exchange, expected)  # noqa: FBT003 - see Case
+            elif age_s >= SETTLES_S and len(past.kept) >= _KEPT and (thing.gone or age_s <= past.longest(thing.id)):
+                past.misses += 1
+                if past.misses >= _SEEN:
+                    observed = f"a list with {thing.id!r}" if thing.gone else f"a list without {thing.id!r}"
+                    cause = f"{thing.creator.label} {act.label}"
+                    yield case(f"soap/{name}", False, exchange, expected, observed, cause)  # noqa: FBT003 - see Case
+
+
+def _payload(octets: bytes) -> etree._Element | None:
+    """Return the first element in the Body of a message; None if it is no message that a checker reads."""
+    if not 0 < len(octets) <= _LONGEST:
+        return None
+    try:
+        root = parse(octets, comments=False)
+    except NotXmlError:
+        return None
+    body = next((one for one in elements(root) if local(str(one.tag)) == "Body"), None)
+    return next(iter(elements(body)), None) if body is not None else None
+
+
+def _is_near(simple: Simple, text: str, got: str) -> bool:
+    """Return whether two numbers with fractions differ by 2 % at most."""
+    first, second = number_in(text), number_in(got)
+    if simple.builtin in INTEGERS or first is None or second is None:
+        return False
+    return isclose(first, second, rel_tol=0.02)
+
+
+def _is_usual(simple: Simple, text: str, kept: list[str]) -> bool:
+    """Return whether a device that keeps some values has to keep this one: it lies between them, or has to be taken."""
+    if simple.enumeration or simple.builtin == "boolean":
+        return True
+    if simple.builtin in NUMBERS:
+        number, numbers = number_in(text), [one for one in map(number_in, kept) if one is not None]
+        if number is None or not numbers:
+            return False
+        return min(numbers) <= number <= max(numbers)
+    longest = max(map(len, kept))
+    return len(text) <= longest or not _WORDS.fullmatch(text)

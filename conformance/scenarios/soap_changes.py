@@ -1,0 +1,347 @@
+"""Change what a device tells over SOAP, read it back, be refused in between, and leave it as it was.
+
+What comes of it is judged by the checkers of every exchange (checkers/soap_memory), and by the rules of the survey.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import islice
+from typing import Final
+
+from conformance.api.rest.interface import RestInterface
+from conformance.api.soap.messages import declarations, simple_leaves, with_text
+from conformance.api.soap.mutations import invalid_ones, mutations
+from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, acts_of, texts_of
+from conformance.api.soap.xml_style import serialize, single_changes
+from conformance.documents.openapi import operations_of
+from conformance.documents.xml_node import Node
+from conformance.documents.xsd_lexical import FLOATS, INTEGERS, STRINGS, bounds, is_alike
+from conformance.documents.xsd_shapes import Element, Simple
+from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
+from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.soap_survey import Caller, Kind, NotSoapError, SoapProbe, usual_message
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.transport.exchange import Outgoing
+from conformance.transport.parallel import MOST_CLIENTS, send_together
+from conformance.transport.reach import is_same
+
+# A value is awaited in steps of so long, s, and has to last a little longer than any that is judged.
+_STEP_S: Final = 0.1
+_LASTS_S: Final = SETTLES_S + 0.4
+# All changes of one operation take at most so long, s.
+_BUDGET_S: Final = 12.0
+# Changes of one operation at quick and else; refusals of it; things that are created.
+_TURNS: Final = (6, 16)
+_REFUSALS: Final = 3
+# Values whose lasting is awaited: two, as what is read in place of a third one may be one of them.
+_LASTING: Final = 2
+_THINGS: Final = 3
+# Reads of each operation one after another, and how many there are in each of as many rounds at the same moment.
+_READS: Final = (20, 60)
+_ROUNDS: Final = (6, 30)
+# Texts that a device has to keep as they are: of its usual kind, with what XML escapes, beyond ASCII, beyond the BMP.
+_TEXTS: Final = ("roaas one", "roaas two", "a<b>&\"c'", "Gr\u00f6\u00dfe 5 \u00b5m", "roaas six", "\U0001f916 ok")
+# An operation with the declaration of its request, and a message that it accepts.
+_Message = tuple[Act, Element | None, Node | None]
+
+
+@dataclass
+class _Changes:
+    """Sends messages to the operations that may be called, and that accept one.
+
+    Attributes:
+        caller: sends and records.
+        acts: those operations, with declaration and message.
+    """
+
+    caller: Caller
+    acts: list[_Message] = field(default_factory=list)
+
+    @cached_property
+    def _is_quick(self) -> bool:
+        return self.caller.api.run.effort.name == "quick"
+
+    def find(self, found: list[Act], allowed: set[str]) -> None:
+        """Call each operation that reads, changes, creates or removes once, to know a message that it accepts."""
+        for act in sorted(found, key=lambda one: (one.role is not Role.READS, self.caller.asks(one.operation))):
+            if act.label not in allowed or act.role is Role.OTHER:
+                continue
+            try:
+                declared, node, kind = usual_message(self.caller, act.port, act.operation)
+            except NotPossibleError:
+                continue
+            # What removes needs a thing to remove.
+            if kind is Kind.USUAL and (self.caller.probes[-1].succeeded or act.role is Role.REMOVES):
+                self.acts.append((act, declared, node))
+
+    def send(self, act: Act, node: Node | None, says: str, kind: Kind = Kind.TRIED) -> SoapProbe:
+        """Send a message to an operation."""
+        octets = self.caller.messages.message(act.port, act.operation, node)
+        return self.caller.send(act.port, act.operation, kind, says, octets)
+
+    def by_role(self, role: Role) -> list[tuple[Act, Element, Node]]:
+        """Return the operations of a role that have values in their message."""
+        return [(act, declared, node) for act, declared, node in self.acts if act.role is role and declared and node]
+
+    def write(self, act: Act, declared: Element, node: Node) -> Iterator[None]:
+        """Write other values again and again, read them, and write what was there."""
+        readers = [one for one in self.acts if one[0].shows(act)]
+        if not readers:
+            return
+        until, began = time.monotonic() + _BUDGET_S, self._read(readers, node)
+        keys = {name for one, _, _ in readers for name in one.sent}
+        leaves = [(path, simple) for path, simple in simple_leaves(declared, node) if path]
+        free = [one for one in leaves if node.at(one[0]).name.lower() not in keys]
+        turns, lasting, made = _TURNS[not self._is_quick], 0, node
+        for turn in range(turns):
+            if time.monotonic() > until:
+                break
+            made = _varied(node, free, turn)
+            if not self.send(act, made, "a message with other values").succeeded:
+                # Not all of them may be changed: those that may are found one by one.
+                free = [one for one in free if self.send(act, _varied(node, [one], turn), "another value").succeeded]
+                if not free:
+                    break
+                made = _varied(node, free, turn)
+                self.send(act, made, "a message with other values")
+            sent = self._wait(readers, made, free)
+            if sent and lasting < _LASTING:
+                lasting += 1
+                time.sleep(_LASTS_S)
+                self._read(readers, made)
+            if turn < _REFUSALS and sent:
+                self._refuse(act, declared, _varied(made, free, turn + 1), turn)
+                self._read(readers, made, times=2)
+            yield
+        self._read(readers, made, times=_READS[not self._is_quick])
+        self._others(act, node, free, readers)
+        self.send(act, _as_it_was(node, leaves, began), "the values that were there before")
+
+    def _wait(self, readers: list[_Message], made: Node, free: list[tuple[tuple[int, ...], Simple]]) -> bool:
+        """Read until what was written is read, or a device should have taken it; return whether anything was."""
+        until = time.monotonic() + SETTLES_S
+        while True:
+            told = self._read(readers, made)
+            texts = [(simple, made.at(path).text, told.get(made.at(path).name.lower())) for path, simple in free]
+            seen = [is_alike(simple, text, got) for simple, text, got in texts if got is not None]
+            if all(seen) or time.monotonic() > until:
+                break
+            time.sleep(_STEP_S)
+        if not all(seen):
+            self._read(readers, made, times=2)
+        return any(seen)
+
+    def _read(self, readers: list[_Message], written: Node, times: int = 1) -> dict[str, str]:
+        """Read what a message concerns; return the values that come once, by name."""
+        names = {written.at(path).name.lower(): written.at(path).text for path in written.paths()}
+        found: dict[str, str] = {}
+        for _ in range(times):
+            for act, _, node in readers:
+                asked = node
+                for path in node.paths() if node else ():
+                    if asked and (text := names.get(asked.at(path).name.lower())) and not asked.at(path).children:
+                        asked = with_text(asked, path, text)
+                probe = self.send(act, asked, "a valid message")
+                found |= _single(probe)
+        return found
+
+    def _refuse(self, act: Act, declared: Element, node: Node, turn: int) -> None:
+        """Send new values with one that the schema forbids."""
+        kind = ("lexical", "missing", "unknown")[turn % _REFUSALS]
+        tried = sorted(mutations(declared, node), key=lambda one: one.kind != kind)
+        tried = [one for one in tried if one.kind in {"lexical", "missing", "unknown"}]
+        for wrong in islice(invalid_ones(tried, self.caller.messages.found.types), 1):
+            self.send(act, wrong.made[0], wrong.what, Kind.INVALID)
+
+    def _others(
+        self, act: Act, node: Node, free: list[tuple[tuple[int, ...], Simple]], readers: list[_Message]
+    ) -> None:
+        """Write to other things of the device, and read each of them afterwards."""
+        keys = [
+            path
+            for path in node.paths()
+            if node.at(path).name.lower() in {n for one, _, _ in readers for n in one.sent}
+        ]
+        if len(keys) != 1:
+            return
+        name = node.at(keys[0]).name
+        own = node.at(keys[0]).text
+        known = [own, *self.caller.given.get(name.lower(), []), *([str(int(own) + 1)] if own.isdecimal() else [])]
+        things = [with_text(node, keys[0], text) for text in list(dict.fromkeys(known))[: _THINGS + 1]]
+        told = [(thing, self._read(readers, thing)) for thing in things]
+        things = [thing for thing, values in told if values]
+        if len(things) > 1:
+            written = [_varied(thing, free, turn) for turn, thing in enumerate(things, 1)]
+            for made in written:
+                self.send(act, made, "a message for another thing")
+            for wait_s in (0.0, SETTLES_S):
+                time.sleep(wait_s)
+                for made in written * 2:
+                    self._read(readers, made)
+            for thing, values in told:
+                if values:
+                    self.send(act, _as_it_was(thing, free, values), "the values that were there before")
+
+    def create(self, act: Act, declared: Element, node: Node) -> Iterator[None]:
+        """Create things, read the lists, be refused, and remove what was created."""
+        remove = next((one for one in self.acts if one[0].role is Role.REMOVES and one[0].noun == act.noun), None)
+        lists = [one for one in self.acts if one[0].lists(act)]
+        if remove is None or not lists or remove[2] is None:
+            return
+        free = [one for one in simple_leaves(declared, node) if one[0]]
+        made: list[str] = []
+        for turn in range(_THINGS):
+            probe = self.send(act, _varied(node, free, turn), "a message that creates")
+            if not probe.succeeded:
+                probe = self.send(act, node, "a message that creates")
+            told = _single(probe)
+            made += [text for name, text in told.items() if REFERS.search(name)][:1] or list(told.values())[:1]
+            self._read(lists, node)
+            yield
+        time.sleep(_LASTS_S)
+        self._read(lists, node)
+        self._refuse(act, declared, _varied(node, free, _THINGS), 0)
+        self._read(lists, node, times=2)
+        for id_ in made:
+            self._remove(remove[0], remove[2], id_)
+            self._read(lists, node)
+            time.sleep(SETTLES_S / len(made))
+        time.sleep(SETTLES_S)
+        self._read(lists, node, times=2)
+
+    def _remove(self, act: Act, node: Node, id_: str) -> None:
+        paths = [path for path in node.paths() if not node.at(path).children]
+        named = [path for path in paths if REFERS.search(node.at(path).name)] or paths
+        if named:
+            self.send(act, with_text(node, named[0], id_), "the id of what was created")
+
+    def read_often(self) -> None:
+        """Read again and again, one after another and at the same moment."""
+        readers = [one for one in self.acts if one[0].role is Role.READS]
+        for act, _, node in readers:
+            for _ in range(_READS[not self._is_quick]):
+                self.send(act, node, "a valid message", Kind.AGAIN)
+        client, messages = self.caller.api.client, self.caller.messages
+        asked = [
+            Outgoing(
+                "POST",
+                target_of(act.port),
+                fields_of(act.port, act.operation),
+                messages.message(act.port, act.operation, node),
+            )
+            for act, _, node in readers
+        ]
+        if len(asked) > 1:
+            together = [(client, asked[number % len(asked)]) for number in range(MOST_CLIENTS)]
+            send_together([together] * _ROUNDS[not self._is_quick])
+
+    def vary(self) -> None:
+        """Send what the schema allows beside the usual: values of enumerations, other forms of booleans and of XML."""
+        for act, declared, node in self.acts:
+            if act.role in {Role.CREATES, Role.REMOVES}:
+                continue
+            for says, made in _alternatives(declared, node) if declared and node else ():
+                octets = self.caller.messages.message(act.port, act.operation, made)
+                self._vary(act, node, says, octets)
+            if act.role is Role.WRITES:
+                self.send(act, node, "the values that were there before")
+        for act, _, node in [one for one in self.acts if one[0].role is Role.READS][: 1 if self._is_quick else 9]:
+            whole = self.caller.messages.whole(act.port, act.operation, node)
+            # A reader that takes no comments is left alone: there are many, and no client that writes messages has any.
+            for says, style in [one for one in single_changes() if "comment" not in one[0]]:
+                self._vary(act, node, f"a message with {says}", serialize(whole, style).encode())
+
+    def _vary(self, act: Act, node: Node | None, says: str, octets: bytes) -> None:
+        """Send a message, and again where it is refused and the usual one is not."""
+        probe = self.caller.send(act.port, act.operation, Kind.TRIED, says, octets)
+        if not probe.succeeded and self.send(act, node, "a valid message").succeeded:
+            probe = self.caller.send(act.port, act.operation, Kind.TRIED, says, octets)
+        if probe.exchange is not None:
+            self.caller.probes.append(replace(probe, kind=Kind.VARIED))
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.INPUT)
+def soap_changes(api: RestInterface) -> tuple[SoapProbe, ...]:
+    """Change what may be changed over SOAP, read it back, be refused in between, and put it back."""
+    messages = DescribedMessages.of(api)
+    if messages is None:
+        raise NotPossibleError("the device has no WSDL")
+    decided = {item.label: api.call_rules.decide(item) for item in operations_of(api.run.contract)}
+    acts = [one for one in acts_of(messages.found) if is_same(one.port.url, messages.found.base)]
+    changes = _Changes(Caller(api, messages))
+    changes.find(acts, {label for label, reason in decided.items() if reason.may})
+    if not changes.acts:
+        raise NotPossibleError("no operation accepted a message")
+    changes.vary()
+    steps = {act.label: changes.write(act, declared, node) for act, declared, node in changes.by_role(Role.WRITES)}
+    steps |= {act.label: changes.create(act, declared, node) for act, declared, node in changes.by_role(Role.CREATES)}
+    api.run.limit.in_turns(steps, 1.0)
+    changes.read_often()
+    return tuple(changes.caller.probes)
+
+
+def _single(probe: SoapProbe) -> dict[str, str]:
+    """Return the values in a success that come once, by name in lower case."""
+    try:
+        inside = probe.inside() if probe.succeeded else []
+    except NotSoapError:
+        return {}
+    return {name: texts[0] for one in inside for name, texts in texts_of(one).items() if len(texts) == 1}
+
+
+def _varied(node: Node, free: list[tuple[tuple[int, ...], Simple]], turn: int) -> Node:
+    """Return a message with other values, by turn."""
+    for path, simple in free:
+        node = with_text(
+            node, path, _other(simple, node.at(path).text, turn, REFERS.search(node.at(path).name) is None)
+        )
+    return node
+
+
+def _other(simple: Simple, text: str, turn: int, is_free: bool) -> str:  # noqa: FBT001 - one caller
+    """Return another value of a type; the same one where none is known to be valid."""
+    if simple.enumeration:
+        return simple.enumeration[turn % len(simple.enumeration)]
+    if simple.builtin == "boolean":
+        return ("true", "false")[turn % 2]
+    if simple.builtin in INTEGERS and is_free:
+        low, high = bounds(simple)
+        # Far from each other first, so that later ones lie between.
+        return str(min(max((1, 9, 4, 7, 2, 6, 3, 8, 5)[turn % 9], low), high))
+    if simple.builtin in FLOATS | {"decimal"}:
+        low_f = float(simple.minimum) if simple.minimum is not None else 0.0
+        high_f = float(simple.maximum) if simple.maximum is not None else low_f + 1.0
+        share = (0.25, 0.75, 0.5, 0.625, 0.375, 0.6875)[turn % 6]
+        return f"{low_f + share * (high_f - low_f):.10g}"
+    if simple.builtin in STRINGS and is_free and not simple.patterns:
+        made = _TEXTS[turn % len(_TEXTS)]
+        fits = (simple.min_length or 0) <= len(made) <= (simple.max_length or len(made))
+        return made if fits else text
+    return text
+
+
+def _as_it_was(node: Node, leaves: list[tuple[tuple[int, ...], Simple]], began: dict[str, str]) -> Node:
+    for path, _ in leaves:
+        node = with_text(node, path, began.get(node.at(path).name.lower(), node.at(path).text))
+    return node
+
+
+def _alternatives(declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
+    """Yield further valid messages, each with what is special about it."""
+    for path, simple in simple_leaves(declared, node):
+        name, text = (node.at(path).name if path else node.name), node.at(path).text
+        others = [one for one in simple.enumeration if one != text]
+        others += (
+            {"true": ["1", "0", "false"], "false": ["1", "0", "true"]}.get(text, [])
+            if simple.builtin == "boolean"
+            else []
+        )
+        for other in others:
+            yield f"{other!r} as {name}", with_text(node, path, other)
+    for path, part in declarations(declared, node):
+        if not part.minimum:
+            yield f"a message without {node.at(path).name}", node.replaced(path)

@@ -1,0 +1,205 @@
+"""A feeder with settings, bins and recipes over SOAP: right in several styles, or with one fault."""
+
+import itertools
+import threading
+import time
+from dataclasses import dataclass, field
+from typing import Any
+from xml.sax.saxutils import escape
+
+from lxml import etree
+from soap_devices import Device, abstract, messages, operation, wsdl
+
+_XS = 'xmlns:xs="http://www.w3.org/2001/XMLSchema"'
+_SETTINGS = (
+    '<xs:element name="Rate" type="c:Rate"/><xs:element name="Label" type="c:Label"/>'
+    '<xs:element name="Mode" type="c:Mode"/><xs:element name="Quiet" type="xs:boolean"/>'
+)
+_NOTHING = "<xs:complexType><xs:sequence/></xs:complexType>"
+_ELEMENTS = {
+    "GetSettings": "",
+    "GetSettingsResponse": _SETTINGS,
+    "SetSettings": _SETTINGS,
+    "SetSettingsResponse": "",
+    "GetBin": '<xs:element name="Bin" type="c:Number"/>',
+    "GetBinResponse": '<xs:element name="Bin" type="c:Number"/><xs:element name="Weight" type="c:Rate"/>',
+    "SetBin": '<xs:element name="Bin" type="c:Number"/><xs:element name="Weight" type="c:Rate"/>',
+    "SetBinResponse": "",
+    "AddRecipe": '<xs:element name="Title" type="c:Label"/><xs:element name="Grams" type="c:Number"/>',
+    "AddRecipeResponse": '<xs:element name="RecipeId" type="xs:string"/>',
+    "GetRecipes": "",
+    "GetRecipesResponse": '<xs:element name="Recipe" minOccurs="0" maxOccurs="unbounded"><xs:complexType><xs:sequence>'
+    '<xs:element name="RecipeId" type="xs:string"/><xs:element name="Title" type="xs:string"/></xs:sequence>'
+    "</xs:complexType></xs:element>",
+    "DeleteRecipe": '<xs:element name="RecipeId" type="xs:string"/>',
+    "DeleteRecipeResponse": "",
+}
+_NAMES = [name for name in _ELEMENTS if not name.endswith("Response")]
+
+
+def _simple(name: str, base: str, *facets: str) -> str:
+    inside = "".join(f"<xs:{facet}/>" for facet in facets)
+    return f'<xs:simpleType name="{name}"><xs:restriction base="xs:{base}">{inside}</xs:restriction></xs:simpleType>'
+
+
+XSD = (
+    f'<xs:schema {_XS} targetNamespace="urn:feeder" xmlns:c="urn:feeder" elementFormDefault="qualified">'
+    + _simple("Rate", "double", 'minInclusive value="0"', 'maxInclusive value="8"')
+    + _simple("Number", "int", 'minInclusive value="1"', 'maxInclusive value="9"')
+    + _simple("Label", "string", 'maxLength value="40"')
+    + _simple("Mode", "string", 'enumeration value="slow"', 'enumeration value="even"', 'enumeration value="burst"')
+    + "".join(
+        f'<xs:element name="{name}"><xs:complexType><xs:sequence>{inside}</xs:sequence></xs:complexType></xs:element>'
+        for name, inside in _ELEMENTS.items()
+    )
+    + "</xs:schema>"
+)
+WSDL = wsdl(
+    "feeder",
+    f'<xs:schema {_XS}><xs:import namespace="urn:feeder" schemaLocation="feeder.xsd"/></xs:schema>',
+    messages(*_NAMES),
+    abstract(*_NAMES),
+    "soap",
+    "document",
+    "".join(operation(name, "soap", f"urn:feeder/{name}") for name in _NAMES),
+)
+
+
+@dataclass
+class Feeder(Device):
+    """The device, with ``style`` or ``fault`` by name."""
+
+    style: str = ""
+    fault_: str = ""
+    settings: dict[str, str] = field(
+        default_factory=lambda: {"Rate": "2", "Label": "feeder", "Mode": "even", "Quiet": "false"}
+    )
+    bins: dict[str, str] = field(default_factory=lambda: {"1": "3", "2": "4"})
+    recipes: dict[str, str] = field(default_factory=dict)
+    lock: Any = field(default_factory=threading.RLock)
+    numbers: Any = field(default_factory=lambda: itertools.count(1))
+    refusals: int = 0
+    writes: int = 0
+    reads: int = 0
+    due: list[tuple[float, dict[str, str]]] = field(default_factory=list)
+
+    def respond(self, octets: bytes) -> tuple[int, bytes]:
+        """Answer, and note what was refused."""
+        with self.lock:
+            status, body = super().respond(octets)
+            if status != 200:
+                self.refusals += 1
+                self._refused(octets)
+            return status, body
+
+    def _refused(self, octets: bytes) -> None:
+        """Let a message that the schema forbids have an effect, if that is the fault."""
+        if (
+            self.fault_ not in {"refused applied", "refused label applied", "refused resets"}
+            or b"SetSettings" not in octets
+        ):
+            return
+        try:
+            sent = {etree.QName(one).localname: one.text or "" for one in etree.fromstring(octets).iter(etree.Element)}
+        except etree.XMLSyntaxError:
+            return
+        if self.fault_ == "refused resets":
+            self.settings["Rate"] = sent.get("Rate", "2")
+            return
+        for name in ("Label",) if self.fault_ == "refused label applied" else ("Rate", "Label", "Quiet"):
+            self.settings[name] = sent.get(name, self.settings[name])
+
+    def answer(self, name: str, payload: Any) -> str | None:
+        """Return the Body of a success."""
+        sent = {etree.QName(one).localname: one.text or "" for one in payload}
+        made = getattr(self, f"_{name}")(sent)
+        if made is None:
+            return None
+        return f'<c:{name}Response xmlns:c="urn:feeder">{made}</c:{name}Response>'
+
+    def _GetSettings(self, _: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
+        self.reads += 1
+        now = time.monotonic()
+        for at, values in [one for one in self.due if one[0] <= now]:
+            self.settings.update(values)
+            self.due.remove((at, values))
+        told = dict(self.settings)
+        if self.fault_ == "stale at times" and self.reads % 9 == 0:
+            told["Mode"] = "even" if told["Mode"] != "even" else "slow"
+        if self.fault_ == "fails at times" and self.reads % 8 == 0:
+            return None
+        if self.fault_ == "latin" and not told["Label"].isascii():
+            told["Label"] = told["Label"].encode().decode("latin-1")
+        if self.fault_ == "escaped twice":
+            told["Label"] = escape(told["Label"])
+        if self.style == "drifts":
+            told["Rate"] = str(float(told["Rate"]) + 0.003 * (self.reads % 5))
+        return "".join(f"<c:{key}>{escape(text)}</c:{key}>" for key, text in told.items())
+
+    def _SetSettings(self, sent: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
+        self.writes += 1
+        values = {**sent, "Quiet": {"1": "true", "0": "false"}.get(sent["Quiet"], sent["Quiet"])}
+        if self.fault_ == "mode burst refused" and values["Mode"] == "burst":
+            return None
+        if self.fault_ == "label ignored":
+            values["Label"] = "feeder"
+        if self.fault_ == "burst is slow" and values["Mode"] == "burst":
+            values["Mode"] = "slow"
+        if self.fault_ == "quiet stays" and values["Quiet"] == "false":
+            values["Quiet"] = "true"
+        if self.fault_ == "rate whole" and self.writes > 3:
+            values["Rate"] = str(int(float(values["Rate"])))
+        if self.fault_ == "lost after refusal" and self.refusals > 4 and self.writes % 2:
+            return ""
+        if self.style == "limits":
+            values["Rate"] = str(min(5.0, float(values["Rate"])))
+        if self.style == "slow":
+            self.due.append((time.monotonic() + 0.3, values))
+            return ""
+        self.settings.update(values)
+        if self.style == "expires":
+            self.due.append((time.monotonic() + 0.5, {"Rate": "0"}))
+        return ""
+
+    def _GetBin(self, sent: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
+        number = sent["Bin"]
+        if number not in self.bins:
+            return None
+        told = next(iter(self.bins)) if self.fault_ == "always the first bin" else number
+        return f"<c:Bin>{number}</c:Bin><c:Weight>{self.bins[told]}</c:Weight>"
+
+    def _SetBin(self, sent: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
+        if sent["Bin"] not in self.bins:
+            return None
+        if self.fault_ == "bins share":
+            self.bins = dict.fromkeys(self.bins, sent["Weight"])
+        self.bins[sent["Bin"]] = sent["Weight"]
+        return ""
+
+    def _AddRecipe(self, sent: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
+        id_ = f"r{next(self.numbers)}"
+        if not (self.fault_ == "third recipe lost" and len(self.recipes) == 2):
+            self.recipes[id_] = sent["Title"]
+        return f"<c:RecipeId>{id_}</c:RecipeId>"
+
+    def _GetRecipes(self, _: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
+        return "".join(
+            f"<c:Recipe><c:RecipeId>{id_}</c:RecipeId><c:Title>{escape(title)}</c:Title></c:Recipe>"
+            for id_, title in self.recipes.items()
+        )
+
+    def _DeleteRecipe(self, sent: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
+        if sent["RecipeId"] not in self.recipes:
+            return None
+        if self.fault_ == "delete takes all":
+            self.recipes.clear()
+        elif self.fault_ != "delete does nothing" and not (
+            self.fault_ == "second delete does nothing" and len(self.recipes) == 2
+        ):
+            del self.recipes[sent["RecipeId"]]
+        return ""
+
+
+def feeder(style: str = "", fault: str = "") -> Feeder:
+    """Return the device."""
+    return Feeder("feeder", WSDL, XSD, {}, style=style, fault_=fault)
