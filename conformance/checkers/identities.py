@@ -95,6 +95,8 @@ class Uniques:
         self._made: dict[str, set[tuple[str, str]]] = defaultdict(set)
         self._refused: dict[str, list[dict[str, Any]]] = defaultdict(list)
         self._unique: dict[str, set[str]] = defaultdict(set)
+        # Members of which two creations had the same value before that was seen.
+        self._shared: dict[str, set[str]] = defaultdict(set)
         # Members of things by collection and identifier, as they were read since one of them was changed.
         self._read: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
 
@@ -103,6 +105,9 @@ class Uniques:
         operation, answer, method = occasion.operation, occasion.response, occasion.request.method
         if operation is None or occasion.request.raw is not None:
             return
+        if method in {"PUT", "PATCH", "DELETE"} and answer.ok:
+            # What was refused may have been so for want of room.
+            self._refused.clear()
         path = occasion.context.target.partition("?")[0].rstrip("/")
         above, _, last = path.rpartition("/")
         if method == "POST" and is_json(occasion.request.media_type):
@@ -123,8 +128,10 @@ class Uniques:
         if occasion.response.status == HTTPStatus.CREATED:
             for one in refused:
                 other = [name for name in {*body, *one} if body.get(name) != one.get(name)]
-                if len(other) == 1 and (other[0], str(one.get(other[0]))) in made:
+                is_taken = len(other) == 1 and (other[0], str(one.get(other[0]))) in made
+                if is_taken and other[0] not in self._shared[path]:
                     self._unique[path].add(plain_name(other[0]))
+            self._shared[path] |= {name for name, one in body.items() if (name, str(one)) in made}
             made |= {(name, str(one)) for name, one in body.items() if _is_plain(one) and len(made) < _REMEMBERED}
         elif occasion.response.status in _TAKEN and occasion.is_valid:
             self._refused[path] = [*refused, body][-_FEW:]

@@ -89,6 +89,11 @@ _UNIQUE = {
     "never refused": ([_MADE[0], ("PUT", "2", {"code": "A"}, 200), ("GET", "2", {"code": "A"}, 200), _A], False),
     "given to another one": ([*_TWICE[:-1], ("GET", "1", {"code": "C", "size": 1}, 200)], False),
     "gone": ([*_TWICE[:-1], ("DELETE", "2", None, 204), _A], False),
+    "a full collection": (
+        [_MADE[0], _TAKEN, ("DELETE", "7", None, 204), ("POST", "", {"code": "B", "size": 2}, 201), *_TWICE[-2:]],
+        False,
+    ),
+    "two of one kind before": ([_MADE[0], _MADE[0], *_TWICE[1:]], False),
     "refused for two reasons": (
         [_MADE[0], _TAKEN, ("POST", "", {"code": "B", "size": 3}, 201), *_TWICE[-2:]], False,
     ),
