@@ -186,7 +186,7 @@ class HttpConnection:
         self, link: socket.socket, head: h11.Response | h11.InformationalResponse, deadline: Deadline
     ) -> tuple[bytes, str]:
         """Return a body, or the beginning of one that does not end, and why it was not read to its end."""
-        fields = {name.lower(): value.decode("latin-1").lower() for name, value in head.headers}
+        fields = {name.lower(): value.decode("latin-1").lower() for name, value in head.headers.raw_items()}
         kind = fields.get(b"content-type", "")
         streams = kind.startswith(_STREAMS) and b"content-length" not in fields
         finite = b"content-length" in fields or kind.startswith("application/json")
