@@ -30,6 +30,8 @@ SOAP: Final = "soap"
 #: What a web server does by itself, for a device of either kind.
 WEB_SERVER: Final = "web-server"
 _CLASSES: Final = ("description", "robustness", "http", WEB_SERVER)
+# Formats in which one value can be written.
+_DATA: Final = re.compile(r"[/+](?:x-)?(?:json|xml|yaml)\b")
 _NO_NAME: Final = re.compile(r"[^a-z0-9]+")
 
 
@@ -108,14 +110,17 @@ def _formats(document: Mapping[str, Any]) -> tuple[set[str], int]:
     """Return the media types that the operations take, and the most that one response of a success has."""
     taken: set[str] = set()
     sent = 0
-    for item in document.get("paths", {}).values():
+    for path, item in document.get("paths", {}).items():
         for operation in item.values() if isinstance(item, dict) else ():
             if not isinstance(operation, dict):
                 continue
             taken |= _content(operation.get("requestBody"))
             responses = operation.get("responses")
             for status, response in responses.items() if isinstance(responses, dict) else ():
-                sent = max(sent, len(_content(response)) if str(status)[0] == "2" else 0)
+                formats = _content(response) if str(status)[0] == "2" else set()
+                # What a path names may be gone when others than the formats of data are asked for.
+                formats = {one for one in formats if _DATA.search(one)} if "{" in str(path) else formats
+                sent = max(sent, len(formats))
     return taken, sent
 
 

@@ -81,16 +81,18 @@ def test_preferred_format(api: RestInterface, judge: Judge) -> None:
     found = answered(api)
     calls = [call for call in api.run.effort.subsample(found, 3) if are_data(call.operation.formats)]
     others = [one for one in found if len(one.operation.formats) > 1 and not are_data(one.operation.formats)]
-    others = [one for one in others if _offers(api, one)]
+    alone = {id(one): _alone(api, one) for one in others}
     if not calls and not others:
         for id_ in (_Q, _SPECIFIC):
             judge.unclaimed(id_, "the contract has no responses in more than one format")
     cases = [(call, id_, text) for call in calls for id_, text in _MATRIX]
-    few = [(call, id_, text) for call in others[:_OTHERS] for id_, text in _FEW]
+    offering = [one for one in others if all(each.holds for each in alone[id(one)])]
+    few = [(call, id_, text) for call in offering[:_OTHERS] for id_, text in _FEW]
     # At little effort each line of the matrix is tried with one resource, another one for each line.
     once = [(calls[index % len(calls)], *_MATRIX[index]) for index in range(len(_MATRIX))] if calls else []
     chosen = few + once + api.run.effort.draw(cases, len(cases), f"{api.run.seed}/accept")
-    preferred: list[Preferred] = []
+    # What has one format whatever is asked for has nothing to choose.
+    preferred = [each for one in others for each in alone[id(one)] if each.holds]
     try:
         for call, id_, text in chosen:
             preferred.append(Preferred(id_, call.operation.formats, *_sent(api, call, text)))
@@ -98,9 +100,10 @@ def test_preferred_format(api: RestInterface, judge: Judge) -> None:
         judge_preferred(judge, preferred)
 
 
-def _offers(api: RestInterface, call: Call) -> bool:
-    """Return whether a resource is there in its first two formats, asked for by name."""
-    return all(call.send(api, ("Accept", name)).response.media_type == name for name in call.operation.formats[:2])
+def _alone(api: RestInterface, call: Call) -> list[Preferred]:
+    """Ask for the first two formats of a resource by name, each alone."""
+    formats = call.operation.formats
+    return [Preferred(_Q, formats, name, call.send(api, ("Accept", name))) for name in formats[:2]]
 
 
 def judge_preferred(judge: Judge, preferred: list[Preferred]) -> None:

@@ -1,9 +1,12 @@
 """What a robot sends in place of preferred formats is one finding, with the values of Accept by which it shows."""
 
 import pytest
+from small_device import described
 
 from conformance.api.rest.formats import are_data
+from conformance.contract.described import write_described_pack
 from conformance.contract.generic import generic_ledger
+from conformance.contract.pack import Contract
 from conformance.rules.rest_formats.test_formats_accept import Preferred, judge_preferred
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.evidence import Judge
@@ -53,3 +56,19 @@ def test_other_formats_in_place_of_the_preferred_one_are_other_findings():
 )
 def test_formats_of_one_value(formats, data):
     assert are_data(formats) == data
+
+
+@pytest.mark.parametrize(
+    ("path", "formats", "claims"),
+    [
+        ("/log", ("application/json", "text/csv"), True),
+        ("/logs/{id}", ("application/json", "text/csv"), False),
+        ("/logs/{id}", ("application/json", "application/xml"), True),
+        ("/log", ("application/json",), False),
+    ],
+)
+def test_formats_are_claimed_where_they_can_be_read(path, formats, claims, tmp_path):
+    answer = {"description": "", "content": {name: {"schema": {}} for name in formats}}
+    document = described({path: {"get": {"responses": {"200": answer}}}})
+    folder = write_described_pack(tmp_path / "pack", document, document)
+    assert ("rest-formats" in Contract.load(folder).classes) == claims
