@@ -16,8 +16,8 @@ _ENOUGH = "all steps that were planned are done"
 # A command takes about this long to be reached, at least; and this part of the settle time of a robot that is slow.
 _COMMAND_S = 0.4
 _OF_SETTLE = 0.25
-# A pause without any request, s; so many in one walk.
-_PAUSE_S, _PAUSES = 1.5, 3
+# A pause without any request, s; once in a walk.
+_PAUSE_S = 1.5
 
 
 class Walk:
@@ -47,7 +47,7 @@ class Walk:
         """
         before: list[Callable[[], object]] = [] if effort.slow else list(preludes)
         if before and effort.name != "quick":
-            lengths = chain(repeat(_PAUSE_S, _PAUSES), repeat(0.0))
+            lengths = chain([_PAUSE_S], repeat(0.0))
             before.append(lambda: robot.clock.sleep(next(lengths)))
         self._preludes = cycle(before)
         self.robot = robot

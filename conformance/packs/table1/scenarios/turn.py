@@ -54,31 +54,22 @@ _STATES: Final = ("GetPose", "GetVelocity")
 _SAMPLES_S: Final = (SEVERAL + 1) * LONGEST_SAMPLE_S
 
 
-@scenario(needs={Need.REST, Need.MOTION})
-def turn(robot: Robot, soap: SoapServices) -> Driven:
-    """Turn for about two seconds, in several ways.
+@scenario(needs={Need.REST, Need.MOTION}, stage=Stage.LATE)
+def turn(robot: Robot, run: Run, soap: SoapServices, refused: RefusedRequests) -> Driven:
+    """Turn for about two seconds, in several ways; then let velocities end by themselves.
 
-    A robot that cannot turn on the spot turns in its narrowest circle; one that cannot turn at all drives.
+    Meanwhile requests are sent that were refused in the run or only read. A robot that cannot turn on the spot turns in
+    its narrowest circle; one that cannot turn at all drives.
     """
     make_room(robot)
-    turning = _Turning(robot, Drive(robot))
+    turning = _Turning(robot, Drive(robot), no_commands(robot, soap, str(run.seed)))
     if soap.subscribers is not None and robot.usual_s <= _QUICK_S:
         turning.drive.aside = partial(turning.read_over_soap, soap.subscribers)
     try:
         turning.play()
-    except Exception as error:
-        raise PartialTraceError(turning.recorded) from error
-    return turning.recorded
-
-
-@scenario(needs={Need.REST, Need.MOTION}, stage=Stage.LATE)
-def letting_go(robot: Robot, run: Run, soap: SoapServices, refused: RefusedRequests) -> Driven:
-    """Let velocities end by themselves, while requests are sent that were refused in the run or only read."""
-    make_room(robot)
-    send_known(robot, soap, refused)
-    again = deque(refused.chosen(soap.there.values(), run.effort))
-    turning = _Turning(robot, Drive(robot), no_commands(robot, soap, str(run.seed)), refused=again)
-    try:
+        turning.drive.aside = lambda _turn: None
+        send_known(robot, soap, refused)
+        turning.refused = deque(refused.chosen(soap.there.values(), run.effort))
         turning.play_letting_go(run)
     except Exception as error:
         raise PartialTraceError(turning.recorded) from error
@@ -163,7 +154,7 @@ class _Turning:
     def play_letting_go(self, run: Run) -> None:
         """Drive along an arc, and let several velocities end by themselves; then drive straight on."""
         robot = self.robot
-        self.drive.look()
+        make_room(robot)
         fast = both(robot) if robot.statement.motion.wheel_separation_m is not None else STILL
         self.fastest = fast if any(fast) or not robot.actuated(ABOUT) else robot.only(ABOUT, fastest(robot, ABOUT))
         bent = robot.drivable(Velocity(*(-part for part in handy(robot, 0.6))))

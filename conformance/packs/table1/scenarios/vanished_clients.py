@@ -53,8 +53,7 @@ _AWAY_M: Final = 1.0
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.STANDSTILL)
 def vanished_clients(robot: Robot, standstill: Standstill) -> tuple[Rest, ...]:
     """Send velocities of which some bytes are missing, and close the connection, at rest."""
-    for part in _PARTS:
-        _vanish(robot, part)
+    _vanish(robot, *_PARTS)
     rest = watch_rest(Drive(robot), _AFTER, _watch_s(robot))
     standstill.attempted("safety/client-vanished", _AFTER, partial(_repeat, robot), seconds=robot.limits.settle_s)
     if rest.found:
@@ -78,17 +77,23 @@ def _watch_s(robot: Robot) -> float:
     return _WATCH_S * robot.watchfulness**2
 
 
-def _vanish(robot: Robot, part: _Part) -> None:
-    """Begin a request that would move the robot, ahead or back, and close the connection before it ends."""
+def _vanish(robot: Robot, *parts: _Part) -> None:
+    """Begin requests that would move the robot, ahead or back, and close their connections before they end."""
+    bodies = [_body(robot, part) for part in parts]  # read first: a robot may wait for the rest of a request
+    begun = []
+    for part, body in zip(parts, bodies, strict=True):
+        sent = body[: int(part.share * len(body))]
+        promised = None if part.lacking is None else len(body) + part.lacking
+        begun.append(PartialRequest(robot.rest, "PUT", part.path, sent=sent, promised=promised))
+    robot.clock.sleep(_READ_S)
+    for part, request in zip(parts, begun, strict=True):
+        request.vanish(reset=part.reset)
+
+
+def _body(robot: Robot, part: _Part) -> bytes:
     sign = 1 if part.reset else -1
     fast = robot.share_of_limits(0.3 * sign, 0.5 * sign)
     if part.path == GOAL_PATH:
         goal = (robot.map_pose() or Pose(0.0, 0.0, 0.0)).ahead(_AWAY_M)
-        body = body_of(goal_body(goal, robot.statement.motion.frame, "vanished"))
-    else:
-        body = body_of(fast.twist if part.path == VELOCITY else fast.linear)
-    sent = body[: int(part.share * len(body))]
-    promised = None if part.lacking is None else len(body) + part.lacking
-    request = PartialRequest(robot.rest, "PUT", part.path, sent=sent, promised=promised)
-    robot.clock.sleep(_READ_S)
-    request.vanish(reset=part.reset)
+        return body_of(goal_body(goal, robot.statement.motion.frame, "vanished"))
+    return body_of(fast.twist if part.path == VELOCITY else fast.linear)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from conformance.packs.table1.robot.drive_rules import outcomes
 from conformance.packs.table1.scenarios.straight import straight
 from conformance.packs.table1.scenarios.trace import Driven
-from conformance.packs.table1.scenarios.turn import further_axes, letting_go, turn
+from conformance.packs.table1.scenarios.turn import further_axes, turn
 from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import NotClaimed, Outcome, Rule, rule
@@ -45,7 +45,7 @@ def velocity_both(trace: Driven, run: Run) -> Iterator[Outcome]:
 velocity_odometry = _shown("velocity-odometry", straight, turn, velocity_walk)
 
 
-@rule("rest-resources/velocity-odometry", on=(letting_go,))
+@rule("rest-resources/velocity-odometry", on=(turn,))
 def velocity_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that the velocity read first after a pause is not the one from before; once is chance."""
     limits = said_of(run).limits
@@ -56,7 +56,7 @@ def velocity_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
         yield Case(False, stale[-1].velocity_exchange, expected, seen, "after a pause")
 
 
-@rule("rest-resources/pose-motion", on=(letting_go,))
+@rule("rest-resources/pose-motion", on=(turn,))
 def pose_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that the pose read first after a pause is the one that the resting robot has in the next GET."""
     limits = said_of(run).limits
@@ -68,8 +68,8 @@ def pose_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
         yield Case(False, stale[-1].exchange, expected, seen, "after a pause")
 
 
-linear_put = _shown("linear-put", turn, letting_go, velocity_walk)
-linear_keeps_angular = _shown("linear-keeps-angular", turn, letting_go, velocity_walk)
+linear_put = _shown("linear-put", turn, velocity_walk)
+linear_keeps_angular = _shown("linear-keeps-angular", turn, velocity_walk)
 linear_agrees = _shown("linear-agrees", straight, turn, velocity_walk)
 pose_motion = _shown("pose-motion", straight, turn, further_axes, velocity_walk)
 pose_rotation = _shown("pose-rotation", turn, velocity_walk)

@@ -13,7 +13,7 @@ from conformance.packs.table1.scenarios.goal_reached import goal_reached
 from conformance.packs.table1.scenarios.standing import standing
 from conformance.packs.table1.scenarios.straight import straight
 from conformance.packs.table1.scenarios.trace import Driven
-from conformance.packs.table1.scenarios.turn import further_axes, letting_go, turn
+from conformance.packs.table1.scenarios.turn import further_axes, turn
 from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import Note, NotTested, Outcome, rule
@@ -30,13 +30,13 @@ _LATE_RESPONSES: Final = 2
 _LATE = NotTested("responses came too late to measure how long a velocity holds")
 
 
-@rule("safety/stop", on=(straight, turn, letting_go, further_axes, velocity_walk))
+@rule("safety/stop", on=(straight, turn, further_axes, velocity_walk))
 def stop(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that zero velocity stops the robot before its watchdog would."""
     return outcomes("safety/stop", trace.drive, said_of(run).limits)
 
 
-@rule("safety/limits-hold", on=(straight, turn, letting_go, further_axes, velocity_walk))
+@rule("safety/limits-hold", on=(straight, turn, further_axes, velocity_walk))
 def limits_hold(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that a robot without declared limits is no faster than commanded."""
     return outcomes("safety/limits-hold", trace.drive, said_of(run).limits)
@@ -48,14 +48,14 @@ def refused_keeps(trace: Driven, run: Run) -> Iterator[Outcome]:
     return outcomes("safety/refused-keeps", trace.drive, said_of(run).limits)
 
 
-@rule("safety/renewal", on=(turn, letting_go))
+@rule("safety/renewal", on=(turn,))
 def renewal(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that a velocity lasts as long as it is renewed."""
     yield from outcomes("safety/renewal", trace.drive, said_of(run).limits)
     yield from (NotTested(reason) for id_, reason in trace.not_tested if id_ == "safety/renewal")
 
 
-@rule("safety/hold", on=(letting_go, further_axes))
+@rule("safety/hold", on=(turn, further_axes))
 def hold(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that a velocity that is not renewed lasts for the hold time."""
     limits = said_of(run).limits
@@ -82,7 +82,7 @@ def hold(trace: Driven, run: Run) -> Iterator[Outcome]:
             )
 
 
-@rule("safety/hold-ends", on=(letting_go, further_axes))
+@rule("safety/hold-ends", on=(turn, further_axes))
 def hold_ends(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that the robot begins to stop at the end of the hold time."""
     limits = said_of(run).limits
@@ -106,7 +106,7 @@ def hold_ends(trace: Driven, run: Run) -> Iterator[Outcome]:
         )
 
 
-@rule("safety/watchdog", on=(letting_go, further_axes))
+@rule("safety/watchdog", on=(turn, further_axes))
 def watchdog(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that the robot comes to rest whenever a velocity is not renewed."""
     for one in itertools.chain.from_iterable(trace.let_go):
