@@ -9,6 +9,9 @@ from conformance.packs.table1.statement import Statement
 from conformance.statement.motion_map import MotionMap
 
 _POSE, _VELOCITY, _GOAL = "/robot/pose/", "/robot/velocity/", "/robot/navigation/action/goal/"
+_LINEAR = "/robot/velocity/linear/"
+# How far from straight ahead a heading is, as a target: half a turn would be reached either way, rad.
+_TURNED = 3.0
 # Components by their names in the map: the part and the axis of a Twist, and the index into a Velocity.
 _COMPONENTS: Final = {"ahead": ("linear", "x", 0), "aside": ("linear", "y", 1), "turn": ("angular", "z", 5)}
 # Beside the way to a goal a robot turns towards it, and turns again at its end, s.
@@ -36,8 +39,15 @@ def motion_map_of(statement: Statement, area: tuple[float, float, float, float])
     for name in names:
         part, axis, _ = _COMPONENTS[name]
         zeros[part][axis] = f"{{{name}}}"
-    position = {"x": "{x}", "y": "{y}", "z": 0.0}
-    pose = {"position": position, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+    heading = {"at": "/pose/pose/orientation", "angle": "yaw", "unit": "rad", "limits": (-_TURNED, _TURNED)}
+    turns = {"heading": heading | {"tolerance": round(limits.arrival[1], 4)}}
+    orientation = {"x": 0.0, "y": 0.0, "z": "{heading:/z}", "w": "{heading:/w}"}
+    if not motion.turns_on_the_spot:
+        turns, orientation = {}, {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+    pose = {"position": {"x": "{x}", "y": "{y}", "z": 0.0}, "orientation": orientation}
+    ways = [{"send": f"PUT {_VELOCITY}", "body": zeros, "media_type": "application/xml", "root": "Twist"}]
+    if set(names) & {"ahead", "aside"}:
+        ways.insert(0, {"send": f"PUT {_LINEAR}", "body": zeros["linear"]})
     way = area[2] - area[0] + area[3] - area[1]
     declared = limits.linear_declared and limits.angular_declared
     arrives_m = round(limits.arrival[0], 4)
@@ -58,7 +68,8 @@ def motion_map_of(statement: Statement, area: tuple[float, float, float, float])
             "axes": {
                 axis: {"at": f"/pose/pose/position/{axis}", "unit": "m", "limits": side, "tolerance": arrives_m}
                 for axis, side in (("x", area[::2]), ("y", area[1::2]))
-            },
+            }
+            | turns,
         },
         "goto": goto if same_frame else None,
         "stop": {"send": f"DELETE {_GOAL}", "rests_within_s": limits.settle_s} if same_frame else None,
@@ -77,6 +88,7 @@ def motion_map_of(statement: Statement, area: tuple[float, float, float, float])
                 }
                 for name, pointer in twist.items()
             },
+            "ways": ways,
         },
     }
     return msgspec.convert(written, MotionMap)
