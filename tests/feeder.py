@@ -63,14 +63,20 @@ WSDL = wsdl(
     "document",
     "".join(operation(name, "soap", f"urn:feeder/{name}") for name in _NAMES),
 )
+# Which values of a refused message are applied.
+_APPLIED = {
+    "refused applied": ("Rate", "Label"),
+    "refused label applied": ("Label",),
+    "refused rate applied": ("Rate",),
+}
 
 
 @dataclass
 class Feeder(Device):
-    """The device, with ``style`` or ``fault`` by name."""
+    """The device, with ``style`` or ``faults`` by name."""
 
     style: str = ""
-    fault_: str = ""
+    faults: frozenset[str] = frozenset()
     settings: dict[str, str] = field(
         default_factory=lambda: {"Rate": "2", "Label": "feeder", "Mode": "even", "Quiet": "false"}
     )
@@ -94,20 +100,15 @@ class Feeder(Device):
 
     def _refused(self, octets: bytes) -> None:
         """Let a message that the schema forbids have an effect, if that is the fault."""
-        if (
-            self.fault_ not in {"refused applied", "refused label applied", "refused resets"}
-            or b"SetSettings" not in octets
-        ):
+        if b"SetSettings" not in octets:
             return
         try:
             sent = {etree.QName(one).localname: one.text or "" for one in etree.fromstring(octets).iter(etree.Element)}
         except etree.XMLSyntaxError:
             return
-        if self.fault_ == "refused resets":
-            self.settings["Rate"] = sent.get("Rate", "2")
-            return
-        for name in ("Label",) if self.fault_ == "refused label applied" else ("Rate", "Label", "Quiet"):
-            self.settings[name] = sent.get(name, self.settings[name])
+        for fault, names in _APPLIED.items():
+            for name in names if fault in self.faults else ():
+                self.settings[name] = sent.get(name, self.settings[name])
 
     def answer(self, name: str, payload: Any) -> str | None:
         """Return the Body of a success."""
@@ -124,13 +125,13 @@ class Feeder(Device):
             self.settings.update(values)
             self.due.remove((at, values))
         told = dict(self.settings)
-        if self.fault_ == "stale at times" and self.reads % 9 == 0:
+        if "stale at times" in self.faults and self.reads % 9 == 0:
             told["Mode"] = "even" if told["Mode"] != "even" else "slow"
-        if self.fault_ == "fails at times" and self.reads % 8 == 0:
+        if "fails at times" in self.faults and self.reads % 8 == 0:
             return None
-        if self.fault_ == "latin" and not told["Label"].isascii():
+        if "latin" in self.faults and not told["Label"].isascii():
             told["Label"] = told["Label"].encode().decode("latin-1")
-        if self.fault_ == "escaped twice":
+        if "escaped twice" in self.faults:
             told["Label"] = escape(told["Label"])
         if self.style == "drifts":
             told["Rate"] = str(float(told["Rate"]) + 0.003 * (self.reads % 5))
@@ -139,17 +140,17 @@ class Feeder(Device):
     def _SetSettings(self, sent: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
         self.writes += 1
         values = {**sent, "Quiet": {"1": "true", "0": "false"}.get(sent["Quiet"], sent["Quiet"])}
-        if self.fault_ == "mode burst refused" and values["Mode"] == "burst":
+        if "mode burst refused" in self.faults and values["Mode"] == "burst":
             return None
-        if self.fault_ == "label ignored":
+        if "label ignored" in self.faults:
             values["Label"] = "feeder"
-        if self.fault_ == "burst is slow" and values["Mode"] == "burst":
+        if "burst is slow" in self.faults and values["Mode"] == "burst":
             values["Mode"] = "slow"
-        if self.fault_ == "quiet stays" and values["Quiet"] == "false":
+        if "quiet stays" in self.faults and values["Quiet"] == "false":
             values["Quiet"] = "true"
-        if self.fault_ == "rate whole" and self.writes > 3:
+        if "rate whole" in self.faults and self.writes > 3:
             values["Rate"] = str(int(float(values["Rate"])))
-        if self.fault_ == "lost after refusal" and self.refusals > 4 and self.writes % 2:
+        if "lost after refusal" in self.faults and self.refusals > 4 and self.writes % 2:
             return ""
         if self.style == "limits":
             values["Rate"] = str(min(5.0, float(values["Rate"])))
@@ -165,20 +166,20 @@ class Feeder(Device):
         number = sent["Bin"]
         if number not in self.bins:
             return None
-        told = next(iter(self.bins)) if self.fault_ == "always the first bin" else number
+        told = next(iter(self.bins)) if "always the first bin" in self.faults else number
         return f"<c:Bin>{number}</c:Bin><c:Weight>{self.bins[told]}</c:Weight>"
 
     def _SetBin(self, sent: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
         if sent["Bin"] not in self.bins:
             return None
-        if self.fault_ == "bins share":
+        if "bins share" in self.faults:
             self.bins = dict.fromkeys(self.bins, sent["Weight"])
         self.bins[sent["Bin"]] = sent["Weight"]
         return ""
 
     def _AddRecipe(self, sent: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
         id_ = f"r{next(self.numbers)}"
-        if not (self.fault_ == "third recipe lost" and len(self.recipes) == 2):
+        if not ("third recipe lost" in self.faults and len(self.recipes) == 2):
             self.recipes[id_] = sent["Title"]
         return f"<c:RecipeId>{id_}</c:RecipeId>"
 
@@ -191,15 +192,15 @@ class Feeder(Device):
     def _DeleteRecipe(self, sent: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
         if sent["RecipeId"] not in self.recipes:
             return None
-        if self.fault_ == "delete takes all":
+        if "delete takes all" in self.faults:
             self.recipes.clear()
-        elif self.fault_ != "delete does nothing" and not (
-            self.fault_ == "second delete does nothing" and len(self.recipes) == 2
+        elif "delete does nothing" not in self.faults and not (
+            "second delete does nothing" in self.faults and len(self.recipes) == 2
         ):
             del self.recipes[sent["RecipeId"]]
         return ""
 
 
-def feeder(style: str = "", fault: str = "") -> Feeder:
+def feeder(style: str = "", *faults: str) -> Feeder:
     """Return the device."""
-    return Feeder("feeder", WSDL, XSD, {}, style=style, fault_=fault)
+    return Feeder("feeder", WSDL, XSD, {}, style=style, faults=frozenset(faults))

@@ -200,16 +200,18 @@ class _Changes:
                 probe = self.send(act, node, "a message that creates")
             told = _single(probe)
             made += [text for name, text in told.items() if REFERS.search(name)][:1] or list(told.values())[:1]
+            if not turn:
+                # The first one shows that things last longer than the others do until they are removed.
+                time.sleep(_LASTS_S)
             self._read(lists, node)
             yield
-        time.sleep(_LASTS_S)
+        time.sleep(SETTLES_S)
         self._read(lists, node)
         self._refuse(act, declared, _varied(node, free, _THINGS), 0)
         self._read(lists, node, times=2)
-        for id_ in made:
+        for id_ in reversed(made):
             self._remove(remove[0], remove[2], id_)
-            self._read(lists, node)
-            time.sleep(SETTLES_S / len(made))
+            self._read(lists, node, times=2)
         time.sleep(SETTLES_S)
         self._read(lists, node, times=2)
 

@@ -1,53 +1,75 @@
 """What SOAP operations write, create and remove is read back: right devices are not blamed, faulty ones are."""
 
-import pytest
+from concurrent.futures import ThreadPoolExecutor
+
 from feeder import feeder
 from small_device import certified
 from soap_devices import serving
 
-_FAULTS = {
-    "refused applied": "refused-keeps",
-    "refused label applied": "refused-keeps",
-    "refused resets": "refused-keeps",
-    "label ignored": "written-is-read",
-    "burst is slow": "written-is-read",
-    "quiet stays": "written-is-read",
-    "rate whole": "written-is-read",
-    "lost after refusal": "written-is-read",
-    "latin": "written-is-read",
-    "escaped twice": "written-is-read",
-    "always the first bin": "written-is-read",
-    "bins share": "written-is-read",
-    "stale at times": "written-is-read",
-    "fails at times": "valid-accepted",
-    "mode burst refused": "valid-accepted",
-    "third recipe lost": "created-is-there",
-    "delete takes all": "created-is-there",
-    "delete does nothing": "deleted-is-gone",
-    "second delete does nothing": "deleted-is-gone",
-}
+_STYLES = ("", "limits", "slow", "expires", "drifts")
+# Faults that one device has beside each other, each with the requirement and what its finding has to name.
+_FAULTS = (
+    {
+        "refused applied": ("refused-keeps", "label '"),
+        "always the first bin": ("written-is-read", "weight '"),
+        "third recipe lost": ("created-is-there", "AddRecipe"),
+    },
+    {
+        "refused label applied": ("refused-keeps", "label '"),
+        "bins share": ("written-is-read", "weight '"),
+        "delete takes all": ("created-is-there", "AddRecipe"),
+    },
+    {
+        "label ignored": ("written-is-read", "label '"),
+        "burst is slow": ("written-is-read", "mode '"),
+        "delete does nothing": ("deleted-is-gone", "which was removed"),
+    },
+    {
+        "quiet stays": ("written-is-read", "quiet '"),
+        "latin": ("written-is-read", "label '"),
+        "rate whole": ("written-is-read", "rate '"),
+        "second delete does nothing": ("deleted-is-gone", "which was removed"),
+    },
+    {"escaped twice": ("written-is-read", "label '"), "stale at times": ("written-is-read", "mode '")},
+    {"lost after refusal": ("written-is-read", "SetSettings")},
+    {"fails at times": ("valid-accepted", "GetSettings"), "mode burst refused": ("valid-accepted", "SetSettings")},
+)
 
 
-def _certified(device, tmp_path):
+def _certified(device, folder):
+    folder.mkdir()
+    allowed = ("--call", "*", "--call", "POST /feederPort/DeleteRecipe")
     with serving(device) as url:
-        return certified(f"{url}/feeder.wsdl", tmp_path, "--call", "*", "--call", "POST /feederPort/DeleteRecipe")
+        return certified(f"{url}/feeder.wsdl", folder, *allowed)
 
 
-@pytest.mark.parametrize("style", ["", "limits", "slow", "expires", "drifts"])
-def test_a_right_device_is_not_blamed_and_is_left_as_it_was(style, tmp_path):
-    device = feeder(style)
-    before = dict(device.settings)
-    outcome = _certified(device, tmp_path)
-    assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
-    if not style:
-        assert device.settings == before
-        assert device.recipes == {}
-        verdicts = {one["id"]: one["verdict"] for one in outcome.result["requirements"]}
-        names = ("written-is-read", "created-is-there", "deleted-is-gone")
-        assert {verdicts[f"soap/{name}"] for name in names} == {"pass"}
+def _all(devices, tmp_path):
+    """Certify several devices at the same time, since a run mostly waits."""
+    with ThreadPoolExecutor(4) as pool:
+        folders = [tmp_path / str(number) for number in range(len(devices))]
+        return list(pool.map(_certified, devices, folders))
 
 
-@pytest.mark.parametrize("fault", _FAULTS)
-def test_a_fault_is_found(fault, tmp_path):
-    outcome = _certified(feeder(fault=fault), tmp_path)
-    assert f"soap/{_FAULTS[fault]}" in outcome.blamed, outcome.text
+def test_right_devices_are_not_blamed_and_are_left_as_they_were(tmp_path):
+    devices = [feeder(style) for style in _STYLES]
+    before = dict(devices[0].settings)
+    outcomes = _all(devices, tmp_path)
+    for outcome in outcomes:
+        assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
+    assert devices[0].settings == before
+    assert devices[0].recipes == {}
+    assert devices[0].bins == {"1": "3", "2": "4"}
+    verdicts = {one["id"]: one["verdict"] for one in outcomes[0].result["requirements"]}
+    names = ("written-is-read", "created-is-there", "deleted-is-gone")
+    assert {verdicts[f"soap/{name}"] for name in names} == {"pass"}
+
+
+def test_faults_are_found_by_the_requirement_that_they_break(tmp_path):
+    outcomes = _all([feeder("", *faults) for faults in _FAULTS], tmp_path)
+    missed = [
+        fault
+        for faults, outcome in zip(_FAULTS, outcomes, strict=True)
+        for fault, (name, said) in faults.items()
+        if said not in "".join(one["message"] for one in outcome.requirement(f"soap/{name}")["failures"])
+    ]
+    assert missed == []
