@@ -5,6 +5,7 @@ from typing import Final
 
 from conformance.api.rest.request_context import RequestContext
 from conformance.checkers import conditional, declared, fields, problem
+from conformance.checkers.changes import Changes
 from conformance.checkers.entity_tags import EntityTags
 from conformance.checkers.identities import Identities, Uniques
 from conformance.checkers.lists import Lists
@@ -38,16 +39,17 @@ class RestCheckers:
         self._contract, self._base_url = contract, base_url
         self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
         # These know what the run has shown so far.
-        self._memory, self._writes = Memory(contract), Writes(contract)
+        self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
         self._over_time = (
             conditional.Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
-            self._writes, Uniques(),
+            self._writes, Uniques(), self._changes,
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:
         """Forget what may have been changed by a request of which nobody knows what it did."""
         self._memory.forget(deletes=deletes)
         self._writes.forget()
+        self._changes.forget()
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Yield the cases of one exchange; none if it went to another interface."""

@@ -106,17 +106,22 @@ def created_path(surveyor: Surveyor, create: Operation, read: Operation) -> str:
             break
     if made is None or made.exchange is None or made.status != 201:  # noqa: PLR2004 - RFC 9110 15.3.2
         return ""
-    sent, answer = made.exchange.request.url, made.exchange.response
+    return located(surveyor.api, read, made.exchange)
+
+
+def located(api: RestInterface, read: Operation, made: Exchange) -> str:
+    """Return the path by which a created thing is read, as far as the response says where it is, or nothing."""
+    sent, answer = made.request.url, made.response
     location, targets = answer.header("location"), []
     if location and is_same(joined(sent, location), sent):
-        targets = [path_of(joined(sent, location)).removeprefix(surveyor.api.client.prefix)]
+        targets = [path_of(joined(sent, location)).removeprefix(api.client.prefix)]
     if id_ := identified(read_json(answer.body).value, read)[1]:
-        base = urlsplit(sent).path.removeprefix(surveyor.api.client.prefix).rstrip("/")
+        base = urlsplit(sent).path.removeprefix(api.client.prefix).rstrip("/")
         targets += [f"{base}/{quote(str(id_), safe='')}{'/' if read.template.endswith('/') else ''}"]
     pattern = re.sub(r"\\{[^{}]*\\}", "[^/]+", re.escape(read.template))
     usable = list(dict.fromkeys(one for one in targets if re.fullmatch(pattern, one)))
     # A Location may be wrong.
-    found = (one for one in usable if len(usable) == 1 or _Thing(surveyor, read, one).get().ok)
+    found = (one for one in usable if len(usable) == 1 or api.send(Outgoing("GET", one)).response.ok)
     return next(found, "")
 
 

@@ -12,6 +12,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.things import is_marked_deleted
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json
+from conformance.scenarios.ending import Deletion, Ended, begin_and_end, look_at_ended, used_things
 from conformance.scenarios.lifecycles import lifecycles
 from conformance.scenarios.living import Kind, Life
 from conformance.scenarios.rule import Outcome, rule
@@ -67,6 +68,37 @@ def deleted_is_gone(trace: tuple[Life, ...]) -> Iterable[Outcome]:
 def refused_keeps(trace: tuple[Life, ...]) -> Iterable[Outcome]:
     """Judge whether requests that were answered 4xx have changed nothing."""
     yield from _looks(trace, Kind.REFUSED)
+
+
+@rule("description/deleted-is-gone", on=(used_things,))
+def nothing_refers_to_what_is_gone(trace: tuple[Deletion, ...]) -> Iterable[Outcome]:
+    """Judge whether a thing that another one refers to was deleted, so that the reference leads nowhere."""
+    for one in trace:
+        shown = one.deleted if one.fault else one.user
+        expected = "a refusal with 409, as the description says of what is in use, or no reference to it any more"
+        yield Case(not one.fault, shown, expected, f"{shown.came}: {one.fault}", cause=one.operation)
+
+
+@pytest.fixture(scope="session")
+def begun() -> list[Ended]:
+    """Return the list of what was begun and ended, which is looked at again at the end."""
+    return []
+
+
+@pytest.mark.phase("input")
+@pytest.mark.needs("rest")
+@pytest.mark.requirement("description/written-is-read", "description/refused-keeps")
+def test_what_goes_on(api: RestInterface, values: Values, begun: list[Ended]) -> None:
+    """Begin and cancel things that have a state; `checkers.changes` judges all reads of a run."""
+    begun += begin_and_end(api, values)
+
+
+@pytest.mark.phase("late")
+@pytest.mark.needs("rest")
+@pytest.mark.requirement("description/written-is-read", "description/refused-keeps")
+def test_what_has_ended(api: RestInterface, values: Values, begun: list[Ended]) -> None:
+    """Read what was begun again, and cancel what is done."""
+    look_at_ended(api, values, begun)
 
 
 @pytest.mark.phase("late")

@@ -13,7 +13,7 @@ from conformance.transport.exchange import Exchange, NoAnswer, Request, Response
 BASE = "http://device:8000/api"
 _MEMBERS = {
     "id": {"type": "string"}, "name": {"type": "string"}, "rank": {"type": "integer"}, "state": {"type": "string"},
-    "is_default": {"type": "boolean"},
+    "is_default": {"type": "boolean"}, "phase": {"enum": ["queued", "running", "done", "cancelled", "archived"]},
 }  # fmt: skip
 _OWN = {"built": {"type": "string", "readOnly": True}, "serial": {"type": "integer", "readOnly": True}}
 _JOB = {"type": "object", "properties": {**_MEMBERS, **_OWN, "kept": {"type": "boolean", "default": False}}}
@@ -36,7 +36,8 @@ _PATHS = {
         "patch": {"requestBody": _BODY, "responses": _OK},
         "delete": {"responses": _OK},
     },
-    "/jobs/{id}/cancel": {"parameters": [_ID], "post": {"responses": _OK}},
+    "/jobs/{id}/cancel": {"parameters": [_ID], "post": {"responses": {**_OK, "409": {"description": "ended"}}}},
+    "/jobs/{id}/retry": {"parameters": [_ID], "post": {"responses": {**_OK, "409": {"description": "not ended"}}}},
     "/keys": {"post": {"requestBody": _BODY, "responses": _OK}},
     "/keys/{id}": {"parameters": [_UUID], "get": {"responses": _OK}, "delete": {"responses": _OK}},
     "/notes/{id}": {
@@ -47,8 +48,9 @@ _PATHS = {
     "/reset": {"post": {"responses": _OK}},
     "/mode": {"get": {"responses": _OK}, "put": {"requestBody": _BODY, "responses": _OK}},
 }
-GONE, THERE, READ, DEFAULTS = (
-    f"description/{name}" for name in ("deleted-is-gone", "created-is-there", "written-is-read", "defaults")
+GONE, THERE, READ, DEFAULTS, KEEPS = (
+    f"description/{name}"
+    for name in ("deleted-is-gone", "created-is-there", "written-is-read", "defaults", "refused-keeps")
 )  # fmt: skip
 
 
@@ -102,6 +104,25 @@ _MODE = ("PUT", "/mode", {"name": "home"}, 200, {"name": "home"})
 _CANCEL = ("POST", "/jobs/1/cancel", None, 200, _job("1"))
 _BY_HAND = ("RAW", "", None, None, None)
 _LOST = ("DELETE", "/jobs/2", None, None, None)
+
+
+def _cancel(status=200, act="cancel", **values):
+    return "POST", f"/jobs/1/{act}", None, status, _job("1", **values)
+
+
+def _status(value):
+    return _get("1", phase=value)
+
+
+def _set(status=200, **values):
+    return "PUT", "/mode", values, status, values
+
+
+def _mode(**values):
+    return "GET", "/mode", None, 200, values
+
+
+_CANCELLED = _cancel(phase="cancelled")
 # Another thing whose name and rank read as written for ten seconds.
 _LASTING = [_put("8", rank=5, name="c"), 10.0, _get("8", rank=5, name="c")]
 #: What is sent, one second after each other or after so many, and the requirement that is broken.
@@ -150,10 +171,59 @@ BROKEN = {
     "a list has what was deleted, at last": (
         [_post("1"), _delete("1"), 5.0, _get("1", 404), _jobs("?rank=1"), _jobs("", _job("9"), _job("1"))], GONE,
     ),
+    "a refused text is set": ([_mode(name="home"), _set(422, name="roaas 1", rank="x"), _mode(name="roaas 1")], KEEPS),
+    "a refused number is set, twice": (
+        [_mode(rank=1), _set(401, rank=2), _mode(rank=2), _set(401, rank=3), _mode(rank=3)], KEEPS,
+    ),
+    "a text is set by a stale condition": (
+        [_get("1"), _patch("1", 412, name="roaas 1"), _get("1", name="roaas 1")], KEEPS,
+    ),
+    "deleted, and refused": ([_get("1"), _delete("1", 403), _get("1", 404)], KEEPS),
+    "cancelled goes on": (
+        [_status("running"), _CANCELLED, _status("cancelled"), _RESET, _status("cancelled"), _status("done")], READ,
+    ),
+    "cancelled is told and not so": ([_status("running"), _CANCELLED, 4.0, _status("running")], READ),
+    "cancelled is told, and it is done": ([_status("running"), _CANCELLED, _status("running"), _status("done")], READ),
+    "cancelled goes on after a refusal": ([_CANCELLED, _status("cancelled"), _REFUSED, _status("running")], READ),
+    "cancelled goes on after another's creation": (
+        [_CANCELLED, _status("cancelled"), _post("2"), _status("queued")], READ,
+    ),
+    "done is cancelled": ([_status("done"), _CANCELLED], READ),
+    "done is cancelled without a word": (
+        [_status("done"), ("POST", "/jobs/1/cancel", None, 204, None), _status("cancelled")], READ,
+    ),
+    "done is cancelled by a refusal": ([_status("done"), _cancel(409), _status("cancelled")], READ),
+    "done goes on after a refusal": ([_status("done"), _cancel(409), _status("running")], READ),
+    "done is cancelled by itself": ([_status("done"), _status("cancelled")], READ),
+    "a start that is told and not so": (
+        [_status("queued"), _cancel(act="retry", phase="running"), 4.0, _status("queued")], READ,
+    ),
     "a default that is not applied": ([_post("1"), _KEPT, _post("3"), _KEPT], DEFAULTS),
 }  # fmt: skip
 #: The same for right devices.
 RIGHT = {
+    "refused, and all as before": [_mode(name="home"), _set(422, name="roaas 1"), _mode(name="home")],
+    "refused, and another value": [_mode(rank=1), _set(422, rank=7), _mode(rank=2)],
+    "refused, and set by another request": [
+        *(_mode(name="a"), _set(422, name="roaas 1"), _set(name="roaas 1"), _mode(name="roaas 1")),
+    ],
+    "refused by a proxy that waited": [_mode(name="a"), _set(408, name="roaas 1"), _mode(name="roaas 1")],
+    "a refused DELETE of what is not there": [_delete("1", 404), _get("1", 404)],
+    "a job that runs": [_status("queued"), _cancel(act="retry", phase="running"), _status("running"), _status("done")],
+    "a job that is cancelled later": [_status("running"), _CANCELLED, _status("running"), _status("cancelled")],
+    "cancelled twice": [_CANCELLED, _status("cancelled"), _CANCELLED, _status("cancelled")],
+    "a cancelled job that is put away": [_CANCELLED, _status("cancelled"), 9.0, _status("archived")],
+    "a cancelled job that is retried": [
+        *(_CANCELLED, _status("cancelled"), _cancel(act="retry", phase="queued"), _status("running")),
+    ],
+    "a done job that is retried, and refused before": [
+        *(_status("done"), _cancel(409), _status("done"), _cancel(act="retry", phase="queued"), _status("queued")),
+    ],
+    "a timetable": [_status("done"), 9.0, _status("running"), 9.0, _status("done")],
+    "a cancelled job that PUT changes": [
+        *(_CANCELLED, _status("cancelled"), _put("1", phase="queued"), _status("queued")),
+    ],
+    "a cancelled job, and all is as before": [_CANCELLED, _status("cancelled"), _RESET, _status("queued")],
     "a member of the device's that changes": [_get("1", built="2026"), _put("1", built="x"), _get("1", built="2027")],
     "a member of the device's that is sent back": [
         *(_get("1", serial=71234), _put("1", serial=71234), _get("1", serial=71234)),
@@ -269,7 +339,7 @@ def _broken(contract, steps):
             else Exchange(request, Response(status, content, body, 10.0, received_s=now))
         )
         broken |= {case.requirement for case in checkers(attempt) if not case.holds}
-    return broken & {GONE, THERE, READ, DEFAULTS}
+    return broken & {GONE, THERE, READ, DEFAULTS, KEEPS}
 
 
 @pytest.mark.parametrize("name", BROKEN)

@@ -1,0 +1,194 @@
+"""States of things, by all reads of a run: what is done or cancelled stays so, and a refused DELETE deletes nothing.
+
+`checkers.writes` judges what PUT and PATCH change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Final
+from urllib.parse import unquote
+
+from conformance.api.call_rules import words_of
+from conformance.api.rest.things import collection_of, represented
+from conformance.checkers.occasion import Occasion
+from conformance.contract.pack import Contract
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
+from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
+from conformance.verdict.case import Case
+
+_REFUSED: Final = range(400, 500)
+# A proxy may have sent 408 after the device has acted; 406 is about the response.
+_UNCLEAR: Final = frozenset({HTTPStatus.NOT_ACCEPTABLE, HTTPStatus.REQUEST_TIMEOUT})
+_ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
+_MOST_OCTETS: Final = 65_536
+_MOST_THINGS: Final = 1_000
+# A device that acts later has so long, s.
+_SETTLES_S: Final = 3.0
+_STATES: Final = frozenset({"state", "status", "phase"})
+_CANCELLED: Final = frozenset({"cancelled", "canceled", "aborted"})
+_DONE: Final = frozenset({"done", "finished", "completed", "complete", "succeeded"})
+#: States in which nothing goes on.
+FINAL: Final = _CANCELLED | _DONE
+# A thing in a final state may be put away; another state ends nothing that went on.
+_AWAY: Final = frozenset({"archived", "expired", "deleted", "removed", "purged"})
+#: Operations that end what goes on, or interrupt it.
+ENDING: Final = frozenset({"cancel", "abort", "stop", "pause", "halt", "interrupt"})
+
+
+@dataclass
+class _State:
+    """The state of one thing.
+
+    Attributes:
+        value: as it was last read or told.
+        at_s: when, s of the monotonic clock.
+        was: what was read before an operation told it; empty: it was read.
+        told: the operation that told it.
+        by: an operation that was accepted since then, and must not change a final state; empty: none.
+        refused: an operation of the thing that was refused since then.
+    """
+
+    value: str
+    at_s: float
+    was: str = ""
+    told: str = ""
+    by: str = ""
+    refused: str = ""
+
+
+class Changes:
+    """Judges each read of a resource by the requests before it.
+
+    Args:
+        contract: the description's.
+    """
+
+    def __init__(self, contract: Contract) -> None:
+        operations = operations_of(contract) if contract.openapi_path else ()
+        reads = {one.template.rstrip("/"): one for one in operations if one.method == "GET" and one.shape}
+        self._states = {
+            template: name for template, one in reads.items() if collection_of(template) and (name := state_of(one))
+        }
+        # What was there when it was read last, and the DELETE of it that was refused since then.
+        self._there: dict[str, str] = {}
+        self._known: dict[str, _State] = {}
+
+    def forget(self) -> None:
+        """Forget what a request may have changed of which nobody knows what it did."""
+        self._there.clear()
+        self._known.clear()
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        operation, method, status = occasion.operation, occasion.request.method, occasion.response.status
+        path = unquote(occasion.context.target.partition("?")[0]).rstrip("/")
+        if method in SAFE:
+            if method == "GET" and operation is not None and occasion.context.plain:
+                yield from self._read(occasion, operation, path)
+        elif status in _REFUSED and status not in _UNCLEAR:
+            said = f"{method} {path} with status {status}"
+            if (above := path.rpartition("/")[0]) in self._known:
+                self._known[above].refused = said
+            if method == "DELETE" and path in self._there:
+                self._there[path] = said
+        else:
+            self._there.clear()
+            yield from self._act(occasion, operation, path)
+
+    def _act(self, occasion: Occasion, operation: Operation | None, path: str) -> Iterator[Case]:
+        """Take a request that was accepted, or may have been."""
+        template = operation.template.rstrip("/") if operation is not None else ""
+        above, item = path.rpartition("/")[0], template.rpartition("/")[0]
+        if operation is not None and occasion.response.ok and item in self._states:
+            yield from self._told(occasion, operation, above, self._states[item])
+        elif operation is not None and occasion.response.ok and template in self._states:
+            self._known.pop(path, None)
+        elif operation is None or f"{template}/" not in {f"{collection_of(one)}/" for one in self._states}:
+            self._known.clear()
+
+    def _told(self, occasion: Occasion, operation: Operation, path: str, name: str) -> Iterator[Case]:
+        """Judge the response to an operation of a thing: what is final is not ended once more."""
+        before = self._known.pop(path, None)
+        now = _state_in(occasion, name) if state_of(operation) == name else ""
+        was = before.value if before is not None and not before.told else ""
+        is_kept = was in FINAL and "409" in operation.responses and words_of(operation.template) & ENDING
+        if is_kept and now:
+            expected = f"a refusal, as the thing was {was}, or the same state"
+            yield self._case(occasion, now == was, expected, f"{now} as {name}", operation.label)
+        if now:
+            is_news = now != was
+            at_s = occasion.response.received_s
+            self._known[path] = _State(now, at_s, was if is_news else "", operation.label if is_news else "")
+        elif is_kept and before is not None:
+            self._known[path] = _State(was, before.at_s, by=operation.label)
+
+    def _read(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
+        """Judge a read of a resource."""
+        status = occasion.response.status
+        refused = self._there.pop(path, "")
+        if status in _ABSENT and refused:
+            expected, cause = f"what was there before {refused}", operation.label
+            yield occasion.case("description/refused-keeps", False, expected, cause=cause)  # noqa: FBT003 - see case()
+        if not occasion.response.ok:
+            return
+        if refused:
+            expected = f"what was there before {refused}"
+            yield occasion.case("description/refused-keeps", True, expected, cause=operation.label)  # noqa: FBT003 - see case()
+        if len(self._there) < _MOST_THINGS:
+            self._there[path] = ""
+        template = operation.template.rstrip("/")
+        if template in self._states and (state := _state_in(occasion, self._states[template])):
+            yield from self._state(occasion, operation, path, state)
+
+    def _state(self, occasion: Occasion, operation: Operation, path: str, now: str) -> Iterator[Case]:
+        """Judge the state of a thing by what was read or told of it before."""
+        name = self._states[operation.template.rstrip("/")]
+        sent_s = occasion.response.received_s - occasion.response.elapsed_ms / 1000
+        before = self._known.get(path)
+        if before is None or sent_s < before.at_s:
+            if before is None and len(self._known) < _MOST_THINGS:
+                self._known[path] = _State(now, occasion.response.received_s)
+            return
+        is_late = sent_s - before.at_s > _SETTLES_S
+        # What was told, and is not yet so.
+        if before.told and now != before.value and now not in FINAL and not is_late:
+            return
+        wrong, expected = "", f"{before.value} as {name}, as it was read before"
+        if before.told and now != before.value:
+            expected = f"{before.value} as {name}, which the response to {before.told} said"
+            lost = before.value in FINAL and now not in _AWAY
+            wrong = now if lost or (now == before.was and is_late) else ""
+        elif before.value in FINAL and now != before.value and now not in _AWAY:
+            reason = before.refused or before.by
+            expected += f" and as {reason} must leave it" if reason else ""
+            # What is done may begin anew by itself, as what a timetable says.
+            wrong = now if reason or before.value in _CANCELLED or now in FINAL else ""
+        yield self._case(occasion, not wrong, expected, f"{now} as {name}", operation.label)
+        self._known[path] = _State(now, occasion.response.received_s)
+
+    @staticmethod
+    def _case(occasion: Occasion, holds: bool, expected: str, found: str, cause: str) -> Case:  # noqa: FBT001 - as case()
+        return occasion.case("description/written-is-read", holds, expected, found, cause=f"{cause} state")
+
+
+def state_of(read: Operation) -> str:
+    """Return the member of a thing that has one of several states, some of them final; empty if it has none."""
+    outer = flat(read.shape or {}).get("properties", {})
+    inner = [flat(one).get("properties", {}) for one in outer.values() if isinstance(one, dict)]
+    parts = ((name, flat(one)) for part in (outer, *inner) for name, one in part.items() if isinstance(one, dict))
+    named = (
+        str(name) for name, one in parts if plain_name(name) in _STATES and FINAL & set(map(str, one.get("enum", ())))
+    )
+    return next(named, "")
+
+
+def _state_in(occasion: Occasion, name: str) -> str:
+    body = occasion.response.body
+    value = read_json(body).value if is_json(occasion.response.media_type) and len(body) <= _MOST_OCTETS else None
+    found = represented(value, {plain_name(name)}).get(name)
+    return found if isinstance(found, str) else ""

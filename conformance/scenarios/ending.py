@@ -1,0 +1,241 @@
+"""Things that go on and end, such as jobs: begin, cancel and leave some; and things in use, which are deleted.
+
+`checkers.changes` judges the states of things by all reads of a run.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from conformance.api.call_rules import words_of
+from conformance.api.rest.applicable import allowed
+from conformance.api.rest.inputs import usual_inputs, whole_body
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.listing import listed
+from conformance.api.rest.references import singular, thing_of
+from conformance.api.rest.samples import fits
+from conformance.api.rest.things import collection_of, identified, represented
+from conformance.api.rest.values import Values
+from conformance.checkers.changes import ENDING, FINAL, state_of
+from conformance.documents.json_schema import kinds_of
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation, operations_of
+from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
+from conformance.scenarios.living import ABSENT
+from conformance.scenarios.own_things import located
+from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.scenarios.writing import Writer, members
+from conformance.transport.exchange import Exchange, NoAnswerError
+
+# So many operations of a thing begin something, and so many kinds of things are looked at.
+_BEGINNING, _KINDS = 2, 3
+# By these words a description says that 409 is for what is in use.
+_IN_USE: Final = re.compile(
+    r"\b(?:in use|while|empty|refer|contain|assign|attach|link|need|depend|belong|stand|used|uses|has|have)",
+    re.IGNORECASE,
+)
+
+_Operations = Mapping[tuple[str, str], Operation]
+
+
+@dataclass(frozen=True)
+class Ended:
+    """Things of one collection that have a state.
+
+    Attributes:
+        read: reads one of them.
+        state: the member with its state.
+        actions: operations of one of them, those that end it last.
+        paths: of those that were cancelled, and left to go on.
+    """
+
+    read: Operation
+    state: str
+    actions: tuple[Operation, ...]
+    paths: tuple[str, ...] = ()
+
+
+def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
+    """Create two things of each collection with states: begin one and end it twice, and begin the other one."""
+    operations = _callable(api)
+    found, writer = list[Ended](), Writer(api, values)
+    for (method, path), read in operations.items():
+        state = state_of(read) if method == "GET" and collection_of(path) else ""
+        actions = _actions(read, operations) if state and len(read.parameter("path")) == 1 else ()
+        if not actions or len(found) >= _KINDS:
+            continue
+        kind, paths = Ended(read, state, actions), list[str]()
+        create = operations.get(("POST", collection_of(path)))
+        begins = [one for one in actions if not _ends(one)][:_BEGINNING]
+        ends = [one for one in actions if _ends(one)][:1]
+        for steps in ([*begins, *ends, *begins, *ends], begins):
+            if create is None:
+                break
+            api.run.limit.check()
+            with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey tells what breaks a connection
+                made = writer.send(create)
+                if (path := located(api, read, made)) and made.response.ok:
+                    paths.append(path)
+                    _walk(writer, kind, path, steps)
+        found.append(replace(kind, paths=tuple(paths)))
+    return found
+
+
+def look_at_ended(api: RestInterface, values: Values, begun: list[Ended]) -> None:
+    """Read again what was begun and ended, and try to end one thing that is done."""
+    writer = Writer(api, values)
+    for kind in begun:
+        ends = [one for one in kind.actions if _ends(one)][:1]
+        with suppress(NoAnswerError):
+            done = ""
+            for path in kind.paths:
+                now = members(writer.send(kind.read, path), (kind.state,)).get(kind.state)
+                done = path if now in FINAL and path != kind.paths[0] else done
+            done = done or (_listed_as_done(writer, kind) if ends else "")
+            if done:
+                _walk(writer, kind, done, ends)
+
+
+def _walk(writer: Writer, kind: Ended, path: str, steps: list[Operation]) -> None:
+    """Call operations of a thing, and read it before them and after each, until it is in the state that was told."""
+    if not writer.send(kind.read, path).response.ok:
+        return
+    for step in steps:
+        sent = writer.send(step, path.rstrip("/") + step.template[len(kind.read.template.rstrip("/")) :])
+        told = members(sent, (kind.state,)).get(kind.state) if sent.response.ok else None
+
+        def is_so(found: Exchange, told: Any = told) -> bool:
+            now = members(found, (kind.state,)).get(kind.state)
+            return told is None or now == told or now in FINAL or not found.response.ok
+
+        writer.until(lambda: writer.send(kind.read, path), is_so)
+
+
+def _listed_as_done(writer: Writer, kind: Ended) -> str:
+    """Return the path of a listed thing that is done."""
+    lister = _callable(writer.api).get(("GET", collection_of(kind.read.template)))
+    items = listed(read_json(writer.send(lister).response.body).value) if lister is not None else None
+    for one in items or []:
+        id_ = identified(one, kind.read)[1]
+        if isinstance(one, dict) and id_ is not None and one.get(kind.state) in FINAL:
+            return f"{collection_of(kind.read.template)}/{id_}"
+    return ""
+
+
+def _callable(api: RestInterface) -> dict[tuple[str, str], Operation]:
+    return {
+        (item.method, item.template.rstrip("/")): item
+        for item in operations_of(api.run.contract)
+        if allowed(api, item) and item.label not in api.streams
+    }
+
+
+def _actions(read: Operation, operations: _Operations) -> tuple[Operation, ...]:
+    """Return the operations of a thing that act on it, those that end it last."""
+    item = read.template.rstrip("/")
+    found = [
+        one
+        for (method, path), one in operations.items()
+        if method == "POST" and path.rpartition("/")[0] == item and not path.endswith("}") and not one.motion
+    ]
+    return tuple(sorted(found, key=_ends))
+
+
+def _ends(action: Operation) -> bool:
+    return bool(words_of(action.template.rpartition("/")[2]) & ENDING)
+
+
+@dataclass(frozen=True)
+class Deletion:
+    """A DELETE of a thing that another one refers to.
+
+    Attributes:
+        operation: label of the DELETE.
+        deleted: the DELETE.
+        user: the read of the thing that refers to it, after the DELETE.
+        fault: what is wrong, as a noun phrase; empty: nothing.
+    """
+
+    operation: str
+    deleted: Exchange
+    user: Exchange
+    fault: str = ""
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LATE)
+def used_things(api: RestInterface, values: Values) -> tuple[Deletion, ...]:
+    """Create a thing and one that refers to it, and delete the first, where the description refuses that by 409."""
+    operations, found = _callable(api), list[Deletion]()
+    for (method, path), delete in operations.items():
+        if method == "DELETE" and "409" in delete.responses and _IN_USE.search(_said_of(api, delete)):
+            api.run.limit.check()
+            with api.run.limit.lifted(), suppress(NoAnswerError):
+                found += _used(Writer(api, values), operations, path, delete)
+    if not found:
+        raise NotPossibleError("the description says of no DELETE that it refuses by 409 what is in use")
+    return tuple(found)
+
+
+def _used(writer: Writer, operations: _Operations, path: str, delete: Operation) -> Iterator[Deletion]:
+    read, create = operations.get(("GET", path)), operations.get(("POST", collection_of(path)))
+    thing = singular(collection_of(path).rpartition("/")[2])
+    users = [
+        (one, operations["GET", item], name)
+        for (method, collection), one in operations.items()
+        for item in {key[1] for key in operations if key[0] == "GET" and collection_of(key[1]) == collection}
+        if method == "POST" and collection != collection_of(path)
+        for name in _references(one, thing)
+    ]
+    if read is None or create is None or not users:
+        return
+    made, (maker, reader, name) = writer.send(create), users[0]
+    place, id_ = located(writer.api, read, made), identified(read_json(made.response.body).value, read)[1]
+    body = _referring(writer, maker, name, place.rpartition("/")[2] if id_ is None else id_) if place else None
+    if body is None:
+        return
+    using = writer.send(maker, "", body)
+    at = located(writer.api, reader, using) if using.response.ok else ""
+    if at and members(writer.send(reader, at), (name,)).get(name) == body[name]:
+        deleted = writer.conditional(delete, read, place)
+        user, there = writer.send(reader, at), writer.send(read, place)
+        refers = user.response.ok and members(user, (name,)).get(name) == body[name]
+        is_lost = deleted.response.ok and refers and there.response.status in ABSENT
+        wrong = f"{name} of {at} leads to {place}, which does not exist any more" if is_lost else ""
+        yield Deletion(delete.label, deleted, user, wrong)
+        discard = operations.get(("DELETE", reader.template.rstrip("/")))
+        if discard is not None:
+            writer.conditional(discard, reader, at)
+    writer.conditional(delete, read, place)
+
+
+def _references(create: Operation, thing: str) -> list[str]:
+    """Return the members of a body that refer to a kind of thing."""
+    schema = next(iter(create.bodies.values())).schema if create.bodies else {}
+    return [
+        name for name in flat(schema).get("properties", {}) if plain_name(name) != thing and thing_of(name) == thing
+    ]
+
+
+def _referring(writer: Writer, create: Operation, name: str, id_: Any) -> dict[str, Any] | None:
+    """Return the usual body of a creation with a reference; None if the schema does not allow it."""
+    schema = next(iter(create.bodies.values())).schema
+    usual, whole = usual_inputs(create, writer.values)[0].body, whole_body(create, writer.values)[1]
+    base = usual if isinstance(usual, dict) else whole
+    is_list = "array" in kinds_of(flat(schema).get("properties", {}).get(name, {}))
+    body = {**base, name: [id_] if is_list else id_} if isinstance(base, dict) else None
+    body = writer.values.unique.renewed(create, body, schema) if body is not None else None
+    return {**body, name: [id_] if is_list else id_} if body is not None and fits(schema, body) else None
+
+
+def _said_of(api: RestInterface, operation: Operation) -> str:
+    """Return what the description says of an operation and its 409."""
+    given: Any = api.run.contract.openapi.get("paths", {}).get(operation.template, {}).get(operation.method.lower(), {})
+    refusal = given.get("responses", {}).get("409", {})
+    texts = (given.get("summary"), given.get("description"), represented(refusal, ()).get("description"))
+    return " ".join(text for text in texts if isinstance(text, str))
