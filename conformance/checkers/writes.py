@@ -116,6 +116,8 @@ class Writes:
         # What may be chance: by operation and member, the bodies that showed it.
         self._doubts: dict[tuple[str, str], set[bytes]] = defaultdict(set)
         self._precise: set[tuple[str, str]] = set()
+        # The last body that was accepted, by path: a device may apply it after a request that it refuses.
+        self._accepted: dict[str, Any] = {}
 
     def forget(self) -> None:
         """Forget all reads: something else may have changed the resources."""
@@ -138,6 +140,8 @@ class Writes:
             return
         state = self._states.get(path) if item is not None else None
         writes = self._writes.get(path, [])
+        if item is not None and len(request.body) <= _MOST_OCTETS and len(self._accepted) < _MOST:
+            self._accepted[path] = read_json(request.body).value
         self.forget()
         if state is not None and occasion.response.ok and request.method in {"PUT", "PATCH"} and request.raw is None:
             self._states[path], self._writes[path] = state, [*writes, occasion]
@@ -195,7 +199,7 @@ class Writes:
 
     def _refused(self, occasion: Occasion, change: _Change) -> Iterator[Case]:
         """Judge whether a refused request has changed nothing, not even in part."""
-        sent = change.sent
+        sent, accepted = change.sent, self._accepted.get(change.write.context.target)
         if JSON_PATCH in change.write.request.media_type:
             made = [one for one in partly_patched(change.before, sent) if isinstance(one, dict)]
         else:
@@ -203,7 +207,9 @@ class Writes:
         wrong = ""
         for name in sorted({name for one in made for name in one} - change.moving):
             was, now = change.before.get(name), change.now.get(name)
-            if not same(was, now) and any(name in one and same(one[name], now) for one in made):
+            is_late = isinstance(accepted, dict) and name in accepted and same(accepted[name], now)
+            is_taken = not same(was, now) and any(name in one and same(one[name], now) for one in made)
+            if is_taken and not is_late:
                 wrong = f"{shown(now)} as {name}, and {shown(was)} before"
                 break
         expected = f"the members as they were before {change.label}"

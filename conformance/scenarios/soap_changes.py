@@ -6,9 +6,9 @@ What comes of it is judged by the checkers of every exchange (checkers/soap_memo
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import islice
 from typing import Final
 
@@ -16,7 +16,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.messages import declarations, simple_leaves, with_text
 from conformance.api.soap.mutations import invalid_ones, mutations
 from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, acts_of, texts_of
-from conformance.api.soap.xml_style import serialize, single_changes
+from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes
 from conformance.documents.openapi import operations_of
 from conformance.documents.xml_node import Node
 from conformance.documents.xsd_lexical import FLOATS, INTEGERS, STRINGS, bounds, is_alike
@@ -26,7 +26,7 @@ from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.soap_survey import Caller, Kind, NotSoapError, SoapProbe, usual_message
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Outgoing
-from conformance.transport.parallel import MOST_CLIENTS, send_together
+from conformance.transport.parallel import MOST_CLIENTS, Addressed, send_together
 from conformance.transport.reach import is_same
 
 # A value is awaited in steps of so long, s, and has to last a little longer than any that is judged.
@@ -227,19 +227,16 @@ class _Changes:
         for act, _, node in readers:
             for _ in range(_READS[not self._is_quick]):
                 self.send(act, node, "a valid message", Kind.AGAIN)
-        client, messages = self.caller.api.client, self.caller.messages
-        asked = [
-            Outgoing(
-                "POST",
-                target_of(act.port),
-                fields_of(act.port, act.operation),
-                messages.message(act.port, act.operation, node),
-            )
-            for act, _, node in readers
-        ]
-        if len(asked) > 1:
-            together = [(client, asked[number % len(asked)]) for number in range(MOST_CLIENTS)]
-            send_together([together] * _ROUNDS[not self._is_quick])
+        if len(readers) > 1:
+            clients = [readers[number % len(readers)] for number in range(MOST_CLIENTS)]
+            rounds = range(_ROUNDS[not self._is_quick])
+            send_together([[self._addressed(act, node) for act, _, node in clients] for _ in rounds])
+
+    def _addressed(self, act: Act, node: Node | None) -> Addressed:
+        """Return a message as one of several clients sends it."""
+        octets = self.caller.messages.message(act.port, act.operation, node)
+        sent = Outgoing("POST", target_of(act.port), fields_of(act.port, act.operation), octets)
+        return self.caller.api.client, sent
 
     def vary(self) -> None:
         """Send what the schema allows beside the usual: values of enumerations, other forms of booleans and of XML."""
@@ -247,21 +244,23 @@ class _Changes:
             if act.role in {Role.CREATES, Role.REMOVES}:
                 continue
             for says, made in _alternatives(declared, node) if declared and node else ():
-                octets = self.caller.messages.message(act.port, act.operation, made)
-                self._vary(act, node, says, octets)
+                self._vary(act, node, says, partial(self.caller.messages.message, act.port, act.operation, made))
             if act.role is Role.WRITES:
                 self.send(act, node, "the values that were there before")
         for act, _, node in [one for one in self.acts if one[0].role is Role.READS][: 1 if self._is_quick else 9]:
-            whole = self.caller.messages.whole(act.port, act.operation, node)
             # A reader that takes no comments is left alone: there are many, and no client that writes messages has any.
             for says, style in [one for one in single_changes() if "comment" not in one[0]]:
-                self._vary(act, node, f"a message with {says}", serialize(whole, style).encode())
+                self._vary(act, node, f"a message with {says}", partial(self._styled, act, node, style))
 
-    def _vary(self, act: Act, node: Node | None, says: str, octets: bytes) -> None:
-        """Send a message, and again where it is refused and the usual one is not."""
-        probe = self.caller.send(act.port, act.operation, Kind.TRIED, says, octets)
+    def _styled(self, act: Act, node: Node | None, style: XmlStyle) -> bytes:
+        """Return a message in a style."""
+        return serialize(self.caller.messages.whole(act.port, act.operation, node), style).encode()
+
+    def _vary(self, act: Act, node: Node | None, says: str, write: Callable[[], bytes]) -> None:
+        """Send a message, and again where it is refused and the usual one is not; each with a nonce of its own."""
+        probe = self.caller.send(act.port, act.operation, Kind.TRIED, says, write())
         if not probe.succeeded and self.send(act, node, "a valid message").succeeded:
-            probe = self.caller.send(act.port, act.operation, Kind.TRIED, says, octets)
+            probe = self.caller.send(act.port, act.operation, Kind.TRIED, says, write())
         if probe.exchange is not None:
             self.caller.probes.append(replace(probe, kind=Kind.VARIED))
 

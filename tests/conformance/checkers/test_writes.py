@@ -179,6 +179,13 @@ RIGHT = {
     "defaults applied": [_get(), _put(gain=2.5), _get(gain=2.5, count=5, mode="on", loud=False)],
     "a PUT that acts later": [_get(), _put(gain=2.5, told={"count": 5, "mode": "on", "loud": False}), _get()],
     "a PUT that is accepted": [_get(), _put(status=202, gain=2.5), _get(gain=2.5)],
+    "a PUT that takes effect after a refused one": [
+        _get(),
+        _put(status=202, **{**_WHOLE, "mode": "on"}),
+        _get(),
+        _put(status=409, **{**_WHOLE, "mode": "on"}),
+        _get(mode="on"),
+    ],
     "a patch keeps what has a default": [_get(), _patch("/plain", {"gain": 2.5}), _get(gain=2.5)],
     "null removes": [_get("/merge"), _patch("/merge", {"note": None}), _get("/merge", note=None)],
     "null sets the default": [_get("/merge"), _patch("/merge", {"mode": None}, mode="on"), _get("/merge", mode="on")],
