@@ -14,7 +14,7 @@ from typing import Any
 
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed, resolved
 from conformance.documents.json_shape import shape_of
-from conformance.documents.openapi import Operation, methods_of, read_operations
+from conformance.documents.openapi import Operation, methods_of, read_operations, without_marked
 from conformance.documents.resources import PARAMETER
 from conformance.documents.schema_places import DATA
 from conformance.documents.schema_words import foreign_words, without_foreign_words
@@ -194,9 +194,12 @@ def unfitting_examples(document: Schema) -> list[str]:
     """Return the examples and defaults that are invalid by the schema beside them, with their places."""
     found: dict[str, None] = {}
     for path, method, operation, shared in _operations(document):
-        for place, schema, value in _examples(operation, shared):
+        for place, schema, marks, value in _examples(operation, shared):
             try:
-                problem = shape_of(modern(schema)).problem(value)
+                given = modern(schema)
+                for mark in marks:
+                    given = without_marked(given, mark)
+                problem = shape_of(given).problem(value)
             except (ValueError, TypeError, RecursionError):
                 continue
             if problem:
@@ -204,13 +207,13 @@ def unfitting_examples(document: Schema) -> list[str]:
     return list(found)
 
 
-def _examples(operation: Schema, shared: list[Any]) -> Iterator[tuple[str, Schema, Any]]:
-    """Yield the examples and defaults of an operation with their places and schemas."""
-    own = operation.get("parameters", [])
-    for one in [*shared, *(own if isinstance(own, list) else [])]:
+def _examples(operation: Schema, shared: list[Any]) -> Iterator[tuple[str, Schema, tuple[str, ...], Any]]:
+    """Yield the examples and defaults of an operation: place, schema, marks of what may be left out, and value."""
+    declared = operation.get("parameters", [])
+    for one in [*shared, *(declared if isinstance(declared, list) else [])]:
         if isinstance(one, dict) and isinstance(one.get("schema"), dict):
             place = f"the example of {one.get('in')} {one.get('name')}"
-            yield from ((place, one["schema"], value) for value in _named(one))
+            yield from ((place, one["schema"], (), value) for value in _named(one))
             yield from _of_schema(f"{one.get('in')} {one.get('name')}", one["schema"])
     body = operation.get("requestBody", {})
     responses = operation.get("responses", {})
@@ -223,7 +226,9 @@ def _examples(operation: Schema, shared: list[Any]) -> Iterator[tuple[str, Schem
         content = one.get("content", {})
         for name, media in content.items() if isinstance(content, dict) else ():
             if isinstance(media, dict) and isinstance(media.get("schema"), dict) and "json" in name:
-                yield from ((f"the example of {place}", media["schema"], value) for value in _named(media))
+                # A request lacks what is the device's, and a response what is only for requests.
+                marks = ("readOnly" if one is body else "writeOnly",)
+                yield from ((f"the example of {place}", media["schema"], marks, value) for value in _named(media))
                 yield from _of_schema(place, media["schema"])
 
 
@@ -237,15 +242,18 @@ def _named(given: Schema) -> list[Any]:
     return [*([given["example"]] if "example" in given else []), *named]
 
 
-def _of_schema(place: str, schema: Schema, depth: int = 0) -> Iterator[tuple[str, Schema, Any]]:
+def _of_schema(place: str, schema: Schema, depth: int = 0) -> Iterator[tuple[str, Schema, tuple[str, ...], Any]]:
     """Yield the defaults and examples inside a schema."""
     plain = {key: value for key, value in schema.items() if key not in {"default", "example", "examples"}}
+    # One schema may be that of a request and of a response.
+    marks = ("readOnly", "writeOnly")
     if schema.get("default") is not None:
-        yield f"the default of {place}", plain, schema["default"]
+        yield f"the default of {place}", plain, marks, schema["default"]
     if schema.get("example") is not None:
-        yield f"the example of {place}", plain, schema["example"]
+        yield f"the example of {place}", plain, marks, schema["example"]
     examples = schema.get("examples")
-    yield from ((f"an example of {place}", plain, value) for value in (examples if isinstance(examples, list) else ()))
+    named = examples if isinstance(examples, list) else ()
+    yield from ((f"an example of {place}", plain, marks, value) for value in named)
     properties = schema.get("properties")
     for name, part in properties.items() if isinstance(properties, dict) and depth < 4 else ():  # noqa: PLR2004 - levels
         if isinstance(part, dict):

@@ -208,7 +208,7 @@ def _operation(
         bodies={
             name: Body(
                 name,
-                _without(modern(content.get("schema", {})), "readOnly"),
+                without_marked(modern(content.get("schema", {})), "readOnly"),
                 examples_of(content),
                 read_encoding(content),
             )
@@ -236,17 +236,17 @@ def _operation(
 
 def _answer(schema: Any, *, closed: bool) -> Schema:
     """Return the schema of a response body: as it is if ``closed``, but without members that only requests have."""
-    answer: Schema = _without(modern(schema), "writeOnly") if closed else opened(modern(schema))
+    answer: Schema = without_marked(modern(schema), "writeOnly") if closed else opened(modern(schema))
     return answer
 
 
-def _without(schema: Any, mark: str) -> Any:
+def without_marked(schema: Any, mark: str) -> Any:
     """Return a schema in which no member with this mark is required (readOnly, writeOnly; OpenAPI 3.0, 4.7.24.2)."""
     if isinstance(schema, list):
-        return [_without(item, mark) for item in schema]
+        return [without_marked(item, mark) for item in schema]
     if not isinstance(schema, dict):
         return schema
-    result = changed_alike({key: _without(item, mark) for key, item in schema.items()}, mark)
+    result = changed_alike({key: without_marked(item, mark) for key, item in schema.items()}, mark)
     properties, required = result.get("properties"), result.get("required")
     if isinstance(properties, dict) and isinstance(required, list):
         marked = _marked(properties, mark)
@@ -257,7 +257,7 @@ def _without(schema: Any, mark: str) -> Any:
     return result
 
 
-CHANGES.update(readOnly=partial(_without, mark="readOnly"), writeOnly=partial(_without, mark="writeOnly"))
+CHANGES.update(readOnly=partial(without_marked, mark="readOnly"), writeOnly=partial(without_marked, mark="writeOnly"))
 
 
 def _marked(properties: dict[str, Any], mark: str) -> set[str]:

@@ -70,6 +70,22 @@ def _responding(schema, **media):
     return {"/a": {"get": {"responses": {"200": {"description": "", "content": content}}}}}
 
 
+_THING = {
+    "type": "object",
+    "required": ["id", "name"],
+    "properties": {
+        "id": {"type": "integer", "readOnly": True},
+        "name": {"type": "string"},
+        "secret": {"type": "string", "writeOnly": True},
+    },
+}
+
+
+def _asking(schema, **media):
+    body = {"content": {"application/json": {"schema": schema, **media}}}
+    return {"/a": {"post": {"requestBody": body, "responses": {"200": {"description": ""}}}}}
+
+
 @pytest.mark.parametrize(
     ("paths", "count"),
     [
@@ -81,6 +97,13 @@ def _responding(schema, **media):
         (_responding({"type": "string", "nullable": True}, example=None), 0),
         (_responding({"$ref": "#/components/schemas/A"}, example="b"), 1),
         (_responding({"type": "integer", "default": None}), 0),
+        (_asking(_THING, example={"name": "a"}), 0),
+        (_asking(_THING, example={"id": 1}), 1),
+        (_responding(_THING, example={"id": 1, "name": "a"}), 0),
+        (_responding(_THING, example={"name": "a"}), 1),
+        (_responding({**_THING, "example": {"name": "a"}}), 0),
+        (_asking({**_THING, "required": ["secret"]}, example={"name": "a"}), 1),
+        (_responding({**_THING, "required": ["secret"]}, example={"name": "a"}), 0),
     ],
 )
 def test_examples_and_defaults_fit_their_schemas(paths, count):
