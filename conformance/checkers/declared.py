@@ -1,8 +1,10 @@
 """Whether the description declares a response for its operation: status, media type, schema, Vary."""
 
+from collections import defaultdict
 from collections.abc import Iterator
 from functools import lru_cache
 from http import HTTPStatus
+from typing import Any
 
 from conformance.api.rest.formats import are_data, quality
 from conformance.api.rest.statuses import CRASHES, is_cut_off
@@ -10,9 +12,10 @@ from conformance.api.rest.validity import INVALID, VALID
 from conformance.checkers.occasion import METHODS, Occasion
 from conformance.documents.json_schema import Schema
 from conformance.documents.json_shape import Shape, shape_of
+from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.documents.patterns import PatternError
-from conformance.documents.representation import UnreadableError, read
+from conformance.documents.representation import UnreadableError, flat, read
 from conformance.documents.resources import resource_at
 from conformance.verdict.case import Case
 from conformance.verdict.finding import Showing, likeness
@@ -23,6 +26,8 @@ _ANY_REQUEST = frozenset({401, 429})
 _ODD_REQUEST = frozenset({400, 408, 411, 413, 414, 415, 417, 431})
 # Larger bodies are not kept to be known again, octets.
 _LARGE = 1 << 14
+# So many responses of an operation are searched for what is writeOnly, so many items of a list, and so deep.
+_JUDGED, _ITEMS, _DEEPEST = 40, 20, 5
 _OK, _NO_CONTENT, _ERROR, _NOT_FOUND, _NO_METHOD, _NOT_ACCEPTABLE, _SERVER_ERROR = 200, 204, 400, 404, 405, 406, 500
 
 
@@ -148,6 +153,51 @@ def _fault(shape: Shape, media_type: str, body: bytes) -> str:
     except UnreadableError as error:
         return str(error)
     return f"a body in which {problem}" if problem else ""
+
+
+class WriteOnly:
+    """Judges whether a response shows what the description marks as written only (OpenAPI 3.0, 4.7.24.2)."""
+
+    def __init__(self) -> None:
+        self._seen: dict[str, int] = defaultdict(int)
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange; the first ones of each operation are judged."""
+        operation, answer = occasion.operation, occasion.response
+        content = operation.declared(answer.status) if operation and answer.ok and answer.body else None
+        if operation is None or not content or not is_json(answer.media_type) or answer.media_type not in content:
+            return
+        self._seen[operation.id] += 1
+        if self._seen[operation.id] > _JUDGED or len(answer.body) > _LARGE:
+            return
+        name = _shown_of(content[answer.media_type], read_json(answer.body).value)
+        if name is not None:
+            expected, cause = "a response without what is writeOnly", f"{operation.id} {name}"
+            found = f"{name} in the response"
+            yield occasion.case("description/written-is-read", not name, expected, found, cause=cause)
+
+
+def _shown_of(schema: Schema, value: Any, depth: int = 0) -> str | None:
+    """Return the name of a member that is shown and writeOnly; empty if there are such that are not; else None."""
+    given = flat(schema)
+    if isinstance(value, list):
+        inner = given.get("items")
+        found = [_shown_of(inner, one, depth + 1) for one in value[:_ITEMS]] if isinstance(inner, dict) else []
+    elif isinstance(value, dict) and depth < _DEEPEST:
+        found = []
+        for name, part in given.get("properties", {}).items():
+            if not isinstance(part, dict):
+                continue
+            if flat(part).get("writeOnly"):
+                # A mask such as **** shows nothing.
+                is_shown = value.get(name) is not None and bool(str(value[name]).strip("*x\u2022"))
+                found.append(name if is_shown else "")
+            elif name in value:
+                found.append(_shown_of(part, value[name], depth + 1))
+    else:
+        return None
+    told = [one for one in found if one is not None]
+    return max(told) if told else None
 
 
 def negotiation(occasion: Occasion) -> Iterator[Case]:

@@ -42,7 +42,7 @@ class RestCheckers:
         self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
         self._over_time = (
             conditional.Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
-            self._writes, Uniques(), self._changes,
+            self._writes, Uniques(), self._changes, declared.WriteOnly(),
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:
