@@ -24,6 +24,8 @@ from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
 
 # What may be said of the thing before the credentials are looked at.
 _UNDECIDED: Final = frozenset({404, 409, 410})
+# So many reads at quick on a connection that has carried credentials.
+_KEPT: Final = 3
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)
@@ -59,7 +61,18 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
                     found += [exchange] if exchange else []
                     if exchange and not authorized and exchange.response.status in _UNDECIDED:
                         found += _on_new_thing(api, values, operation, request)
-    return (*found, *_beyond_ascii(api, values, closed))
+    return (*found, *_on_kept_connection(api, values, closed), *_beyond_ascii(api, values, closed))
+
+
+def _on_kept_connection(api: RestInterface, values: Values, closed: list[Operation]) -> Iterator[Exchange]:
+    """Send reads without credentials on a connection that has just carried them: they count for one request alone."""
+    reads = [one for one in closed if one.safe and one.label not in api.streams]
+    for operation in api.run.effort.subsample(reads, _KEPT):
+        request = written(operation, usual_inputs(operation, values)[0])
+        with suppress(NoAnswerError):
+            known = api.client.send(request.method, request.target, headers=request.headers)
+            if known.response.ok:
+                yield api.client.send(request.method, request.target, headers=request.headers, authorized=False)
 
 
 def _on_new_thing(api: RestInterface, values: Values, operation: Operation, request: Outgoing) -> Iterator[Exchange]:

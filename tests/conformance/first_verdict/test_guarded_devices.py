@@ -102,6 +102,27 @@ def test_an_operation_that_takes_no_credentials_of_swagger_2_is_found_and_others
     assert {failure["request"]["url"].rpartition("/")[2] for failure in told} == {"open"}
 
 
+def test_credentials_that_count_for_a_whole_connection_are_found(secret, tmp_path):
+    """Connections that have carried the token need none any more; a new one does."""
+    description, routes = guarded([{"bearer": []}])
+    known = set()
+
+    def kept(handle):
+        async def answered(request):
+            if request.headers.get("Authorization") == f"Bearer {SECRET}":
+                known.add(id(request.transport))
+            elif id(request.transport) in known:
+                request = request.clone(headers={**request.headers, "Authorization": f"Bearer {SECRET}"})
+            return await handle(request)
+
+        return answered
+
+    routes = {path: {method: kept(one) for method, one in methods.items()} for path, methods in routes.items()}
+    with small_device(description, routes) as url:
+        done = certified(url, tmp_path / "out", "--token-file", secret(SECRET))
+    assert (done.blamed, done.exit_code) == ({"description/security": "fail"}, 1), done.text
+
+
 @pytest.mark.parametrize(
     ("given", "refusal", "lasts", "said"),
     [
