@@ -40,6 +40,7 @@ _STYLES = {
     "shuffled": {"in": "results", "around": lambda _, of: {"count": of}},
     "sliding": {"limit": "limit", "offset": "offset", "in": "items", "around": lambda _, of: {"total": of}},
     "late": {"limit": "limit", "offset": "skip", "in": "items", "around": lambda _, of: {"total": of}},
+    "newest": {"limit": "limit", "in": "items", "around": lambda *_: {}},
     "last": {"limit": "limit", "page": "page", "first": 1, "in": "items", "around": lambda _, of: {"total": of}},
 }  # fmt: skip
 _FAULTS = [
@@ -119,8 +120,9 @@ class _Collection:
         is_right = query.get("state", "open") in _STATES and query.get("sort", "label") in _SORTED
         if not is_right or not query.keys() <= known or None in {limit, page, *where} or page < first:
             return self._refusal()
-        size = min(limit or 50, self.style.get("most", 50))
+        size = min(limit or (5 if self.manner == "newest" else 50), self.style.get("most", 50))
         found = self._chosen(query)
+        found = found[-size:] if self.manner == "newest" else found
         begin = self._begin(sum(where) + (page - first) * size, len(found))
         end = begin + size + (self.fault == "limit off by one" and limit > 0)
         total = self._counted(len(found)) if "state" not in query else len(found)
