@@ -28,7 +28,7 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.scenarios.living import ABSENT
 from conformance.scenarios.own_things import located
-from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.writing import Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError
@@ -178,7 +178,7 @@ def used_things(api: RestInterface, values: Values) -> tuple[Deletion, ...]:
             with api.run.limit.lifted(), suppress(NoAnswerError):
                 found += _used(Writer(api, values), operations, path, delete)
     if not found:
-        raise NotPossibleError("the description says of no DELETE that it refuses by 409 what is in use")
+        raise NoOccasionError("the description says of no DELETE that it refuses by 409 what is in use")
     return tuple(found)
 
 

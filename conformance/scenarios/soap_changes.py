@@ -22,7 +22,7 @@ from conformance.documents.xml_node import Node
 from conformance.documents.xsd_lexical import FLOATS, INTEGERS, STRINGS, bounds, is_alike
 from conformance.documents.xsd_shapes import Element, Simple
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
-from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
 from conformance.scenarios.soap_survey import Caller, Kind, NotSoapError, SoapProbe, usual_message
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Outgoing
@@ -276,7 +276,7 @@ def soap_changes(api: RestInterface) -> tuple[SoapProbe, ...]:
     changes = _Changes(Caller(api, messages))
     changes.find(acts, {label for label, reason in decided.items() if reason.may})
     if not changes.acts:
-        raise NotPossibleError("no operation accepted a message")
+        raise NoOccasionError("no operation that reads, writes, creates or removes by its name accepted a message")
     changes.vary()
     steps = {act.label: changes.write(act, declared, node) for act, declared, node in changes.by_role(Role.WRITES)}
     steps |= {act.label: changes.create(act, declared, node) for act, declared, node in changes.by_role(Role.CREATES)}

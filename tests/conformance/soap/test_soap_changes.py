@@ -4,7 +4,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from feeder import feeder
 from small_device import certified
-from soap_devices import serving
+from soap_devices import camera, serving
 
 _STYLES = ("", "limits", "slow", "expires", "drifts")
 # Faults that one device has beside each other, each with the requirement and what its finding has to name.
@@ -73,3 +73,15 @@ def test_faults_are_found_by_the_requirement_that_they_break(tmp_path):
         if said not in "".join(one["message"] for one in outcome.requirement(f"soap/{name}")["failures"])
     ]
     assert missed == []
+
+
+def test_operations_whose_names_say_nothing_are_judged_as_before(tmp_path):
+    device = camera()
+    device.wsdl, device.xsd = (text.replace("GetStatus", "Report") for text in (device.wsdl, device.xsd))
+    device.answers = {"Report": device.answers["GetStatus"].replace("GetStatus", "Report")}
+    with serving(device) as url:
+        outcome = certified(f"{url}/camera.wsdl", tmp_path, "--call", "Report")
+    assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
+    verdicts = {one["id"]: one["verdict"] for one in outcome.result["requirements"]}
+    assert {verdicts[f"soap/{name}"] for name in ("answered", "message", "response-valid", "recovers")} == {"pass"}
+    assert verdicts["soap/written-is-read"] not in {"pass", "fail", "warn"}
