@@ -24,7 +24,7 @@ from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
 
 # What may be said of the thing before the credentials are looked at.
 _UNDECIDED: Final = frozenset({404, 409, 410})
-# So many reads at quick on a connection that has carried credentials.
+# So many operations of a slow device are sent without credentials on a connection that has carried some.
 _KEPT: Final = 3
 
 
@@ -65,14 +65,17 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
 
 
 def _on_kept_connection(api: RestInterface, values: Values, closed: list[Operation]) -> Iterator[Exchange]:
-    """Send reads without credentials on a connection that has just carried them: they count for one request alone."""
-    reads = [one for one in closed if one.safe and one.label not in api.streams]
-    for operation in api.run.effort.subsample(reads, _KEPT):
+    """Send requests without credentials on a connection that has just carried them: they count for one request."""
+    read = next((one for one in api.working.values() if one.operation.safe), None)
+    for operation in api.run.effort.subsample(closed, _KEPT) if read is not None else ():
+        if operation.label in api.streams or read is None:
+            continue
         request = written(operation, usual_inputs(operation, values)[0])
         with suppress(NoAnswerError):
-            known = api.client.send(request.method, request.target, headers=request.headers)
-            if known.response.ok:
-                yield api.client.send(request.method, request.target, headers=request.headers, authorized=False)
+            read.send(api)
+            yield api.client.send(
+                request.method, request.target, headers=request.headers, body=request.body, authorized=False
+            )
 
 
 def _on_new_thing(api: RestInterface, values: Values, operation: Operation, request: Outgoing) -> Iterator[Exchange]:
