@@ -4,6 +4,7 @@ The rooms are the packages conformance, loadtests, reference_robot, reports and 
 its command is used, so that ``roaas certify`` needs neither ROS nor Locust.
 """
 
+import difflib
 import gc
 import os
 import sys
@@ -27,7 +28,7 @@ import click
 # here so that it need not import every package.
 _COMMANDS = {
     "robot": ("reference_robot.cli", "Run the reference robot."),
-    "certify": ("conformance.cli.certify", "Judge a robot by its contract."),
+    "certify": ("conformance.cli.certify", "Judge a device by its own description, or by its contract."),
     "load": ("loadtests.cli", "Measure how fast a robot responds."),
     "replay": ("conformance.cli.replay", "Send a finding's requests again, and report whether it persists."),
     "judge": ("conformance.cli.judge", "Judge a stored run again, without the robot."),
@@ -48,6 +49,17 @@ _COMMANDS = {
 _MEASURING = {"robot", "load"}  # commands whose time for single requests counts
 _EXTRAS = {"load"}  # commands that need the optional dependencies of the same name
 _USAGE, _INCONCLUSIVE, _INTERRUPTED = 2, 4, 130
+_START = """\
+Judge a device by its own OpenAPI description or WSDL; nothing moves:
+  roaas certify http://robot:8000/openapi.json
+
+Measure how fast it answers:
+  roaas load http://robot:8000/openapi.json --operation 'GET /state'
+
+Understand a finding, and how to fix it:
+  roaas explain http/date
+
+All commands: roaas --help"""
 _INSTALLED = Path(__file__).with_name("roaas_rooms")
 
 
@@ -69,6 +81,28 @@ class _Rooms(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         return list(_COMMANDS)
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments; without any, print what to try and exit."""
+        if not args:
+            click.echo(_START, err=True)
+            ctx.exit(_USAGE)
+        return super().parse_args(ctx, args)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that the arguments name.
+
+        Raises:
+            click.UsageError: there is none; it names the nearest.
+        """
+        word = args[0]
+        if word in _COMMANDS or word.startswith("-") or self.get_command(ctx, word):
+            return super().resolve_command(ctx, args)
+        near = difflib.get_close_matches(word, _COMMANDS, 1)
+        meant = f"certify {word}" if "://" in word or "." in word else next(iter(near), "")
+        raise click.UsageError(f"No such command {word!r}." + (f" Did you mean: roaas {meant}" if meant else ""), ctx)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click's
         with formatter.section("Commands"):
@@ -229,12 +263,14 @@ class FrontDoor:
         return known
 
 
-# All commands inherit how help is asked for, that it shows the defaults, and whether there are colours (no-color.org).
+# All commands inherit how help is asked for, that it shows the defaults and is as wide as the terminal, and whether
+# there are colours (no-color.org).
 _SETTINGS = {
     "help_option_names": ["-h", "--help"],
     "show_default": True,
     "obj": FrontDoor(),
-    "color": False if os.environ.get("NO_COLOR") else None,
+    "max_content_width": 200,
+    "color": False if os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb" else None,
 }
 
 

@@ -19,6 +19,7 @@ import click
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.endings import as_parent, end_like_ctrl_c, end_with_parent, ending_signals, undisturbed
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.help_pages import Group, options_of
 from conformance.commandline.out_folder import FolderError, command_without_folders, held
 from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.commandline.terminal import inert
@@ -50,6 +51,15 @@ DEFAULT_OUT = "out"  # as `roaas certify` does
 #: Threads of NumPy's linear algebra wait for one another by spinning, ten times as long on a busy machine.
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 _FILE = click.Path(path_type=Path)
+_START = """\
+Measure how fast an operation of a device answers:
+  roaas load http://robot:8000/openapi.json --operation 'GET /state' --rate 50
+
+Find the highest rate that the device manages:
+  roaas load http://robot:8000/openapi.json --operation 'GET /state' --knee
+
+Compare it with another device, or with another version:
+  roaas load http://robot:8000/openapi.json --operation 'GET /state' --against http://old:8000"""
 # How often signals are looked for while a load test runs, s.
 _LOOKS_S = 0.2
 _DESCRIPTIONS = ("publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint")
@@ -116,15 +126,18 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
     return RobotStatement(endpoints=Endpoints(rest=where, **described, **shared))
 
 
-@click.command(cls=ResultCommand)
-@click.argument("targets", nargs=-1, metavar="[STATEMENT] [DESCRIPTION]")
+@click.command(cls=ResultCommand, start=_START)
+@click.argument("targets", nargs=-1, metavar="[DESCRIPTION] [STATEMENT]")
+@options_of(Group.DEVICE, rare=True)
 @click.option("--rest", metavar="URL", help="Base URL of the REST interface.")
 @description_options
+@options_of(Group.DEVICE, rare=True)
 @click.option("--publishers-wsdl", metavar="URL|FILE", help="WSDL of the publishers service, which takes deliveries.")
 @click.option("--subscribers-wsdl", metavar="URL|FILE", help="WSDL of the subscribers service, which returns the pose.")
 @click.option("--publishers-endpoint", metavar="URL", help="Address of that service, when its WSDL does not say.")
 @click.option("--subscribers-endpoint", metavar="URL", help="Address of that service, when its WSDL does not say.")
 @click.option("--rosbridge", metavar="URL", help="Measure this rosbridge to the robot as well.")
+@options_of(Group.MEASURED)
 @click.option(
     "--operation",
     "operations",
@@ -135,16 +148,20 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
 @click.option(
     "--scenario", type=click.Path(exists=True, dir_okay=False), help="Locust file with what the users (--users) do."
 )
+@options_of(Group.MEASURED, rare=True)
 @click.option("--interface", "interfaces", multiple=True, type=click.Choice(INTERFACES), help="Only this interface.")
 @click.option("--client", "clients", multiple=True, type=click.Choice(CLIENTS), help="Only this client.")
+@options_of(Group.EFFORT)
 @click.option("--rate", type=float, help=f"Open model: requests per second (default {DEFAULT_RATE:g}).")
 @click.option("--users", type=int, help="Closed model: users, each of which waits for its response.")
+@options_of(Group.EFFORT, rare=True)
 @click.option(
     "--arrivals",
     type=click.Choice(["constant", "poisson"]),
     default="constant",
     help="Open model: how requests are spaced.",
 )
+@options_of(Group.EFFORT)
 @click.option(
     "--duration",
     "duration_s",
@@ -155,6 +172,7 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
 @click.option(
     "--warmup", "warmup_s", type=float, help=f"Seconds of load beforehand, not counted (default {DEFAULT_WARMUP_S:g})."
 )
+@options_of(Group.EFFORT, rare=True)
 @click.option("--timeout", "timeout_s", type=float, help="Deadline of one request, in seconds.")
 @click.option("--seed", type=int, default=1, help="Seed of schedule, payloads and intervals.")
 @click.option(
@@ -167,6 +185,7 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
 @click.option(
     "--restart-command", metavar="CMD", help="Restart the robot with this command before each repeat (no shell)."
 )
+@options_of(Group.MACHINES, rare=True)
 @click.option("--processes", type=click.IntRange(0, 256), default=1, help="Workers on this machine.")
 @click.option(
     "--expect-workers", "expect", type=click.IntRange(0, 1000), default=0, help="Workers in total, on all machines."
@@ -176,12 +195,17 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
 @click.option("--web-port", type=click.IntRange(1, 65535), help="Show Locust's web UI on this port.")
 @click.option("--web-host", default="127.0.0.1", help="Where the web UI and the metrics listen.")
 @click.option("--metrics-port", type=click.IntRange(1, 65535), help="Serve the histograms to Prometheus on this port.")
+@options_of(Group.EFFORT)
 @click.option("--steps", is_flag=True, help="Then raise the rate in steps until the robot breaks down.")
+@options_of(Group.EFFORT, rare=True)
 @click.option("--step-rates", callback=RATES, metavar="R,R,…", help="The rates of these steps.")
+@options_of(Group.EFFORT)
 @click.option("--knee", is_flag=True, help="Find the highest rate of REST, SOAP and both together, by bisection.")
+@options_of(Group.EFFORT, rare=True)
 @click.option("--knee-searches", type=click.IntRange(1, 50), default=KNEE_SEARCHES, help="How often to search for it.")
 @click.option("--connections", callback=COUNTS, metavar="N,N,…", help="Then keep this many connections busy.")
 @click.option("--step-duration", "step_s", type=float, default=STEP_S, help="Seconds of each step, for each interface.")
+@options_of(Group.MEASURED)
 @click.option(
     "--stream",
     "streams",
@@ -190,26 +214,36 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
     help="Also listen to this stream: an operation that sends events, a WebSocket (ws://…), or a topic of a rosbridge "
     "(ws://…#/odom); repeatable.",
 )
+@options_of(Group.MEASURED, rare=True)
 @click.option("--stamp-field", metavar="POINTER", help="Where a message has its time, such as /header/stamp.")
 @click.option("--clock-field", metavar="POINTER", help="Where the polled response has the robot's time, such as /now.")
 @click.option("--end-to-end", is_flag=True, help="Also measure the time until the robot's application has a delivery.")
 @click.option("--ros-domain-id", type=click.IntRange(0, 232), help="The robot's ROS domain, for --end-to-end.")
+@options_of(Group.OUTPUT)
 @click.option("--thresholds", type=_FILE, help="TOML file of [[threshold]] tables.")
+@options_of(Group.CREDENTIALS)
 @click.option("--token-file", metavar="FILE", help="File with the robot's bearer token.")
 @click.option("--ca-file", metavar="FILE", help="Certificate authorities to trust.")
 @credential_options
+@options_of(Group.COMPARED)
 @click.option("--against", metavar="URL|STATEMENT", help="Compare with another robot or version; the two take turns.")
+@options_of(Group.COMPARED, rare=True)
 @click.option("--against-publishers-wsdl", metavar="URL|FILE", help="WSDL of the other robot's publishers service.")
 @click.option("--against-subscribers-wsdl", metavar="URL|FILE", help="WSDL of its subscribers service.")
 @click.option("--against-publishers-endpoint", metavar="URL", help="Address of that service, when no WSDL says.")
 @click.option("--against-subscribers-endpoint", metavar="URL", help="Address of that service, when no WSDL says.")
+@options_of(Group.COMPARED)
 @click.option(
     "--tolerance", callback=SHARE, default="5%", help="How much slower than the other, or the baseline, it may be."
 )
+@options_of(Group.CALLS)
 @click.option("--allow-motion", is_flag=True, help="The robot may drive: measure deliveries too.")
+@options_of(Group.COMPARED)
 @click.option("--save", metavar="NAME", help="Store the result as a baseline of this name.")
 @click.option("--baseline", metavar="NAME", help="Compare with the latest result stored under this name.")
+@options_of(Group.COMPARED, rare=True)
 @click.option("--baselines", type=_FILE, metavar="DIR", default=FOLDER, help="Folder of baselines.")
+@options_of(Group.OUTPUT)
 @click.option("--out", metavar="DIR", default=DEFAULT_OUT, help="Folder for the results.")
 def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     """Measure how fast a robot responds, and compare SOAP with REST.

@@ -16,6 +16,7 @@ from conformance.cli.summary import print_summary
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.help_pages import Group, options_of
 from conformance.commandline.out_folder import command_without_folders
 from conformance.commandline.result_command import CommandResult, FrontDoor, ResultCommand
 from conformance.commandline.terminal import inert
@@ -26,7 +27,7 @@ from conformance.contract.requirement_sets import RequirementSetError, judged_by
 from conformance.documents.description import DescriptionError
 from conformance.documents.openapi import operations_of
 from conformance.statement.statement import Statement, StatementError
-from conformance.target.naming import Judged, hold_folder, told_apart, what_is_judged
+from conformance.target.naming import Judged, hold_folder, named_or_usual, told_apart, what_is_judged
 from conformance.transport.reach import UnreachableError
 from conformance.verdict.effort import DEEP_MINUTES, EFFORTS, Effort
 
@@ -36,19 +37,56 @@ if TYPE_CHECKING:
 
 _POSITIVE = click.FloatRange(min=0, min_open=True)
 _FILE = click.Path(exists=True, dir_okay=False)
+_START = """\
+Judge a device by its own OpenAPI description or WSDL. Only what reads is called, so nothing moves:
+  roaas certify http://robot:8000/openapi.json
+
+Call operations that change something as well:
+  roaas certify http://robot:8000/openapi.json --call 'POST /api/move/*'
+
+Write down what is known of the device in a file, which later runs are given:
+  roaas certify http://robot:8000/openapi.json --init roaas.toml"""
 
 
-@click.command(cls=ResultCommand)
-@click.argument("targets", nargs=-1, metavar="[STATEMENT] [DESCRIPTION]")
+@click.command(cls=ResultCommand, start=_START)
+@click.argument("targets", nargs=-1, metavar="[DESCRIPTION] [STATEMENT]")
+@options_of(Group.DEVICE)
 @click.option("--init", is_flag=True, help="Write a commented STATEMENT from the device's descriptions; test nothing.")
+@options_of(Group.DEVICE, rare=True)
+@click.option("--force", is_flag=True, help="With --init: overwrite STATEMENT.")
 @click.option("--rest", metavar="URL", help="Base URL of the REST interface.")
-@description_options
 @click.option("--publishers-wsdl", metavar="URL", help="WSDL of the publishers service, URL or file.")
 @click.option("--subscribers-wsdl", metavar="URL", help="WSDL of the subscribers service, URL or file.")
 @click.option("--publishers-endpoint", metavar="URL", help="Address of that service, if its WSDL has another.")
 @click.option("--subscribers-endpoint", metavar="URL", help="Address of that service, if its WSDL has another.")
-@click.option("--profile", metavar="NAME", help="Claim the classes of a profile of the contract, such as full.")
+@click.option(
+    "--ros-domain-id",
+    type=click.IntRange(0, 232),
+    help="ROS domain of the robot: observe its topics with a probe (needs rclpy).",
+)
+@click.option("--fleet", type=_FILE, metavar="FILE", help="Test several robots, each in its own process (TOML).")
+@click.option(
+    "--parallel", type=click.IntRange(min=1), metavar="N", help="With --fleet: at most N robots at once.  [default: 4]"
+)
+@description_options
+@options_of(Group.CALLS)
+@click.option(
+    "--allow-motion", is_flag=True, help="Allow the suite to move the robot; most of the paper's contract needs that."
+)
+@click.option(
+    "--request-rate", type=click.FloatRange(min=1), metavar="R", help="At most R requests per second, 1 or more."
+)
+@options_of(Group.CREDENTIALS)
+@click.option("--token-file", type=_FILE, help="File with the bearer token to send.")
+@click.option("--ca-file", type=_FILE, help="Certificate authorities (PEM) to trust for HTTPS instead of the system's.")
+@credential_options
+@options_of(Group.EFFORT)
+@click.option("--effort", type=click.Choice(EFFORTS), default="standard", help="How many cases to test.")
+@click.option("--minutes", type=_POSITIVE, metavar="M", help="Send requests for about M minutes, the usual ones first.")
 @click.option("--class", "classes", multiple=True, metavar="NAME", help="Claim a conformance class; repeatable.")
+@click.option("--plan", is_flag=True, help="Print the scenarios and checks in their order; send nothing.")
+@options_of(Group.EFFORT, rare=True)
+@click.option("--profile", metavar="NAME", help="Claim the classes of a profile of the contract, such as full.")
 @click.option(
     "--contract",
     "pack",
@@ -62,11 +100,6 @@ _FILE = click.Path(exists=True, dir_okay=False)
     help="Only this frozen set of requirements counts; newer ones are shown.  [default: all]",
 )
 @click.option(
-    "--allow-motion", is_flag=True, help="Allow the suite to move the robot; most of the contract needs that."
-)
-@click.option("--effort", type=click.Choice(EFFORTS), default="standard", help="How many cases to test.")
-@click.option("--minutes", type=_POSITIVE, metavar="M", help="Send requests for about M minutes, the usual ones first.")
-@click.option(
     "--seed",
     type=click.IntRange(min=0),
     default=0,
@@ -75,56 +108,41 @@ _FILE = click.Path(exists=True, dir_okay=False)
 @click.option("--nonce", metavar="TEXT", help="Text chosen by the relying party; the seed is derived from it.")
 @click.option("--timeout", "timeout_s", type=_POSITIVE, metavar="S", help="Deadline of one request.  [default: 10]")
 @click.option(
-    "--request-rate", type=click.FloatRange(min=1), metavar="R", help="At most R requests per second, 1 or more."
-)
-@click.option(
     "--restart-command",
     metavar="CMD",
     default="",
+    show_default=False,
     help="Command that restarts a device that stopped responding, so that the run can go on.",
 )
 @click.option(
     "--wait", "wait_s", type=_POSITIVE, metavar="S", help="Wait so long for a device that is lost.  [default: 20 or 60]"
 )
-@click.option("--ca-file", type=_FILE, help="Certificate authorities (PEM) to trust for HTTPS instead of the system's.")
+@options_of(Group.OUTPUT)
 @click.option(
-    "--ros-domain-id",
-    type=click.IntRange(0, 232),
-    help="ROS domain of the robot: observe its topics with a probe (needs rclpy).",
+    "--out", type=click.Path(file_okay=False, path_type=Path), default=Path("out"), help="Folder for the results."
 )
 @click.option(
     "--baseline", type=click.Path(path_type=Path), help="Accepted failures, each with reason and expiry date (TOML)."
 )
-@click.option("--token-file", type=_FILE, help="File with the bearer token to send.")
-@credential_options
-@click.option(
-    "--out", type=click.Path(file_okay=False, path_type=Path), default=Path("out"), help="Folder for the results."
-)
-@click.option("--plan", is_flag=True, help="Print the scenarios and checks in their order; send nothing.")
-@click.option("--fleet", type=_FILE, metavar="FILE", help="Test several robots, each in its own process (TOML).")
-@click.option(
-    "--parallel", type=click.IntRange(min=1), metavar="N", help="With --fleet: at most N robots at once.  [default: 4]"
-)
-@click.option("--sign", "key", type=_FILE, metavar="KEY", help="Sign the result with this private key.")
+@click.option("--json", "as_json", is_flag=True, help="Print result.json to stdout in place of the summary.")
+@click.option("--quiet", "-q", "progress", flag_value="none", help="Write no progress; the same as --progress none.")
+@options_of(Group.OUTPUT, rare=True)
 @click.option(
     "--progress",
     type=click.Choice(["auto", "lines", "none"]),
     default="auto",
     help="What is written to stderr: auto is a bar on a terminal, and lines elsewhere.",
 )
-@click.option("--quiet", "-q", "progress", flag_value="none", help="The same as --progress none.")
-@click.option("--json", "as_json", is_flag=True, help="Print result.json to stdout in place of the summary.")
-@click.option("--force", is_flag=True, help="With --init: overwrite STATEMENT.")
+@click.option("--sign", "key", type=_FILE, metavar="KEY", help="Sign the result with this private key.")
 @click.pass_obj
 def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> CommandResult:
-    """Test a robot against its contract, and judge each requirement.
+    """Judge a device by its own description, or by its contract.
 
-    STATEMENT is the robot's implementation conformance statement (TOML); options override it. --fleet takes several
-    statements. If no classes are claimed (statement, --profile, --class), all classes are judged whose interfaces have
-    an address.
+    DESCRIPTION is the URL or file of an OpenAPI or Swagger description or of a WSDL: the device is judged by it and by
+    what binds every web API. Only GET, HEAD and OPTIONS are sent, unless --call allows more.
 
-    DESCRIPTION is the URL or file of an OpenAPI or Swagger description: the device is then judged by it and by what
-    binds every web API. Only GET, HEAD and OPTIONS are sent, unless --call allows more.
+    STATEMENT is the device's implementation conformance statement (TOML); options override it. If neither is given,
+    it is roaas.toml in the working directory. If no classes are claimed, all are judged whose interface has an address.
 
     Exit code: 0 conformant, 1 not conformant, 2 usage, 3 robot not reached, 4 inconclusive, 130 interrupted.
     """
@@ -144,7 +162,7 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> Comma
         return certify_fleet(Path(options.fleet), options)
     if options.parallel is not None:
         raise click.UsageError("--parallel says how many robots of a --fleet are judged at once: give --fleet")
-    source, statement = told_apart(targets, options.openapi or options.wsdl)
+    source, statement = told_apart(named_or_usual(targets, given), options.openapi or options.wsdl)
     try:
         done = _judge(door, source, statement, options)
     except UnreachableError as unreachable:

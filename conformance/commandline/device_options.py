@@ -7,11 +7,14 @@ from typing import Any, TypeVar
 
 import click
 
+from conformance.commandline.help_pages import Group, options_of
+
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 _FILE = click.Path(exists=True, dir_okay=False)
 _OPTION = re.compile(r"--[a-z][a-z-]+")
 
 _DESCRIPTION = (
+    options_of(Group.DEVICE, rare=True),
     click.option("--openapi", metavar="URL|FILE", help="The device's own OpenAPI or Swagger description: go by that."),
     click.option("--wsdl", metavar="URL|FILE", help="The device's own WSDL: go by that."),
     click.option(
@@ -23,6 +26,7 @@ _DESCRIPTION = (
     click.option("--overlay", "overlays", multiple=True, metavar="FILE", help="OpenAPI Overlay to apply; repeatable."),
     click.option("--base-url", metavar="URL", help="Where the operations of the description are."),
     click.option("--allow-files", is_flag=True, help="A description in a file may refer to files outside its folder."),
+    options_of(Group.CALLS),
     click.option(
         "--call",
         "allow",
@@ -33,6 +37,17 @@ _DESCRIPTION = (
     click.option("--never", multiple=True, metavar="PATTERN", help="Never call these operations; repeatable."),
 )
 _CREDENTIALS = (
+    options_of(Group.CREDENTIALS),
+    click.option("--basic-file", type=_FILE, help="File with user:password for basic authentication."),
+    click.option("--api-key-file", type=_FILE, help="File with the API key."),
+    click.option(
+        "--api-key", metavar="'PLACE NAME'", help="Where the API key goes: header, query or cookie, and its name."
+    ),
+    options_of(Group.CREDENTIALS, rare=True),
+    click.option("--digest-file", type=_FILE, help="File with user:password for digest authentication (RFC 7616)."),
+    click.option(
+        "--username-token-file", type=_FILE, help="File with user:password for WS-Security's UsernameToken (SOAP)."
+    ),
     click.option(
         "--trust-host",
         "trust_hosts",
@@ -40,18 +55,10 @@ _CREDENTIALS = (
         metavar="HOST[:PORT]",
         help="A description may lead to this server too, with the credentials; repeatable.",
     ),
-    click.option("--basic-file", type=_FILE, help="File with user:password for basic authentication."),
-    click.option("--digest-file", type=_FILE, help="File with user:password for digest authentication (RFC 7616)."),
-    click.option(
-        "--username-token-file", type=_FILE, help="File with user:password for WS-Security's UsernameToken (SOAP)."
-    ),
-    click.option(
-        "--api-key", metavar="'PLACE NAME'", help="Where the API key goes: header, query or cookie, and its name."
-    ),
-    click.option("--api-key-file", type=_FILE, help="File with the API key."),
     click.option("--headers-file", type=_FILE, help="File with headers to send, 'Name: value' in each line."),
 )
 _CLIENT_CERTIFICATE = (
+    options_of(Group.CREDENTIALS, rare=True),
     click.option("--client-cert-file", type=_FILE, help="Client certificate (PEM) for HTTPS."),
     click.option("--client-key-file", type=_FILE, help="Its key, if it is not in the same file."),
     click.option("--client-key-passphrase-file", type=_FILE, help="File with the passphrase of that key."),

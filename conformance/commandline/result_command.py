@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, Protocol
 import click
 
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.help_pages import GroupedCommand
 from conformance.commandline.terminal import inert
 
 
@@ -38,7 +39,7 @@ class FrontDoor(Protocol):
         """Write the pages of a result file, sign it if there is a signer, and return their paths."""
 
 
-class ResultCommand(click.Command):
+class ResultCommand(GroupedCommand):
     """A click command whose callback returns a CommandResult.
 
     After the callback, the front door, if any, renders the result file, and the process exits with the exit code.

@@ -6,13 +6,14 @@ import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, Final, NamedTuple, Self
 
 import click
 import msgspec
 
 from conformance.commandline.device_options import advice
 from conformance.commandline.extras import lacking_soap
+from conformance.commandline.help_pages import USUAL_STATEMENT
 from conformance.commandline.out_folder import FolderError, held
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.documents.description import is_url
@@ -81,6 +82,21 @@ class Judged(NamedTuple):
     statement: Statement
     contract: Contract
     remarks: tuple[str, ...] = ()
+
+
+# The options that name a device, by their names in Python.
+_NAMES: Final = (
+    "openapi", "wsdl", "rest", "publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint",
+    "rosbridge", "fleet", "init",
+)  # fmt: skip
+
+
+def named_or_usual(targets: tuple[str, ...], options: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the arguments of a command, or ./roaas.toml if it names no device; say so on stderr."""
+    if targets or any(options.get(name) for name in _NAMES) or not USUAL_STATEMENT.is_file():
+        return targets
+    click.echo(f"statement: {USUAL_STATEMENT}", err=True)
+    return (str(USUAL_STATEMENT),)
 
 
 def told_apart(targets: tuple[str, ...], openapi: str | None) -> tuple[str | None, Path | None]:

@@ -1,0 +1,106 @@
+"""The help of a command with many options: in groups, rare ones under --help-all; and what to try first."""
+
+from collections.abc import Callable
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, Final, NamedTuple, TypeVar
+
+import click
+
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+_PLACE, _EVERYTHING = "roaas_place", "roaas.help_all"
+#: The statement that is used where a command names no device.
+USUAL_STATEMENT: Final = Path("roaas.toml")
+
+
+class Group(StrEnum):
+    """The groups of options in the help of a command, in their order."""
+
+    DEVICE = "Device"
+    CALLS = "What may be called"
+    CREDENTIALS = "Credentials"
+    MEASURED = "What is measured"
+    EFFORT = "Effort"
+    COMPARED = "What it is compared with"
+    MACHINES = "Several machines"
+    OUTPUT = "Output"
+    HELP = "Help"
+
+
+class _Place(NamedTuple):
+    group: Group
+    rare: bool
+
+
+def options_of(group: Group, *, rare: bool = False) -> Callable[[_Command], _Command]:
+    """Put the options declared below this decorator, down to the next one, into a group of the help.
+
+    Args:
+        group: heading of the group; several decorators may name the same.
+        rare: whether only --help-all shows these options.
+    """
+
+    def mark(command: _Command) -> _Command:
+        # Decorators run from the last to the first: what has no group yet stands between this one and the next.
+        for parameter in getattr(command, "__click_params__", ()):
+            vars(parameter).setdefault(_PLACE, _Place(group, rare))
+        return command
+
+    return mark
+
+
+class GroupedCommand(click.Command):
+    """A click command whose help has groups of options, and that shows what to try where it gets no argument.
+
+    Args:
+        start: what to print in place of an error if there is no argument and no roaas.toml; empty: run the command.
+    """
+
+    def __init__(self, *args: Any, start: str = "", **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._start = start
+        if any(_place(one).rare for one in self.params):
+            everything = click.Option(
+                ["--help-all"], is_flag=True, is_eager=True, expose_value=False, callback=_show_everything,
+                help="Show all options.",
+            )  # fmt: skip
+            self.params.append(everything)
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments; without any, print what to try and exit."""
+        if self._start and not args and not USUAL_STATEMENT.is_file():
+            click.echo(f"{self._start}\n\nAll options: {ctx.command_path} --help", err=True)
+            ctx.exit(2)
+        return super().parse_args(ctx, args)
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options group by group."""
+        groups, left_out = {group: list[tuple[str, str]]() for group in Group}, 0
+        for parameter in self.get_params(ctx):
+            place, record = _place(parameter), parameter.get_help_record(ctx)
+            if record is None or isinstance(parameter, click.Argument):
+                continue
+            if place.rare and _EVERYTHING not in ctx.meta:
+                left_out += 1
+                continue
+            groups[place.group].append(record)
+        filled = {group: records for group, records in groups.items() if records}
+        for group, records in filled.items():
+            # A command without groups has "Options" alone, as click writes it.
+            with formatter.section(group if len(filled) > 1 else "Options"):
+                formatter.write_dl(records)
+        if left_out:
+            formatter.write_paragraph()
+            formatter.write_text(f"{left_out} more options: {ctx.command_path} --help-all")
+
+
+def _place(parameter: click.Parameter) -> _Place:
+    place: _Place = vars(parameter).get(_PLACE, _Place(Group.HELP, rare=False))
+    return place
+
+
+def _show_everything(ctx: click.Context, _: click.Parameter, given: bool) -> None:  # noqa: FBT001 - click's signature
+    if given:
+        ctx.meta[_EVERYTHING] = True
+        click.echo(ctx.get_help(), color=ctx.color)
+        ctx.exit()
