@@ -33,7 +33,7 @@ class RosProcess:
     """A started probe; call await_ready() before anything else.
 
     Args:
-        role: observe, listen or publish.
+        role: observe, listen, publish or play.
         options: its options, beside the domain.
         domain_id: the robot's ROS domain.
 
@@ -77,7 +77,7 @@ class RosProcess:
             self.close()
             raise
 
-    def ask(self, line: str) -> dict[str, Any]:
+    def ask(self, line: str, within_s: float = _ANSWER_S) -> dict[str, Any]:
         """Write a line, and return the answer.
 
         Raises:
@@ -89,7 +89,7 @@ class RosProcess:
                 self._process.stdin.flush()
         except (OSError, ValueError) as error:
             raise ProbeError(f"it has ended: {error}") from error
-        return self.told(_ANSWER_S)
+        return self.told(within_s)
 
     def told(self, within_s: float) -> dict[str, Any]:
         """Return what the program says next.
@@ -109,6 +109,11 @@ class RosProcess:
         if not isinstance(answer, dict) or "problem" in answer:
             raise ProbeError(str(answer["problem"]) if isinstance(answer, dict) else "it answers nonsense")
         return answer
+
+    def kill(self) -> None:
+        """Kill the process, so that its nodes leave the graph without a word."""
+        self._process.kill()
+        self.close()
 
     def close(self) -> None:
         """End the process."""

@@ -157,6 +157,10 @@ def _number(kind: inspect.IntType | inspect.FloatType, _: str) -> str:
 # By the patterns of statements: what a text has to be.
 _TEXTS: Final = {
     r"^[A-Z]+ /\S*$": "a method and a path on the device, such as 'POST /login', and no URL",
+    r"^/\S+$": "a full ROS name, which begins with '/'",
+    r"^[A-Za-z]\w*/msg/[A-Za-z]\w*$": "a message type such as 'nav_msgs/msg/Odometry'",
+    r"^[A-Za-z]\w*/srv/[A-Za-z]\w*$": "a service type such as 'std_srvs/srv/SetBool'",
+    r"^[A-Za-z]\w*/action/[A-Za-z]\w*$": "an action type such as 'nav2_msgs/action/NavigateToPose'",
     "^/": "a JSON pointer, such as '/access_token'",
     r"^(bearer|(header|query|cookie) \S+)$": "'bearer', 'header NAME', 'query NAME' or 'cookie NAME'",
 }

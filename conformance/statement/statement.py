@@ -11,6 +11,7 @@ from conformance.contract.toml_file import Text, TomlFileError, fit, read_toml
 from conformance.statement.endpoints import Auth, Endpoints, beside
 from conformance.statement.load import Load, ServiceLevel
 from conformance.statement.motion_map import MotionMap
+from conformance.statement.ros_map import RosMap, read_ros_map
 
 
 class StatementError(TomlFileError):
@@ -58,6 +59,7 @@ class Statement(msgspec.Struct, frozen=True):
         values: values to use in requests, by the name of a parameter or member.
         calls: what may be called.
         motion_map: how a device moves of which only its description is known, or None.
+        ros_map: what the device, a ROS 2 web gateway, makes of a ROS graph, or None.
         slo: service levels by operation, which a load test judges.
     """
 
@@ -68,6 +70,7 @@ class Statement(msgspec.Struct, frozen=True):
     values: dict[str, tuple[Any, ...]] = {}
     calls: Calls = Calls()
     motion_map: MotionMap | None = None
+    ros_map: RosMap | None = None
     slo: dict[str, ServiceLevel] = {}
 
     @property
@@ -89,9 +92,11 @@ class Statement(msgspec.Struct, frozen=True):
         """Return the statement with another ROS domain.
 
         Raises:
-            StatementError: this type of statement has no ROS domain.
+            StatementError: this statement has no ROS domain.
         """
-        raise StatementError(f"ROS domain {domain_id}: this contract has no ROS probe")
+        if self.ros_map is None:
+            raise StatementError(f"ROS domain {domain_id}: this contract has no ROS probe, and the statement no [ros]")
+        return msgspec.structs.replace(self, ros_map=msgspec.structs.replace(self.ros_map, domain_id=domain_id))
 
     def claimed(self, contract: Contract) -> tuple[str, ...]:
         """Return the classes to judge: those claimed, or, without claims, those whose interfaces all have an address.
@@ -172,18 +177,23 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     api: Api = Api()
     auth: Auth | None = None
     motion: Any = None
+    ros: Any = None
     slo: dict[str, Any] = {}
 
     def read(self, contract: Contract, path: Path) -> Statement:
         """Return the statement.
 
         Raises:
-            StatementError: it claims an unknown class or profile, or has a motion map that is invalid or has no use.
+            StatementError: it claims an unknown class or profile, or has a map that is invalid or has no use.
         """
-        if self.motion is not None and "motion" not in contract.classes:
-            raise StatementError(f"{path}: [motion] is for a device that is judged by its own description: see [api]")
+        for name, table in (("motion", self.motion), ("ros", self.ros)):
+            if table is not None and contract.is_claimed:
+                raise StatementError(
+                    f"{path}: [{name}] is for a device that is judged by its own description: see [api]"
+                )
         moves = None if self.motion is None else fit({"motion": self.motion}, _Map, str(path), StatementError).motion
-        return Statement(**self.common(contract, path), motion_map=moves)
+        ros = None if self.ros is None else read_ros_map(self.ros, str(path), StatementError)
+        return Statement(**self.common(contract, path), motion_map=moves, ros_map=ros)
 
     def common(self, contract: Contract, path: Path) -> dict[str, Any]:
         """Return the attributes that every statement has, by name.

@@ -1,0 +1,243 @@
+"""The ROS map: which operation of a web gateway is which topic, service or action (tables ``[ros]`` of a statement).
+
+Operations are written as in ``--call``: "METHOD PATH", the path as the description has it, or "POST /PORT/OPERATION" of
+a WSDL. Positions in bodies are JSON pointers (RFC 6901); in XML they go by local names. Message types are written as
+ROS writes them: "PACKAGE/msg/NAME", "PACKAGE/srv/NAME", "PACKAGE/action/NAME".
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from typing import Annotated, Any, Final, Literal
+
+import msgspec
+from msgspec import Meta
+
+from conformance.contract.toml_file import Positive, TomlFileError, fit
+from conformance.statement.motion_map import Call, Pointer
+
+#: ROS names are unlimited; DDS domains are not (design.ros2.org, "ROS domain id").
+_MOST_DOMAINS: Final = 232
+_CALL: Final = re.compile(r"[A-Z]+ /\S*$")
+Topic = Annotated[str, Meta(pattern=r"^/\S+$")]
+Status = Annotated[int, Meta(ge=400, le=599)]
+MessageType = Annotated[str, Meta(pattern=r"^[A-Za-z]\w*/msg/[A-Za-z]\w*$")]
+ServiceType = Annotated[str, Meta(pattern=r"^[A-Za-z]\w*/srv/[A-Za-z]\w*$")]
+ActionType = Annotated[str, Meta(pattern=r"^[A-Za-z]\w*/action/[A-Za-z]\w*$")]
+
+
+class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How a message is written in the body of an operation.
+
+    Attributes:
+        at: where the message is in the body; empty: the body is the message.
+        fields: position in the web's message = position in the ROS message, where their names differ. What is under the
+            position goes with it. Without it, all names are those of the message.
+        values: values of the parameters in the path, and of others that the operation requires.
+        timeout_s: time that the gateway has for a response, and for what the response stands for, s.
+    """
+
+    at: Pointer = ""
+    fields: dict[Pointer, Pointer] = {}
+    values: dict[str, Any] = {}
+    timeout_s: Positive = 5.0
+
+
+class Reads(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An operation that returns the last message of a topic.
+
+    Attributes:
+        topic: its full name.
+        type: of its messages.
+        absent: the statuses without a message: the topic has no publisher or no message, or the last is too old. Empty:
+            not judged.
+        max_age_s: how old a message may be that the operation returns, s; None: as old as it gets.
+    """
+
+    topic: Topic
+    type: MessageType
+    absent: tuple[Status, ...] = ()
+    max_age_s: Positive | None = None
+
+
+class Publishes(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An operation that publishes the message of its body on a topic.
+
+    Attributes:
+        publishes: the topic's full name.
+        type: of its messages.
+    """
+
+    publishes: Topic
+    type: MessageType
+
+
+class Calls(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An operation that calls a service.
+
+    Attributes:
+        service: its full name.
+        type: of the service.
+        result: where the response of the service is in the response's body.
+        unavailable: the statuses when the service is not there; empty: any that is no success.
+        too_late: the statuses when the service does not respond in time; empty: any that is no success.
+    """
+
+    service: Topic
+    type: ServiceType
+    result: Pointer = ""
+    unavailable: tuple[Status, ...] = ()
+    too_late: tuple[Status, ...] = ()
+
+
+class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a goal says of itself.
+
+    Attributes:
+        read: the operation, a template: "{id}" is the goal's id.
+        at: where the word for its state is in the response.
+        running, succeeded, aborted, canceled: these words; an empty list: not judged.
+    """
+
+    read: Call
+    at: Pointer
+    running: tuple[str, ...] = ()
+    succeeded: tuple[str, ...] = ()
+    aborted: tuple[str, ...] = ()
+    canceled: tuple[str, ...] = ()
+
+
+class Acts(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An operation that sends a goal to an action; ``at`` is where the goal is in its body.
+
+    Attributes:
+        action: its full name.
+        type: of the action.
+        id: where the goal's id is in the response.
+        state: what the goal says of itself; None: not judged.
+        feedback: where the last feedback is in the response of ``state.read``; None: nowhere.
+        result: where the result is in the response of ``state.read``; None: nowhere.
+        cancel: the operation that cancels the goal, a template: "{id}" is the goal's id.
+        rejected: the statuses when the action server rejects a goal; empty: any that is no success.
+    """
+
+    action: Topic
+    type: ActionType
+    id: Pointer
+    state: State | None = None
+    feedback: Pointer | None = None
+    result: Pointer | None = None
+    cancel: Call | Literal[""] = ""
+    rejected: tuple[Status, ...] = ()
+
+
+class Lists(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An operation that lists what is on the graph.
+
+    Attributes:
+        lists: what.
+        at: where the array is in the body.
+        name: where the full name is in an item; empty: the item is the name.
+        type: where its type, or the list of its types, is in an item; None: nowhere.
+        hidden: whether names that are hidden (with a part that begins with "_") are listed; None: either.
+        timeout_s: time in which a change of the graph has to show, s.
+    """
+
+    lists: Literal["topics", "services", "actions", "nodes"]
+    at: Pointer = ""
+    name: Pointer = ""
+    type: Pointer | None = None
+    hidden: bool | None = None
+    timeout_s: Positive = 5.0
+
+
+Operation = Reads | Publishes | Calls | Acts | Lists
+_KINDS: Final[dict[str, type[Operation]]] = {
+    "topic": Reads, "publishes": Publishes, "service": Calls, "action": Acts, "lists": Lists,
+}  # fmt: skip
+
+
+class RosMap(msgspec.Struct, frozen=True):
+    """What a gateway makes of a ROS graph.
+
+    Attributes:
+        operations: by operation.
+        domain_id: the robot's ROS domain; None: that of the environment.
+        non_finite: how NaN and infinities are written: as null, as the strings "NaN", "Infinity" and "-Infinity", as a
+            bare NaN or Infinity, or not at all but refused with an error status; None: not judged.
+        integers: how integers of 64 bits are written; None: either, but exactly.
+        bytes: how uint8[] and byte[] are written; None: either.
+    """
+
+    operations: dict[str, Operation]
+    domain_id: int | None = None
+    non_finite: Literal["null", "string", "refused", "literal"] | None = None
+    integers: Literal["number", "string"] | None = None
+    bytes: Literal["base64", "array"] | None = None
+
+    @property
+    def domain(self) -> int:
+        """The ROS domain: that of the map, else of the environment variable ROS_DOMAIN_ID, else 0."""
+        given = os.environ.get("ROS_DOMAIN_ID", "")
+        return self.domain_id if self.domain_id is not None else int(given) if given.isdecimal() else 0
+
+    @property
+    def calls(self) -> tuple[str, ...]:
+        """The operations that the map names."""
+        actions = [one for one in self.operations.values() if isinstance(one, Acts)]
+        states = [one.state.read for one in actions if one.state]
+        return (*self.operations, *states, *(one.cancel for one in actions if one.cancel))
+
+    @property
+    def acts(self) -> tuple[str, ...]:
+        """The operations that send something to the robot."""
+        return tuple(call for call, one in self.operations.items() if isinstance(one, Publishes | Calls | Acts))
+
+
+class _Ros(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The table ``[ros]`` as it is written; its operations are of several kinds."""
+
+    operations: Annotated[dict[str, dict[str, Any]], Meta(min_length=1)]
+    domain_id: Annotated[int, Meta(ge=0, le=_MOST_DOMAINS)] | None = None
+    non_finite: Literal["null", "string", "refused", "literal"] | None = None
+    integers: Literal["number", "string"] | None = None
+    bytes: Literal["base64", "array"] | None = None
+
+
+class _File(msgspec.Struct, frozen=True):
+    ros: _Ros
+
+
+def read_ros_map(table: Any, where: str, error: type[TomlFileError]) -> RosMap:
+    """Return the ROS map that a statement's table ``[ros]`` holds.
+
+    Args:
+        table: its content.
+        where: the statement's file, for messages.
+        error: the type of what is raised.
+
+    Raises:
+        TomlFileError: as ``error``: a key is unknown or missing, or a value is invalid.
+    """
+    found = fit({"ros": table}, _File, where, error).ros
+    given = {name: getattr(found, name) for name in ("domain_id", "non_finite", "integers", "bytes")}
+    return RosMap({call: _operation(call, one, where, error) for call, one in found.operations.items()}, **given)
+
+
+def _operation(call: str, table: dict[str, Any], where: str, error: type[TomlFileError]) -> Operation:
+    place = f"{where}: [ros.operations] {call!r}"
+    if not _CALL.match(call):
+        raise error(f"{place} must be a method and a path on the device, such as 'GET /pose', and no URL")
+    kinds = [name for name in _KINDS if name in table]
+    if len(kinds) != 1:
+        found = f"has {' and '.join(kinds)}" if kinds else "has none"
+        raise error(f"{place}: one key of {', '.join(_KINDS)} must say what it is; it {found}")
+    made = fit(table, _KINDS[kinds[0]], place, error)
+    if isinstance(made, Acts):
+        for name, path in (("state.read", made.state.read if made.state else "{id}"), ("cancel", made.cancel)):
+            if path and "{id}" not in path and "/{" not in path:
+                raise error(f"{place}: {name} = {path!r} must name the goal by {{id}}")
+    elif isinstance(made, Reads) and not call.startswith(("GET ", "POST ")):
+        raise error(f"{place}: topic = {made.topic!r} is read by GET, or by an operation of a WSDL")
+    return made

@@ -1,0 +1,316 @@
+"""A ROS node that does as told: publishes, listens, serves services and actions, and lists the graph.
+
+Each command is an object with "do"; each gets one answer. Times are of CLOCK_MONOTONIC, ns. Values are as in values.py.
+
+- `describe` (type): the fields of a type.
+- `publish` (topic, type, values, gap_s, reliability, durability): publish; the first time, become a publisher. Without
+  values, only that. Answers `sent`: when each was handed to ROS; `subscribers`.
+- `listen` (topic, type): subscribe, as reliably as the publishers that are there.
+- `heard` (name, count, within_s): what came to a topic, service or action since the last call, each `[time, what,
+  value]`; waits until so much has come.
+- `serve` (service, type, script): serve. Each call takes the next item of the script, and the last one goes on:
+  `{"answer": value, "delay_s": s}`, `{"never": true}`. Events: `request`, `response`.
+- `act` (action, type, script): the same for goals: `{"reject": true}`, or `{"feedback": [values], "gap_s": s, "end":
+  "succeed" | "abort" | "never", "result": value, "refuse_cancel": true, "cancel_s": s}`. Events: `goal`, `rejected`,
+  `feedback`, `cancel`, `end`.
+- `forget` (name): leave a topic, service or action.
+- `graph`: topics with types and counts, services, actions and nodes.
+"""
+
+import threading
+import time
+from collections import defaultdict, deque
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Final
+
+import rclpy
+from rclpy.action import ActionServer, CancelResponse, GoalResponse, get_action_names_and_types
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.context import Context
+from rclpy.executors import (
+    Executor,
+    ExternalShutdownException,
+    MultiThreadedExecutor,
+    ShutdownException,
+    SingleThreadedExecutor,
+)
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from ros_probe.values import described, message_of, plain, type_of
+
+# Messages that came and were not asked for yet, of one topic; then the oldest are lost, and that is said.
+_KEPT: Final = 20_000
+_DEPTH: Final = 5000
+# As many calls and goals may wait at the same moment.
+_THREADS: Final = 48
+_STEP_S: Final = 0.01
+_LONGEST_S: Final = 60.0
+
+Event = tuple[int, str, Any]
+
+
+class Player:
+    """A ROS node that does as told.
+
+    Args:
+        domain_id: of the graph.
+        name: of the node.
+    """
+
+    def __init__(self, domain_id: int, name: str) -> None:
+        self._context = Context()
+        rclpy.init(args=[], context=self._context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
+        # What is heard is dated by a thread that does nothing else; who serves may wait.
+        self._node, self._name = self._made(name), name
+        self._servant: Node | None = None
+        self._executors: list[Executor] = []
+        self._spin(SingleThreadedExecutor(context=self._context), self._node)
+        self._entities: dict[str, Any] = {}
+        self._came: dict[str, deque[Event]] = defaultdict(partial(deque, maxlen=_KEPT))
+        self._news, self._ends = threading.Condition(), threading.Event()
+        self._commands: dict[str, Callable[..., dict[str, Any]]] = {
+            "describe": lambda type: {"types": described(type)},  # noqa: A006 - the command's own word
+            "publish": self._publish,
+            "listen": self._listen,
+            "heard": self._heard,
+            "serve": self._serve,
+            "act": self._act,
+            "forget": self._forget,
+            "graph": self._graph,
+        }
+
+    def answer(self, command: dict[str, Any]) -> dict[str, Any]:
+        """Carry out a command; return its answer, or {"problem": …} if it cannot be carried out."""
+        what = command.pop("do", None)
+        if what not in self._commands:
+            return {"problem": f"not understood: {what!r}; known are {', '.join(self._commands)}"}
+        try:
+            return self._commands[what](**command)
+        except Exception as error:  # noqa: BLE001 - whatever it is, the parent process has to be told
+            return {"problem": f"{what}: {type(error).__name__}: {error}"}
+
+    def close(self) -> None:
+        """Remove the nodes from the graph."""
+        self._ends.set()
+        for executor in self._executors:
+            executor.shutdown(timeout_sec=1)
+        for node in filter(None, (self._servant, self._node)):
+            node.destroy_node()
+        self._context.try_shutdown()
+
+    def _made(self, name: str) -> Node:
+        return Node(name, context=self._context, start_parameter_services=False, enable_rosout=False)
+
+    def _spin(self, executor: Executor, node: Node) -> None:
+        def spin() -> None:
+            try:
+                executor.spin()
+            except (ExternalShutdownException, ShutdownException):
+                return
+
+        executor.add_node(node)
+        self._executors.append(executor)
+        threading.Thread(target=spin, name="ros", daemon=True).start()
+
+    def _server(self) -> Node:
+        """Return the node that serves; its callbacks may wait."""
+        if self._servant is None:
+            self._servant = self._made(f"{self._name}_server")
+            self._spin(MultiThreadedExecutor(_THREADS, context=self._context), self._servant)
+        return self._servant
+
+    def _note(self, name: str, what: str, value: Any, at_ns: int | None = None) -> None:
+        with self._news:
+            self._came[name].append((at_ns or time.monotonic_ns(), what, value))
+            self._news.notify_all()
+
+    def _publish(
+        self,
+        topic: str,
+        type: str,  # noqa: A002 - the command's own word
+        values: list[dict[str, Any]] = [],  # noqa: B006 - is only read
+        gap_s: float = 0.0,
+        reliability: str = "reliable",
+        durability: str = "volatile",
+        depth: int = 100,
+    ) -> dict[str, Any]:
+        messages = [message_of(type, value) for value in values]
+        key = f"publish {topic}"
+        if key not in self._entities:
+            qos = QoSProfile(
+                depth=depth,
+                reliability=ReliabilityPolicy[reliability.upper()],
+                durability=DurabilityPolicy[durability.upper()],
+            )
+            self._entities[key] = self._node.create_publisher(type_of(type), topic, qos)
+        publisher, sent = self._entities[key], []
+        for number, message in enumerate(messages):
+            if number and gap_s:
+                time.sleep(gap_s)
+            sent.append(time.monotonic_ns())
+            publisher.publish(message)
+        return {"sent": sent, "subscribers": publisher.get_subscription_count()}
+
+    def _listen(self, topic: str, type: str) -> dict[str, Any]:  # noqa: A002 - as above
+        publishers = self._node.get_publishers_info_by_topic(topic)
+        best_effort = any(one.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for one in publishers)
+        reliability = ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE
+
+        def came(message: Any) -> None:
+            at_ns = time.monotonic_ns()
+            self._note(topic, "message", plain(message), at_ns)
+
+        if topic not in self._entities:
+            qos = QoSProfile(depth=_DEPTH, reliability=reliability)
+            self._entities[topic] = self._node.create_subscription(type_of(type), topic, came, qos)
+        return {"publishers": self._node.count_publishers(topic), "best_effort": best_effort}
+
+    def _heard(self, name: str, count: int = 0, within_s: float = 0.0) -> dict[str, Any]:
+        events = self._came[name]
+        with self._news:
+            self._news.wait_for(lambda: len(events) >= count, min(within_s, _LONGEST_S))
+            return {"events": [events.popleft() for _ in range(len(events))]}
+
+    def _serve(self, service: str, type: str, script: list[dict[str, Any]]) -> dict[str, Any]:  # noqa: A002 - as above
+        steps = _Steps(script)
+        answers = {id(step): message_of(f"{type}#Response", step.get("answer", {})) for step in script}
+
+        def called(request: Any, _: Any) -> Any:
+            step = steps.next()
+            self._note(service, "request", plain(request))
+            self._ends.wait(None if step.get("never") else step.get("delay_s", 0.0))
+            response = answers[id(step)]
+            self._note(service, "response", plain(response))
+            return response
+
+        self._forget(service)
+        self._entities[service] = self._server().create_service(
+            type_of(type), service, called, callback_group=ReentrantCallbackGroup()
+        )
+        return {}
+
+    def _act(self, action: str, type: str, script: list[dict[str, Any]]) -> dict[str, Any]:  # noqa: A002 - as above
+        played = _Goals(partial(self._note, action), type, script, self._ends)
+        self._forget(action)
+        self._entities[action] = ActionServer(
+            self._server(),
+            type_of(type),
+            action,
+            played.execute,
+            goal_callback=played.decide,
+            cancel_callback=played.cancel,
+            callback_group=ReentrantCallbackGroup(),
+        )
+        return {}
+
+    def _forget(self, name: str) -> dict[str, Any]:
+        found = [self._entities.pop(key) for key in (name, f"publish {name}") if key in self._entities]
+        for one in found:
+            # In rclpy, each entity has its own way out; an action server is one of several entities.
+            if isinstance(one, ActionServer):
+                one.destroy()
+            else:
+                destroy = {"Publisher": "destroy_publisher", "Subscription": "destroy_subscription"}
+                node = self._servant if one.__class__.__name__ == "Service" else self._node
+                getattr(node, destroy.get(one.__class__.__name__, "destroy_service"))(one)
+        return {"forgotten": len(found)}
+
+    def _graph(self) -> dict[str, Any]:
+        node = self._node
+        topics = {
+            name: {
+                "types": types,
+                "publishers": node.count_publishers(name),
+                "subscribers": node.count_subscribers(name),
+            }
+            for name, types in node.get_topic_names_and_types()
+        }
+        nodes = [f"{space.rstrip('/')}/{name}" for name, space in node.get_node_names_and_namespaces()]
+        own = {f"/{self._name}", f"/{self._name}_server"}
+        return {
+            "topics": topics,
+            "services": dict(node.get_service_names_and_types()),
+            "actions": dict(get_action_names_and_types(node)),
+            "nodes": [name for name in nodes if name not in own],
+        }
+
+
+class _Steps:
+    """A script: each call takes the next step, and the last one goes on."""
+
+    def __init__(self, script: list[dict[str, Any]]) -> None:
+        self._left, self._lock = deque(script or [{}]), threading.Lock()
+
+    def next(self) -> dict[str, Any]:
+        """Return the next step."""
+        with self._lock:
+            return self._left.popleft() if len(self._left) > 1 else self._left[0]
+
+
+class _Goals:
+    """What an action server does with goals.
+
+    Args:
+        note: keeps an event.
+        kind: the action's type.
+        script: a step for each goal.
+        ends: is set when the node ends.
+    """
+
+    def __init__(
+        self, note: Callable[[str, Any], None], kind: str, script: list[dict[str, Any]], ends: threading.Event
+    ) -> None:
+        self._note, self._kind, self._steps, self._ends = note, kind, _Steps(script), ends
+        self._accepted: deque[dict[str, Any]] = deque()
+        self._by_goal: dict[bytes, dict[str, Any]] = {}
+        self._lock = threading.Lock()
+
+    def decide(self, goal: Any) -> Any:
+        """Accept or reject a goal."""
+        step = self._steps.next()
+        self._note("rejected" if step.get("reject") else "goal", plain(goal))
+        if step.get("reject"):
+            return GoalResponse.REJECT
+        with self._lock:
+            self._accepted.append(step)
+        return GoalResponse.ACCEPT
+
+    def cancel(self, goal: Any) -> Any:
+        """Accept or refuse to cancel a goal."""
+        step = self._by_goal.get(bytes(goal.goal_id.uuid), {})
+        refused = step.get("refuse_cancel", False)
+        self._note("cancel", {"id": bytes(goal.goal_id.uuid).hex(), "accepted": not refused})
+        return CancelResponse.REJECT if refused else CancelResponse.ACCEPT
+
+    def execute(self, goal: Any) -> Any:
+        """Do with a goal what its step says; return the result."""
+        id_ = bytes(goal.goal_id.uuid)
+        with self._lock:
+            step = self._by_goal[id_] = self._accepted.popleft()
+        for value in step.get("feedback", []):
+            if self._is_over(goal, step.get("gap_s", 0.0)):
+                break
+            goal.publish_feedback(message_of(f"{self._kind}#Feedback", value))
+            self._note("feedback", {"id": id_.hex(), "value": value})
+        while step.get("end") == "never" and not self._is_over(goal, _STEP_S):
+            pass
+        if not goal.is_cancel_requested:
+            self._is_over(goal, step.get("gap_s", 0.0))
+        end = "canceled" if goal.is_cancel_requested else step.get("end", "succeed")
+        if end == "canceled":
+            self._ends.wait(step.get("cancel_s", 0.0))
+        {"canceled": goal.canceled, "abort": goal.abort}.get(end, goal.succeed)()
+        self._note("end", {"id": id_.hex(), "end": end})
+        return message_of(f"{self._kind}#Result", step.get("result", {}))
+
+    def _is_over(self, goal: Any, wait_s: float) -> bool:
+        """Wait; return whether the goal is to be canceled, or the node ends, before that."""
+        until = time.monotonic() + wait_s
+        while not (goal.is_cancel_requested or self._ends.is_set()):
+            if time.monotonic() >= until:
+                return False
+            time.sleep(min(_STEP_S, max(0.0, until - time.monotonic())))
+        return True

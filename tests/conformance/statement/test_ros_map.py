@@ -1,0 +1,78 @@
+"""A ROS map is read as it stands, and refused with the offending value."""
+
+import tomllib
+
+import pytest
+
+from conformance.contract.toml_file import TomlFileError
+from conformance.statement.ros_map import Acts, Calls, Lists, Publishes, Reads, read_ros_map
+
+FULL = """
+domain_id = 7
+non_finite = "null"
+integers = "string"
+bytes = "base64"
+
+[operations]
+"GET /api/v1/pose" = { topic = "/odom", type = "nav_msgs/msg/Odometry", absent = [404, 503], max_age_s = 2.0 }
+"POST /api/v1/velocity" = { publishes = "/cmd_vel", type = "geometry_msgs/msg/Twist", fields = { "/x" = "/linear/x" } }
+"POST /api/v1/reset" = { service = "/reset", type = "std_srvs/srv/SetBool", at = "", result = "/result" }
+"GET /api/v1/topics" = { lists = "topics", at = "/topics", name = "/name", type = "/type" }
+
+[operations."POST /api/v1/goals"]
+action = "/count"
+type = "example_interfaces/action/Fibonacci"
+at = "/goal"
+id = "/id"
+state = { read = "GET /api/v1/goals/{id}", at = "/state", succeeded = ["succeeded"], running = ["executing"] }
+feedback = "/feedback"
+result = "/result"
+cancel = "POST /api/v1/goals/{id}/cancel"
+"""
+
+
+def _read(text):
+    return read_ros_map(tomllib.loads(text), "gateway.toml", TomlFileError)
+
+
+def test_a_full_map():
+    ros = _read(FULL)
+    assert [type(one) for one in ros.operations.values()] == [Reads, Publishes, Calls, Lists, Acts]
+    assert (ros.domain, ros.non_finite, ros.integers, ros.bytes) == (7, "null", "string", "base64")
+    assert ros.operations["GET /api/v1/pose"].absent == (404, 503)
+    assert ros.acts == ("POST /api/v1/velocity", "POST /api/v1/reset", "POST /api/v1/goals")
+    assert "POST /api/v1/goals/{id}/cancel" in ros.calls
+    assert "GET /api/v1/goals/{id}" in ros.calls
+
+
+def test_the_domain_is_that_of_the_environment(monkeypatch):
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    ros = _read(FULL.replace("domain_id = 7", ""))
+    assert ros.domain == 0
+    monkeypatch.setenv("ROS_DOMAIN_ID", "41")
+    assert ros.domain == 41
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("domain_id = 7", "domain_id = 233", "domain_id = 233 must be a whole number from 0 to 232"),
+        ('"null"', '"nan"', "non_finite = 'nan' must be one of"),
+        ('topic = "/odom"', 'topic = "odom"', "topic = 'odom' must be a full ROS name"),
+        ("nav_msgs/msg/Odometry", "nav_msgs/Odometry", "type = 'nav_msgs/Odometry' must be a message type such as"),
+        ("absent = [404, 503]", "absent = [200]", "must be a whole number from 400 to 599"),
+        ('topic = "/odom"', 'topics = "/odom"', "one key of topic, publishes, service, action, lists must"),
+        ('topic = "/odom"', 'topic = "/odom", service = "/a"', "it has topic and service"),
+        ("max_age_s", "max_age", "unknown key 'max_age'; known are"),
+        ("goals/{id}/cancel", "goals/cancel", "must name the goal by {id}"),
+        ('"GET /api/v1/pose"', '"DELETE /api/v1/pose"', "is read by GET"),
+        ('"GET /api/v1/pose"', '"pose"', "must be a method and a path"),
+        ('id = "/id"', "", "'id' is missing"),
+    ],
+)
+def test_what_is_wrong_is_named(old, new, said):
+    assert old in FULL
+    with pytest.raises(TomlFileError) as error:
+        _read(FULL.replace(old, new))
+    assert said in str(error.value)
+    assert "gateway.toml: [ros" in str(error.value)
