@@ -84,7 +84,7 @@ class _Rooms(click.Group):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments; without any, print what to try and exit."""
-        if not args:
+        if not args and not ctx.resilient_parsing:
             click.echo(_START, err=True)
             ctx.exit(_USAGE)
         return super().parse_args(ctx, args)

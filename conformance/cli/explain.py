@@ -11,16 +11,16 @@ import click
 from click.shell_completion import CompletionItem
 
 from conformance.cli.contract import contract_option, loaded
+from conformance.cli.explanation import UnknownRequirementError, found, known, page_of
 from conformance.contract.classes import QUESTIONS, Topic
 from conformance.contract.generic import generic_classes
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
 from conformance.explaining.advice import FRAMEWORKS
-from conformance.explaining.explanation import UnknownRequirementError, found, known, page_of
 
 if TYPE_CHECKING:
+    from conformance.cli.explanation import Explanation
     from conformance.contract.ledger import Requirement
-    from conformance.explaining.explanation import Explanation
 
 _WIDEST = 100
 _SHOWN_MUTANTS = 8
@@ -54,7 +54,7 @@ def explain(requirement: str | None, pack: str, frameworks: tuple[str, ...]) -> 
     try:
         item = found(contract, requirement)
         # Imported here: it imports every check.
-        from conformance.explaining.explanation import explained  # noqa: PLC0415
+        from conformance.cli.explanation import explained  # noqa: PLC0415
 
         explanation = explained(contract, item)
     except (UnknownRequirementError, ContractError) as error:
@@ -107,7 +107,7 @@ def _sources(explanation: Explanation, contract: Contract) -> Iterator[str]:
 
 
 def _judging(explanation: Explanation) -> Iterator[str]:
-    from conformance.explaining.explanation import EFFORTS, NEEDS  # noqa: PLC0415 - as above
+    from conformance.cli.explanation import EFFORTS, NEEDS  # noqa: PLC0415 - as above
 
     item = explanation.requirement
     if item.untestable:

@@ -68,7 +68,7 @@ class GroupedCommand(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments; without any, print what to try and exit."""
-        if self._start and not args and not USUAL_STATEMENT.is_file():
+        if self._start and not args and not ctx.resilient_parsing and not USUAL_STATEMENT.is_file():
             click.echo(f"{self._start}\n\nAll options: {ctx.command_path} --help", err=True)
             ctx.exit(2)
         return super().parse_args(ctx, args)

@@ -16,11 +16,12 @@ from conformance.engine.resending import written
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.engine.suite import contract_digests, installed, suite_digest, suite_version
 from conformance.engine.web_server import web_server
+from conformance.explaining.advice import topic_of
 from conformance.transport.exchange import Attempt, Unanswered
 from conformance.verdict.causes import Cause
 from conformance.verdict.finding import Finding
 from conformance.verdict.run import Run
-from conformance.verdict.verdicts import ClassValue, Verdict, overall, verdict_line, views
+from conformance.verdict.verdicts import ClassValue, Value, Verdict, overall, verdict_line, views
 
 RESULT_FORMAT = "roaas-result/1"
 RESULT_NAME = "result.json"
@@ -197,11 +198,18 @@ def _requirement(verdict: Verdict) -> dict[str, Any]:
         "reason": verdict.reason,
         "untestable": requirement.untestable,
         "checks": sorted(verdict.evidence.checks - {""}),
+        **_advice(verdict),
         "failures": [_failure(finding) for finding in verdict.evidence.findings.values()] if shown else [],
         **({} if verdict.because is None else {"because_of": verdict.because.number}),
         **({} if verdict.scored else {"scored": False}),
         **({"expected_failure": {"reason": expected[0], "expires": expected[1]}} if expected else {}),
     }
+
+
+def _advice(verdict: Verdict) -> dict[str, str]:
+    """Return why a requirement that is not met matters and how to meet it; empty if it is met or nothing is known."""
+    topic = topic_of(verdict.requirement.id) if verdict.value in {Value.FAIL, Value.WARN} else None
+    return {"why": topic.why, "fix": topic.fix} if topic else {}
 
 
 def _cause(cause: Cause) -> dict[str, Any]:

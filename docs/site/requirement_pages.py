@@ -4,12 +4,12 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 
+from conformance.cli.explanation import EFFORTS, NEEDS, Explanation, explained, known, page_of
 from conformance.contract.classes import QUESTIONS, ConformanceClass, Origin
 from conformance.contract.generic import generic_classes
 from conformance.contract.ledger import Requirement
 from conformance.contract.pack import Contract
 from conformance.explaining.advice import FRAMEWORKS, Source, Topic, topics
-from conformance.explaining.explanation import EFFORTS, NEEDS, Explanation, explained, known, page_of
 from reports.formats.source_pages import page_of as clause_page
 
 _INDEX = """# Requirements

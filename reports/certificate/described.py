@@ -137,5 +137,20 @@ def _is_declared(code: str, declared: list[str]) -> bool:
 
 
 def described(result: Mapping[str, Any]) -> Described | None:
-    """Return what a result tells of the device's own description; None if it was judged by a contract."""
-    return Described(result["api"]) if "api" in result else None
+    """Return what a result tells of the device's own description; None if it was judged by a contract.
+
+    An operation has the findings that name it, and those of the web server whose request is a call of it.
+    """
+    if "api" not in result:
+        return None
+    aside = result.get("web_server", {}).get("requirements", ())
+    found = [(str(one.get("subject")), one.get("number")) for item in aside for one in item["failures"]]
+    operations = [
+        entry | {"findings": sorted({*entry.get("findings", ()), *_of(entry["operation"], found)})}
+        for entry in result["api"]["operations"]
+    ]
+    return Described({**result["api"], "operations": operations})
+
+
+def _of(operation: str, found: list[tuple[str, Any]]) -> list[int]:
+    return [number for subject, number in found if number and subject.partition("?")[0] == operation]

@@ -23,6 +23,8 @@ SHOWN_BODY = 3000
 """Characters shown of a request's or response's body."""
 SHOWN_CURL = 8000
 """Characters shown of a curl command; a longer one, as of a size attack, cannot be copied."""
+FIRST = 3
+"""Findings that the page begins with."""
 SHOWN_IDS = 12
 """Requirements of one reason that are listed; a longer list is folded, or counted."""
 
@@ -43,6 +45,7 @@ VIEWS = {
 }
 """What it means how a class was observed."""
 _ORDER = ("fail", "error", "warn", "skip", "pass", "not-claimed")
+_COLUMNS = ("pass", "fail", "warn", "error", "skip", "not-claimed")
 _CLASS_ORDER = ("fail", "inconclusive", "pass", "not-claimed")
 
 
@@ -58,21 +61,9 @@ class ClassSummary:
     view: str = ""
     """How it was observed, if that makes a difference: one of `VIEWS`."""
 
-    @property
-    def cases(self) -> int:
-        """Return the number of test cases that were executed for the class."""
-        return sum(requirement["cases"] for requirement in self.requirements)
-
-    def count(self, verdict: str, level: str | None = None) -> int:
-        """Return how many of the class's requirements have that verdict, of one level or of all levels."""
-        return sum(
-            requirement["verdict"] == verdict and level in (None, requirement["level"])
-            for requirement in self.requirements
-        )
-
-    def level(self, level: str) -> int:
-        """Return how many of the class's requirements have that level (MUST, SHOULD, ...)."""
-        return sum(requirement["level"] == level for requirement in self.requirements)
+    def count(self, verdict: str) -> int:
+        """Return how many of the class's requirements have that verdict."""
+        return sum(requirement["verdict"] == verdict for requirement in self.requirements)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,15 +147,16 @@ class Certificate:
 
     @property
     def robot(self) -> str:
-        """Return the robot's name, or its address if it has no name."""
-        name = self.result["statement"]["robot"].get("name")
+        """Return the robot's name, or else the title of its description, or its address."""
+        name = self.result["statement"]["robot"].get("name") or self.result.get("api", {}).get("title")
         return str(name or self.result["target"].get("rest") or "Unnamed robot")
 
     @property
     def maker(self) -> str:
-        """Return the robot's vendor and version as text, as far as the vendor states them."""
+        """Return the robot's vendor and version as far as they are stated, and the address of a described one."""
         robot = self.result["statement"]["robot"]
         parts = [robot.get("vendor"), f"version {robot['version']}" if robot.get("version") else None]
+        parts += [self.result["target"].get("rest")] if self.described else []
         return ", ".join(part for part in parts if part)
 
     @property
@@ -216,6 +208,30 @@ class Certificate:
     def subject(self) -> str:
         """Return the title of the specification that a conforming robot conforms to, "RoAAS" by default."""
         return str(self.result.get("pack", {}).get("title", "RoAAS"))
+
+    @property
+    def columns(self) -> list[tuple[str, str]]:
+        """Return each verdict that a requirement of a claimed class has, with its heading; they add up to all."""
+        words = verdict_words(self.result) | {"warn": "Warnings"}
+        return [(verdict, words[verdict]) for verdict in _COLUMNS if any(c.count(verdict) for c in self.claimed)]
+
+    @property
+    def seen_by(self) -> list[str]:
+        """Return how the claimed classes were observed: keys of `VIEWS`."""
+        return sorted({c.view for c in self.claimed} & set(VIEWS))
+
+    @property
+    def first(self) -> list[Finding]:
+        """Return what to do first: a finding each of the requirements to look at first, failures before warnings."""
+        found: dict[str, Finding] = {}
+        for finding in (*self.findings("fail"), *self.findings("warn")):
+            found.setdefault(finding.requirement["id"], finding)
+        return list(found.values())[:FIRST]
+
+    @property
+    def more_findings(self) -> int:
+        """Return how many findings there are beside `first`."""
+        return len(self.findings("fail")) + len(self.findings("warn")) - len(self.first)
 
     def findings(self, verdict: str) -> list[Finding]:
         """Return the findings (failures) of requirements with that verdict, the most urgent finding first."""

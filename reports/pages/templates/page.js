@@ -1,5 +1,21 @@
 "use strict";
-// Adds comfort to a page that is whole without it: copy buttons, a search box, and everything unfolded in print.
+// Adds comfort to a page that is whole without it: rows as cards on a phone, copy buttons, a search box, links that
+// unfold what they lead to, and everything unfolded in print.
+for (const table of document.querySelectorAll(".scroll > table:not(.matrix)")) {
+  const heads = Array.from(table.querySelectorAll("thead th"), (head) => head.textContent.trim());
+  for (const row of table.tBodies[0]?.rows ?? []) {
+    for (const cell of row.cells) if (cell.tagName === "TD" && cell.colSpan === 1) cell.dataset.label ??= heads[cell.cellIndex] ?? "";
+  }
+  table.classList.add("stacked");
+}
+const unfold = () => {
+  const wanted = location.hash.length > 1 && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  if (!wanted) return;
+  for (let part = wanted.closest("details"); part; part = part.parentElement.closest("details")) part.open = true;
+  wanted.scrollIntoView();
+};
+addEventListener("hashchange", unfold);
+unfold();
 for (const source of document.querySelectorAll("[data-copy]")) {
   const button = document.createElement("button");
   const word = source.dataset.copy || "Copy";

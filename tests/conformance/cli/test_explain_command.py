@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from conformance.cli.explanation import explained, known
 from conformance.contract.pack import Contract
 from conformance.explaining.advice import FRAMEWORKS, sources_of, topic_of, topics
-from conformance.explaining.explanation import explained, known
 from roaas import main
 
 CONTRACT = Contract.load()

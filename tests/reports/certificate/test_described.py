@@ -67,6 +67,16 @@ def test_findings_come_first_and_each_link_leads_somewhere(described_result):
         assert page.get_element_by_id(link[1:], None) is not None, f"{link} leads nowhere"
 
 
+def test_an_operation_with_a_finding_of_the_web_server_is_not_without_one(described_result):
+    clean = next(one for one in described_result["api"]["operations"] if one["called"] and not one["findings"])
+    failed = next(r for r in described_result["requirements"] if r["failures"])
+    failure = {**failed["failures"][0], "number": 77, "subject": f"{clean['operation']}?a=b"}
+    described_result["web_server"] = {"text": "x", "requirements": [{**failed, "failures": [failure]}]}
+    page = html.document_fromstring(certificate_html(described_result))
+    row = page.xpath(f"//tr[.//th[normalize-space() = '{clean['operation']}']]")[0]
+    assert row.xpath(".//a/@href") == ["#finding-77"]
+
+
 def test_a_requirement_with_many_findings_shows_all_that_the_matrix_links_to(described_result):
     failed = next(r for r in described_result["requirements"] if r["id"] == "robustness/no-server-error")
     example = failed["failures"][0]

@@ -17,6 +17,10 @@ def text(element):
     return " ".join(element.text_content().split())
 
 
+def section(page, id_):
+    return page.get_element_by_id(id_).xpath("ancestor::section[1]")[0]
+
+
 def words(message):
     """Return a message as the page shows it, with code in a typeface of its own and not between backticks."""
     return " ".join(message.replace("`", "").split()).rstrip(".")
@@ -57,12 +61,12 @@ def test_everything_is_in_it(result):
 
 def test_findings_come_in_their_order_under_their_causes(result):
     document = page(result)
-    section = document.get_element_by_id("found-fail").getparent()
-    numbers = [int(found.get("id").removeprefix("finding-")) for found in section.find_class("finding")]
+    failed = section(document, "found-fail")
+    numbers = [int(found.get("id").removeprefix("finding-")) for found in failed.find_class("finding")]
     assert numbers == sorted(
         f["number"] for r in result["requirements"] if r["verdict"] == "fail" for f in r["failures"]
     )
-    headings = [text(heading) for heading in section.find_class("cause")]
+    headings = [text(heading) for heading in failed.find_class("cause")]
     assert headings[0].startswith("No response")
     assert headings[-1].startswith("Rule not met")
     assert len(headings) == len({failure["cause"] for failure in failures(result)})
@@ -70,7 +74,7 @@ def test_findings_come_in_their_order_under_their_causes(result):
 
 def test_what_a_finding_blocks_is_told_with_it_and_links_back(result):
     document = page(result)
-    untested = document.get_element_by_id("untested").getparent()
+    untested = section(document, "untested")
     blocking = [cause for cause in result["causes"] if cause["blocks"]]
     assert len(blocking) > 1
     for cause in blocking:
@@ -94,6 +98,34 @@ def test_a_result_from_before_1_2_shows_what_was_done_expected_and_seen(older, r
         assert wanted in shown
 
 
+def test_it_begins_with_the_verdict_and_what_to_do_first(result):
+    failed = [r for r in result["requirements"] if r["verdict"] == "fail"]
+    for requirement in failed:
+        requirement["fix"] = f"Repair {requirement['id']}."
+    document = page(result)
+    heads = [head.get("id") for head in document.xpath("//h1 | //h2 | //*[@id='verdict']")]
+    assert heads[:4] == [None, "verdict", "first", "classes"]
+    steps = document.xpath("//ol[@class='first']/li")
+    assert len(steps) == min(3, len(failed))
+    for step in steps:
+        link = step.xpath(".//a/@href")[0]
+        finding = document.get_element_by_id(link[1:])
+        assert finding.tag == "details"
+        assert "How to fix it: Repair" in text(step)
+        assert "Got" in text(step)
+    shown = [head for head in document.xpath("//h2") if not head.xpath("ancestor::details")]
+    assert [head.get("id") for head in shown] == ["first", "classes"]
+
+
+def test_the_numbers_of_a_class_add_up(result):
+    table = page(result).xpath("//table")[0]
+    heads = [text(head) for head in table.xpath(".//thead//th")][2:]
+    for row in table.xpath(".//tbody/tr"):
+        *parts, whole = (int(cell.text_content()) for cell in row.xpath("./td")[1:])
+        assert sum(parts) == whole > 0
+    assert heads[-1] == "Requirements"
+
+
 def test_curl_is_copied_as_it_is(result):
     commands = {pre.text_content() for pre in page(result).iter("pre") if pre.get("data-copy") == "Copy"}
     assert {failure["request"]["curl"] for failure in failures(result)} <= commands
@@ -104,7 +136,7 @@ def test_untested_is_told_with_its_reason(result):
     assert sum(len(group.requirements) for group in groups) == [r["verdict"] for r in result["requirements"]].count(
         "skip"
     )
-    shown = text(page(result).get_element_by_id("untested").getparent())
+    shown = text(section(page(result), "untested"))
     for group in groups:
         assert group.reason[1:] in shown
 

@@ -4,6 +4,7 @@ Debian's Chromium shows the pages, as they are, in frames of a wrapper page, who
 """
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from reports.certificate.page import certificate_html
 from reports.latency.comparison import compare
 from reports.latency.comparison_page import comparison_html
 from reports.latency.page import latency_html
+from reports.pages.page import TEMPLATE_DIR
 
 DATA = Path(__file__).parents[1] / "data"
 WIDTHS = (1280, 390)
@@ -32,6 +34,8 @@ MEASURE = """(page, view) => {
       }),
     })),
     figures: page.querySelectorAll("figure").length,
+    height: page.documentElement.scrollHeight,
+    hidden: Array.from(page.querySelectorAll(".scroll"), (box) => box.scrollWidth - box.clientWidth),
     buttons: page.querySelectorAll("button").length,
     loaded: view.performance.getEntriesByType("resource").map((entry) => entry.name),
   };
@@ -82,6 +86,40 @@ def test_words_in_figures_are_readable(seen, page):
 @EACH
 def test_nothing_hangs_over_the_edge(seen, page):
     assert seen[page]["width"] <= int(page.split()[1])
+
+
+@EACH
+def test_a_certificate_is_short_and_no_table_hides_a_column_on_a_phone(seen, page):
+    name, width = page.split()
+    if name in {"certificate", "described"}:
+        assert seen[page]["height"] < {"1280": 6_000, "390": 12_000}[width]
+    if width == "390":
+        assert max(seen[page]["hidden"], default=0) <= 1
+
+
+def _contrast(one, other):
+    def luminance(colour):
+        parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+        red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts)
+        return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+    light, dark = sorted((luminance(one), luminance(other)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+@pytest.mark.parametrize("mode", [0, 1], ids=["light", "dark"])
+def test_words_are_readable_in_light_and_in_the_dark(mode):
+    # WCAG 2.1, 1.4.3.
+    style = (TEMPLATE_DIR / "page.css").read_text(encoding="utf-8")
+    blocks = [block for block in re.findall(r":root \{(.*?)\}", style, re.DOTALL) if "--ink" in block]
+    assert len(blocks) == 2
+    colours = dict(re.findall(r"--([\w-]+): (#\w+)", blocks[mode]))
+    colours["paper"] = colours["paper"].replace("#fff", "#ffffff")[:7]
+    for name in ("good", "bad", "warn", "quiet"):
+        assert _contrast(colours[name], colours[f"{name}-wash"]) >= 4.5, name
+        assert _contrast(colours["ink"], colours[f"{name}-wash"]) >= 4.5, name
+    for name in ("ink", "soft", "link", "good", "bad", "warn"):
+        assert _contrast(colours[name], colours["paper"]) >= 4.5, name
 
 
 @EACH
