@@ -58,9 +58,9 @@ class _Events:
         self._workload = workload
         self.label = ("", "")
 
-    def record(self, _: int, operation: int, due: int, start: int, *moments: int, queued: bool) -> None:
+    def record(self, _: int, operation: int, due: int, start: int, *moments: int, noticed: int) -> None:
         """Record a success; the moments are built, received, done and the server's time."""
-        del due, queued
+        del due, noticed
         self._fire(operation, (moments[2] - start) / 1e6, None)
 
     def failed(self, _: int, operation: int, error: CallError, due_ns: int, start_ns: int) -> None:
@@ -142,7 +142,7 @@ class RobotUser(User):
             return
         self._turn += 1
         self._caller.perform(
-            0, self.interface, self.client, OPERATIONS.index(operation), self._turn % VARIANTS, now_ns(), queued=False
+            0, self.interface, self.client, OPERATIONS.index(operation), self._turn % VARIANTS, now_ns()
         )
 
     @tag("pose")

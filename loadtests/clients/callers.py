@@ -82,9 +82,12 @@ class Caller:
         return fresh
 
     def perform(
-        self, segment: int, interface: str, client: str, operation: int, payload: int, due: int, *, queued: bool
+        self, segment: int, interface: str, client: str, operation: int, payload: int, due: int, *, noticed: int = 0
     ) -> bool:
-        """Send a request and record its outcome; returns whether it succeeded."""
+        """Send a request and record its outcome; returns whether it succeeded.
+
+        `due` and `noticed` are when it was to start, and when the pacer saw that no user was free (monotonic ns).
+        """
         recorder = self.recorder
         start = now_ns()
         try:
@@ -106,7 +109,7 @@ class Caller:
         except CallError as error:
             recorder.failed(segment, operation, error, due, start)
             return False
-        recorder.record(segment, operation, due, start, built, received, done, server_ns(timing), queued=queued)
+        recorder.record(segment, operation, due, start, built, received, done, server_ns(timing), noticed=noticed)
         return True
 
     def _library(self, interface: str, operation: int, payload: int) -> Any:

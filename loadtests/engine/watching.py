@@ -1,5 +1,6 @@
 """What happens while a plan is carried out: progress on standard error, and what ends the run before its time."""
 
+import math
 import os
 import sys
 from collections.abc import Callable
@@ -11,7 +12,11 @@ from loadtests.engine.liveness import Liveness
 from loadtests.measuring.distributed_executor import Executor
 from loadtests.measuring.errors import GeneratorError
 from loadtests.result.outcome import Carried, Outcome
+from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Plan
+from loadtests.schedule.rotation import rotation
+from loadtests.statistics.histogram import SHARES
+from loadtests.statistics.intervals import samples_for_point
 from loadtests.statistics.recorder import Recorder
 
 _OFTEN_S = 0.2
@@ -31,6 +36,28 @@ def tell_plan(plan: Plan, pacing: str) -> None:
         f"{' and '.join(plan.interfaces)} at {load} for {plan.load.duration_s:g} s after {plan.load.warmup_s:g} s of "
         f"warm-up, {plan.blocks} blocks, paced by {pacing}"
     )
+    if plan.open_model and (fewest := _fewest(plan)):
+        number, name = fewest
+        needed = samples_for_point(SHARES["p99"])
+        if number < needed:
+            longer_s = math.ceil(plan.load.duration_s * needed / number)
+            tell(f"p99 needs {needed:,} requests, and {name} gets {number:,}: --duration {longer_s} is long enough")
+
+
+def _fewest(plan: Plan) -> tuple[int, str] | None:
+    """Return how many requests the series with the fewest gets, and its operation; None without a series."""
+    schedule, found = Schedule(plan, 0, 1), []
+    for interface, client in dict.fromkeys(name[1:] for name in plan.series_names()):
+        offered = plan.offered(interface, client)
+        total = sum(
+            schedule.total(index)
+            for index, segment in enumerate(plan.segments)
+            if (segment.interface, segment.client) == (interface, client)
+            and (segment.phase == "duel" or (segment.phase == "aa" and plan.alone))
+        )
+        turns = rotation(offered, plan.weights)
+        found += [(total * turns.count(number) // len(turns), plan.operations[number]) for number in offered]
+    return min((each for each in found if each[0]), default=None)
 
 
 def show_web_ui(executor: Executor, host: str, port: int) -> None:

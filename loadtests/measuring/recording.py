@@ -15,6 +15,7 @@ from loadtests.schedule.segment import Segment
 from loadtests.statistics.recorder import Recorder
 
 NS = 1_000_000_000
+_FLUSH_S = 1.0
 AFTER_ERROR_S = 0.02  # closed model: users of a dead robot would spin on refused connections
 
 
@@ -41,6 +42,7 @@ class Recording:
         self.cpu_share: float | None = None
         self.after_segment: Callable[[], None] | None = None
         self.timeout_s = timeout_s
+        self._flushed = 0.0
         self._cpu: list[tuple[float, float]] = []
         self._block: tuple[int, float, float] | None = None
 
@@ -50,6 +52,8 @@ class Recording:
         self.series_of.update(plan.series_of())
         self.segments.update({plan.first_segment + index: segment for index, segment in enumerate(plan.segments)})
         self.origin_ns, self.offset_ns = origin_ns, int(plan.offset_s * NS)
+        since_s, until_s = plan.measured_s
+        self.recorder.window = (plan.first_segment, origin_ns + int(since_s * NS), origin_ns + int(until_s * NS))
         self._cpu, self._block = [], None
         gc.collect()
         gc.freeze()  # what exists now lives on: a collection in mid-run would look like a stall of the robot
@@ -73,8 +77,10 @@ class Recording:
         """In the gap before a segment, sort the recorded times into bins and read the processor time."""
         number = index + self.first
         now = self.look_at_processor(number)
-        self.recorder.flush()
         segment = self.segments[number]
+        if segment.gap or now[0] - self._flushed > _FLUSH_S:  # without a gap it delays what is due
+            self.recorder.flush()
+            self._flushed = now[0]
         if self._cpu and segment.phase != "warmup":
             spent = now[1] - self._cpu[0][1]
             elapsed = now[0] - self._cpu[0][0]

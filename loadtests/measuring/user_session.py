@@ -75,7 +75,7 @@ class Session(Recording):
                         arrival.operation,
                         arrival.payload % VARIANTS,
                         arrival.due_ns,
-                        queued=arrival.queued,
+                        noticed=arrival.noticed_ns,
                     )
                 finally:
                     self.busy -= 1

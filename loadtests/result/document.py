@@ -21,17 +21,17 @@ from loadtests.measuring.preflight import Findings
 from loadtests.measuring.robot_process import same_machine
 from loadtests.result.files import FORMAT
 from loadtests.result.outcome import Outcome, RunAborted
-from loadtests.schedule.arrivals import arrivals_due
 from loadtests.schedule.plan import Plan, step_operation
 from loadtests.schedule.segment import GAP_S
 from loadtests.settings.settings import Settings
-from loadtests.statistics import end_to_end, figures, modes, over_time, service_levels, steps, streams, verdict
+from loadtests.statistics import counts, end_to_end, figures, modes, over_time, service_levels, steps, streams, verdict
 from loadtests.statistics.against import EXIT_CODES, Against, against
 from loadtests.statistics.comparisons import AaControl, aa_controls, further_interfaces, soap_over_rest
 from loadtests.statistics.end_to_end import SHARED
 from loadtests.statistics.headline import Found, headline
 from loadtests.statistics.intervals import order_interval_ms
 from loadtests.statistics.measured import Measured
+from loadtests.statistics.overload import overload
 from loadtests.statistics.recorder import Recorder
 from loadtests.statistics.rounds import between_runs
 
@@ -106,7 +106,7 @@ def plan_words(settings: Settings, plan: Plan, pacing: str, parts: int) -> dict[
         "duration_s": load.duration_s * parts,
         "warmup_s": load.warmup_s,
         "block_s": round(plan.block_s, 6),
-        "gap_s": 0.0 if plan.scenario else GAP_S,
+        "gap_s": 0.0 if plan.scenario or plan.alone else GAP_S,
         "blocks": plan.blocks * parts,
         "seed": load.seed,
         "timeout_s": plan.timeout_s,
@@ -144,17 +144,23 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     executor, settings = outcome.executor, outcome.settings
     recorder = executor.recorder if executor else Recorder()
     measured = Measured([carried.plan for carried in outcome.carried] or [plan], recorder)
-    generator = _generator(outcome, measured)
+    generator = verdict.generator_figures(measured, outcome.cpu_share)
+    counted = counts.counts(measured, ((one.plan, one.elapsed_s) for one in outcome.carried))
     pacing = executor.pacing if executor else ""
     machine, spoilt = conditions(outcome.before, Moment.now())
     deviation = between_runs(machine, os.cpu_count() or 1, len(measured.repeats))
     comparisons = soap_over_rest(measured, deviation)
-    reasons, notes = ([str(aborted)], []) if aborted else verdict.invalid_because(generator, plan, pacing, spoilt)
+    reasons, notes = (
+        ([str(aborted)], []) if aborted else verdict.invalid_because(generator, counted, plan, pacing, spoilt)
+    )
     reasons = _endings(outcome, plan) + reasons + outcome.invalid
+    overloaded = None if aborted or reasons or outcome.interrupted else overload(measured, counted)
     undecided = (
         []
         if aborted or reasons
-        else [*_undecided(settings, generator), *verdict.says_nothing(comparisons), *_silent(outcome)]
+        else [overloaded.sentence()]
+        if overloaded
+        else [*_undecided(settings, counted), *verdict.says_nothing(comparisons), *_silent(outcome)]
     )
     workers, losses = process_figures(executor.members if executor else [])
     judged = [] if aborted else verdict.judge(measured, settings.thresholds)
@@ -167,7 +173,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     series = figures.series(measured, outcome.findings.sizes)
     for entry in series:
         entry.after_pause = _after_pause(outcome.paused.get(entry.name))
-        entry.modes = modes.modes(measured.total("duel", entry.name).service)
+        entry.modes = modes.modes(measured.total(entry.name, "duel").service)
     found = Found(
         measured.plan,
         settings.limits.max_rate,
@@ -179,6 +185,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         reasons,
         undecided,
         kept,
+        overloaded,
     )
     document = {
         "format": FORMAT,
@@ -194,6 +201,8 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "environment": describe(outcome.robots[0], settings.output, outcome.findings.servers, outcome.robot_process)
         | {"machine": machine},
         "plan": plan_words(settings, plan, pacing, 1 + max(one.part for one in measured.plans)),
+        "counts": counted,
+        "overload": overloaded,
         "generator": generator,
         "workers": workers,
         "series": series,
@@ -218,19 +227,11 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     return code, builtins
 
 
-def _undecided(settings: Settings, generator: verdict.GeneratorFigures) -> list[str]:
+def _undecided(settings: Settings, counted: counts.Counts) -> list[str]:
     """Return why failed requests leave nothing to compare, unless a service level judges those of each operation."""
     levels = [settings.slo.get(name) for name in settings.selection.operations]
     judged = all(level is not None and level.error_rate is not None for level in levels)
-    return [] if judged else verdict.failures(generator)
-
-
-def _generator(outcome: Outcome, measured: Measured) -> verdict.GeneratorFigures:
-    asked, active_s = 0, 0.0
-    for carried in outcome.carried:
-        asked += sum(arrivals_due(carried.plan, carried.elapsed_s, phase=phase) for phase in verdict.MEASURED_PHASES)
-        active_s += carried.plan.active_s(carried.elapsed_s, verdict.MEASURED_PHASES)
-    return verdict.generator_figures(measured, asked, active_s, outcome.cpu_share)
+    return [] if judged else verdict.failures(counted)
 
 
 def _after_pause(paused: Paused | None) -> dict[str, Any] | None:

@@ -1,5 +1,6 @@
 """The summary of a run, for the terminal."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from conformance.commandline.terminal import inert
@@ -36,6 +37,7 @@ def summary(document: dict[str, Any]) -> str:
             f"{entry['errors']:7}     {_ms(service['p50'])} {_ms(service['p90'])} {_ms(service['p99'])}      "
             f"{_ms(response['p99'])}"
         )
+    lines += _counts(document["counts"])
     lines += _medians(document)
     lines += _end_to_end(document.get("end_to_end"))
     lines += _against(document.get("against"))
@@ -54,6 +56,26 @@ def summary(document: dict[str, Any]) -> str:
     words, sentence = document["headline"]["words"], document["headline"]["sentence"]
     lines.append(sentence if sentence.startswith(words) else f"{words}. {sentence}")
     return "\n".join(map(inert, lines)) + "\n"
+
+
+def _counts(counts: Mapping[str, Any]) -> list[str]:
+    """Return what became of the requests as a table."""
+    offered, achieved, seconds = counts["asked_rate"], counts["achieved_rate"] or 0.0, counts["seconds"]
+    kinds = ", ".join(f"{number:,} {kind}" for kind, number in counts["failed"].items())
+    late = f", {counts['waiting_at_end']:,} of them when the time was over" if counts["waiting_at_end"] else ""
+    rows = [
+        ("asked", counts["asked"], f"{offered:,.1f}/s for {seconds:.1f} s" if offered else "by users that wait"),
+        ("sent", counts["sent"], ""),
+        ("answered", counts["answered"], f"{achieved:,.1f}/s{late}"),
+        ("failed", sum(counts["failed"].values()), kinds),
+        ("not sent", counts["not_sent"], "no connection was free until their deadline"),
+        ("lost", counts["lost"], "neither sent nor given up"),
+        ("in the series", counts["in_series"], "what the times are of"),
+        ("in the A/A control", counts["in_control"], "" if counts["control_only"] else "of those in the series"),
+        ("to the other robot", counts["other_robot"], ""),
+    ]
+    always = {"asked", "sent", "answered", "failed", "in the series"}
+    return [f"{name:18} {number:9,}  {said}".rstrip() for name, number, said in rows if number or name in always]
 
 
 def _medians(document: dict[str, Any]) -> list[str]:

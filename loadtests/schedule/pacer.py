@@ -22,14 +22,15 @@ from loadtests.schedule.arrivals import Schedule
 class Arrival(NamedTuple):
     """One request to send: its segment, operation and payload, and when it is due (monotonic ns).
 
-    `queued`: no user was free when it was due, so that its delay is due to the robot and not to the pacer.
+    `noticed_ns`: when the pacer saw that no user was free for it; 0: one was free. What it waits from then on is the
+    robot's doing, what it waited before is the generator's.
     """
 
     segment: int
     operation: int
     payload: int
     due_ns: int
-    queued: bool = False
+    noticed_ns: int = 0
 
 
 class Pacer:
@@ -171,13 +172,13 @@ class Pacer:
         while self._position < count:
             offset, operation, payload = due[self._position]
             at = origin + offset
-            if at > now_ns():
+            if at > (now := now_ns()):
                 break
             self._position += 1
             if idle:
                 idle.pop().switch(Arrival(self._segment, operation, payload, at))
             else:
-                self._backlog.append(Arrival(self._segment, operation, payload, at, queued=True))
+                self._backlog.append(Arrival(self._segment, operation, payload, at, now))
         self._arm(schedule)
 
     def _open_gate(self, schedule: Schedule) -> None:

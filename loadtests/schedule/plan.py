@@ -163,7 +163,7 @@ class Plan:
         if not self._rounds:
             return []
         made = self._steps() if self.step_rate is not None else [*self._warmup(), *self._duel()]
-        return [replace(segment, gap=False) for segment in made] if self.scenario else made
+        return [replace(segment, gap=False) for segment in made] if self.scenario or self.alone else made
 
     def active_s(self, elapsed_s: float, phases: tuple[str, ...]) -> float:
         """Return for how long requests of some phases could start in the segments that had ended by then."""
@@ -191,6 +191,17 @@ class Plan:
     def length_s(self) -> float:
         """Return the time from start to end."""
         return self.segments[-1].end_ns / _NS if self.segments else 0.0
+
+    @property
+    def measured_s(self) -> tuple[float, float]:
+        """Return when the measured part begins and ends, in seconds from the start."""
+        warm = [segment.end_ns for segment in self.segments if segment.phase == "warmup"]
+        return max(warm, default=0) / _NS, self.length_s
+
+    @property
+    def alone(self) -> bool:
+        """Return whether there is one side only: blocks of one interface, client and robot need no gaps between."""
+        return self.robots == len(self.interfaces) == len(self.clients) == 1
 
     def _warmup(self) -> list[Segment]:
         turns = [

@@ -129,7 +129,7 @@ def _overall(changes: Sequence[Change]) -> str:
 
 def _series(measured: Measured, name: SeriesName) -> dict[str, Any]:
     """Return the other robot's figures, which are fewer than this robot's in `series`."""
-    whole = measured.total("against", name)
+    whole = measured.total(name, "against")
     units, seed = measured.units(name, "service", "against"), measured.plan.load.seed
     return named(name) | {
         "count": whole.service.total,

@@ -95,7 +95,7 @@ def series(measured: Measured, sizes: dict[SeriesName, tuple[int, int]]) -> list
 
 
 def _one_series(measured: Measured, name: SeriesName, request: int | None, response: int | None) -> Series:
-    whole, spans = measured.total("duel", name), measured.spans("duel", name)
+    whole, spans = measured.total(name, "duel"), measured.spans("duel", name)
     service = measured.whole(name, "service")
     service_ms, reasons = quantiles(service)
     intervals: dict[str, dict[str, list[float] | None]] = {"service": {}, "response": {}}

@@ -10,6 +10,7 @@ from loadtests.schedule.plan import Plan
 from loadtests.statistics.against import DECIDING, NOT_SLOWER, SLOWER, UNCLEAR, Against, Change
 from loadtests.statistics.comparisons import AaControl, SoapOverRest
 from loadtests.statistics.figures import Series
+from loadtests.statistics.overload import Overload
 from loadtests.statistics.service_levels import BROKEN, NOT_KNOWN
 
 _ORDER = {"delivery": 0, "pose": 1, "coffee": 2}  # described operations: as they were named
@@ -21,6 +22,7 @@ _AGAINST = {
     UNCLEAR: "Inconclusive whether it is slower than the other robot",
 }
 _WORTHLESS = "Not valid: these figures say nothing about the robot"
+_OVERLOADED = "The robot is overloaded"
 _UNDECIDED = "This run is inconclusive"
 _NOTHING = "No series has enough successful requests for a figure."
 
@@ -36,6 +38,7 @@ class Found:
         worthless: why the figures say nothing about the robot.
         undecided: why the run has nothing to compare; thresholds are judged all the same.
         levels: outcomes of the service levels.
+        overload: how the robot was overloaded, if it was.
     """
 
     plan: Plan
@@ -48,6 +51,7 @@ class Found:
     worthless: Sequence[str] = field(default=())
     undecided: Sequence[str] = field(default=())
     levels: Sequence[str] = ()
+    overload: Overload | None = None
 
 
 def headline(found: Found) -> dict[str, str]:
@@ -55,10 +59,25 @@ def headline(found: Found) -> dict[str, str]:
     if found.worthless:
         return {"words": _WORTHLESS, "sentence": f"{_WORTHLESS}, because {'; '.join(found.worthless)}."}
     judged = "; ".join(filter(None, (_levels(found.levels), _thresholds(found.outcomes))))
+    if found.overload is not None:
+        sentence = found.overload.sentence()
+        return {"words": judged or _OVERLOADED, "sentence": f"{_OVERLOADED}: {sentence}.{_answered(found)}"}
     if found.undecided:
         return {"words": judged or _UNDECIDED, "sentence": f"{_UNDECIDED}, because {'; '.join(found.undecided)}."}
     words, sentence = _measured(found)
     return {"words": judged or words, "sentence": sentence + _two_modes(found.series)}
+
+
+def _answered(found: Found) -> str:
+    """Return a sentence on the requests that an overloaded robot answered: from when they were due, and when sent."""
+    series = [entry for entry in found.series if entry.service_ms[DECIDING] is not None]
+    if not series:
+        return ""
+    entry = min(series, key=_rank)
+    return (
+        f" Half of the {entry.operation} requests took {_ms(entry.response_ms[DECIDING])} ms or longer from when they "
+        f"were due, and {_ms(entry.service_ms[DECIDING])} ms or longer from when they were sent."
+    )
 
 
 def _thresholds(outcomes: Sequence[str]) -> str | None:

@@ -79,16 +79,19 @@ class Measured:
         """Return the numbers of the repeats."""
         return list(dict.fromkeys(plan.repeat for plan in self.plans))
 
-    def blocks(self, name: SeriesName, *phases: str, label: str | None = None) -> Iterator[Block]:
+    def blocks(self, name: SeriesName, *phases: str, label: str | None = None, alike: bool = True) -> Iterator[Block]:
         """Yield the blocks of a series in some phases, in order of time; those in which nothing happened are left out.
 
         Args:
             name: the series.
-            phases: which phases.
+            phases: which phases. Where one side is measured alone, its requests in the A/A control are like all others,
+                so that `duel` means both.
             label: only blocks of this label.
+            alike: whether `duel` may mean both.
         """
         operation, interface, client = name
         operation_number = self.plan.operations.index(operation)
+        phases = self.alike(phases) if alike else phases
         for plan in self.plans:
             for number, segment in enumerate(plan.segments, plan.first_segment):
                 if segment.phase not in phases or (segment.interface, segment.client) != (interface, client):
@@ -97,10 +100,14 @@ class Measured:
                 if cell is not None and label in {None, segment.label}:
                     yield Block(plan, number, segment, cell)
 
-    def total(self, phase: str, name: SeriesName) -> Cell:
+    def alike(self, phases: tuple[str, ...]) -> tuple[str, ...]:
+        """Return the phases whose requests are alike: the duel's and the A/A control's where there is only one side."""
+        return ("duel", "aa") if phases == ("duel",) and self.plan.alone else phases
+
+    def total(self, name: SeriesName, *phases: str) -> Cell:
         """Return the sum of a series' cells."""
         whole = Cell()
-        for block in self.blocks(name, phase):
+        for block in self.blocks(name, *phases):
             whole.merge(block.cell)
         return whole
 
@@ -135,5 +142,7 @@ class Measured:
     def spans(self, phase: str, name: SeriesName) -> Spans:
         """Return where a series' time went."""
         operation, interface, client = name
-        key = (SERIES.index((phase, interface, client)), self.plan.operations.index(operation))
-        return self.recorder.spans.get(key, Spans())
+        whole, number = Spans(), self.plan.operations.index(operation)
+        for each in self.alike((phase,)):
+            whole.merge(self.recorder.spans.get((SERIES.index((each, interface, client)), number), Spans()))
+        return whole

@@ -1,6 +1,6 @@
 """Records what happened, in memory that does not grow with the number of requests.
 
-A request is eight integers appended to a buffer; NumPy bins the buffer in the quiet gap between blocks. A cell holds
+A request is nine integers appended to a buffer; NumPy bins the buffer in the quiet gap between blocks. A cell holds
 the histograms of one operation in one segment of the plan (a block): the statistics resample blocks, and a series is
 their sum. The plan bounds the number of segments, and the histogram the number of bins. Cells add, so that those of
 several processes merge into exactly their union.
@@ -18,7 +18,7 @@ from loadtests.statistics.histogram import Histogram, Ints
 
 #: A start later than this after its time counts as late.
 LATE_NS = 1_000_000
-_FIELDS = 8
+_FIELDS = 9
 _BUFFERED = 4096 * _FIELDS
 #: How many operations a plan may have.
 MOST_OPERATIONS = 1024
@@ -33,7 +33,7 @@ class Cell:
         service, response: times of the successful requests.
         failed_service, failed_response: of the others, until they were given up, from the actual and from the
             intended start. A request that never started has its wait in both.
-        queued: how long arrivals waited because no user was free when they were due.
+        queued: how long arrivals waited for a user, from when the pacer saw that none was free.
         errors: requests that failed; late: started over 1 ms after their time; dropped: never started.
     """
 
@@ -112,6 +112,10 @@ class Recorder:
     Args:
         series_of: the series number of each segment (`Plan.series_of`); spans and errors are kept by series.
         listener: receives each buffer's response times, by series and operation.
+
+    Attributes:
+        window: the plan under way: its first segment, and when its measured part begins and ends (monotonic ns).
+        in_time, afterwards: successful responses that came within that part and after it, by the plan's first segment.
     """
 
     def __init__(
@@ -119,6 +123,7 @@ class Recorder:
     ) -> None:
         self.series_of = series_of if series_of is not None else {}
         self.listener = listener
+        self.window = (0, 0, 0)
         self._buffer = array("q")
         self._begin()
 
@@ -127,6 +132,8 @@ class Recorder:
         self.spans: defaultdict[tuple[int, int], Spans] = defaultdict(Spans)
         self.failures: dict[FailureKey, Failure] = {}
         self.counters: Counter[str] = Counter()
+        self.in_time: Counter[int] = Counter()
+        self.afterwards: Counter[int] = Counter()
         self.busy: dict[int, float] = {}
         self.faults: list[str] = []
 
@@ -141,12 +148,13 @@ class Recorder:
         done: int,
         server: int,
         *,
-        queued: bool = False,
+        noticed: int = 0,
     ) -> None:
-        """Record a successful request (moments in monotonic ns; `server` a duration, -1 when unknown)."""
-        self._buffer.extend(
-            (segment, -1 - operation if queued else operation, due, start, built, received, done, server)
-        )
+        """Record a successful request (moments in monotonic ns; `server` a duration, -1 when unknown).
+
+        `noticed` is when the generator saw that no connection was free for it; 0: one was free.
+        """
+        self._buffer.extend((segment, operation, due, start, built, received, done, server, noticed))
         if len(self._buffer) >= _BUFFERED:
             self.flush()
 
@@ -201,15 +209,18 @@ class Recorder:
             return
         rows = np.frombuffer(self._buffer, dtype=np.int64).reshape(-1, _FIELDS).copy()
         self._buffer = array("q")
-        queued = rows[:, 1] < 0
-        operations = np.where(queued, -1 - rows[:, 1], rows[:, 1])
-        keys = rows[:, 0] * MOST_OPERATIONS + operations
+        plan, since, until = self.window
+        done = rows[:, 6]
+        self.in_time[plan] += int(((done >= since) & (done <= until)).sum())
+        self.afterwards[plan] += int((done > until).sum())
+        keys = rows[:, 0] * MOST_OPERATIONS + rows[:, 1]
         for key in np.unique(keys).tolist():
             chosen = keys == key
-            self._bin(key // MOST_OPERATIONS, key % MOST_OPERATIONS, rows[chosen], queued[chosen])
+            self._bin(key // MOST_OPERATIONS, key % MOST_OPERATIONS, rows[chosen])
 
-    def _bin(self, segment: int, operation: int, rows: Ints, queued: Ints) -> None:
-        due, start, built, received, done, server = (rows[:, column] for column in range(2, _FIELDS))
+    def _bin(self, segment: int, operation: int, rows: Ints) -> None:
+        due, start, built, received, done, server, noticed = (rows[:, column] for column in range(2, _FIELDS))
+        queued = noticed > 0
         cell = self.cells[segment, operation]
         cell.service.record(done - start)
         response = Histogram()
@@ -218,14 +229,14 @@ class Recorder:
         if self.listener is not None:
             self.listener(self.series_of.get(segment, -1), operation, response)
         cell.late += int(((start - due > LATE_NS) | queued).sum())
-        cell.queued.record(np.maximum((start - due)[queued.astype(bool)], 0))
+        cell.queued.record(np.maximum((start - noticed)[queued], 0))
         spans = self.spans[self.series_of.get(segment, -1), operation]
         told = np.clip(server, 0, received - built)  # the robot's clock may be coarser than ours
         spans.build.record(built - start)
         spans.wire.record(received - built - told)
         spans.server.record(told[server >= 0])
         spans.parse.record(done - received)
-        spans.lag.record(np.maximum((start - due)[~queued.astype(bool)], 0))
+        spans.lag.record(np.maximum(np.where(queued, noticed, start) - due, 0))
 
     def merge(self, other: Self) -> None:
         """Add all records of another recorder."""
@@ -236,6 +247,8 @@ class Recorder:
         for kind, failure in other.failures.items():
             self._add(kind, replace(failure))
         self.counters.update(other.counters)
+        self.in_time.update(other.in_time)
+        self.afterwards.update(other.afterwards)
         for segment, share in other.busy.items():
             self.was_busy(segment, share)
         for message in other.faults:
@@ -263,6 +276,8 @@ class Recorder:
                 for key, failure in self.failures.items()
             ],
             "counters": dict(self.counters),
+            "in_time": list(self.in_time.items()),
+            "afterwards": list(self.afterwards.items()),
             "busy": list(self.busy.items()),
             "faults": self.faults,
         }
@@ -281,6 +296,8 @@ class Recorder:
         for series, operation, kind, message, count, first, last in packed["failures"]:
             made.failures[series, operation, kind] = Failure(message, count, first, last)
         made.counters.update(packed["counters"])
+        made.in_time.update(dict(packed["in_time"]))
+        made.afterwards.update(dict(packed["afterwards"]))
         made.busy.update(packed["busy"])
         made.faults = packed["faults"]
         return made

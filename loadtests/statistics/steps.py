@@ -93,7 +93,7 @@ def step_result(plan: Plan, recorder: Recorder, interface: str, operation: str, 
     measured, name = Measured([plan], recorder), (operation, interface, "wire")
     asked = arrivals_due(plan, plan.length_s, phase="step", interface=interface)
     seconds = sum(segment.active_s for segment in plan.segments if segment.interface == interface)
-    whole, last = measured.total("step", name), Histogram()
+    whole, last = measured.total(name, "step"), Histogram()
     for block in measured.blocks(name, "step"):
         last = block.cell.response
     achieved = _answered_in_time(whole.service.total, last, seconds)

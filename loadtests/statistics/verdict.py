@@ -9,16 +9,13 @@ from scipy import special
 from conformance.papers_robot.thresholds import Threshold
 from loadtests.schedule.plan import Plan
 from loadtests.statistics.comparisons import SoapOverRest
+from loadtests.statistics.counts import Counts
 from loadtests.statistics.figures import Figures, plain_quantiles, rounded
 from loadtests.statistics.histogram import SHARES, Histogram, edges_us
 from loadtests.statistics.intervals import figure_interval_ms
 from loadtests.statistics.measured import Measured
-from loadtests.statistics.recorder import Cell
 
-MEASURED_PHASES = ("duel", "aa", "against")
 MOST_CPU = 0.95
-#: Where the generator is this busy in a block, arrivals that wait for a free connection wait for the generator.
-BUSY_CPU = 0.9
 #: How late requests may start, as a share of the median and of the p99 of the service time.
 MOST_LAG = {"p50": 0.10, "p99": 0.20}
 #: A process needs this long to wake up: a shorter lag is not held against the generator.
@@ -33,60 +30,36 @@ class GeneratorFigures(msgspec.Struct, kw_only=True):
     cpu_share: float | None
     lag_ms: Figures
     lag_limits_ms: Figures
-    queued_by_generator: int
     real_time: bool
-    asked_rate: float | None
-    achieved_rate: float | None
-    scheduled: int
-    started: int
-    completed: int
     late: int
-    dropped: int
-    errors: int
-    error_share: float
     connects: int
     resends: int
 
 
-def generator_figures(measured: Measured, asked: int, active_s: float, cpu_share: float | None) -> GeneratorFigures:
+def generator_figures(measured: Measured, cpu_share: float | None) -> GeneratorFigures:
     """Return figures on the load generator, over all measured phases.
 
     Args:
         measured: the records.
-        asked: how many arrivals should have started so far.
-        active_s: for how long blocks were open, together.
         cpu_share: the busiest worker's share of a core.
     """
     plan, counters = measured.plan, measured.recorder.counters
-    lag, service = Histogram(), Histogram()
-    total, queued = Cell(), 0
+    lag, service, late = Histogram(), Histogram(), 0
     for name in plan.series_names():
-        for phase in MEASURED_PHASES:
-            cell = measured.total(phase, name)
-            total.merge(cell)
+        for phase in ("duel", "aa", "against"):
+            if phase == "aa" and plan.alone:
+                continue  # those of the duel are both
+            cell = measured.total(name, phase)
+            late += cell.late
             if name[2] == plan.clients[0]:
                 service.merge(cell.service)
                 lag.merge(measured.spans(phase, name).lag)
-                for block in measured.blocks(name, phase):
-                    if measured.recorder.busy.get(block.number, 0.0) >= BUSY_CPU:
-                        queued += block.cell.queued.total
-                        lag.merge(block.cell.queued)
-    started = total.service.total + total.errors
     return GeneratorFigures(
         cpu_share=rounded(cpu_share),
         lag_ms=plain_quantiles(lag),
         lag_limits_ms=_lag_limits(service),
-        queued_by_generator=queued,
         real_time=counters.get("real time", 0) > 0,
-        asked_rate=rounded(asked / active_s) if plan.open_model and active_s > 0 else None,
-        achieved_rate=rounded(started / active_s) if active_s > 0 else None,
-        scheduled=asked if plan.open_model else started,
-        started=started,
-        completed=total.service.total,
-        late=total.late,
-        dropped=total.dropped,
-        errors=total.errors,
-        error_share=round(total.errors / started, 6) if started else 0.0,
+        late=late,
         connects=counters.get("connects", 0),
         resends=counters.get("resends", 0),
     )
@@ -102,19 +75,20 @@ def _lag_limits(service: Histogram) -> Figures:
 
 
 def invalid_because(
-    figures: GeneratorFigures, plan: Plan, pacing: str, spoilt: Sequence[str]
+    figures: GeneratorFigures, counts: Counts, plan: Plan, pacing: str, spoilt: Sequence[str]
 ) -> tuple[list[str], list[str]]:
     """Return the reasons why the figures say nothing about the robot, and notes.
 
     Args:
         figures: on the load generator.
+        counts: of the requests.
         plan: the plan that the generator had to carry out.
         pacing: the clock that started the requests.
         spoilt: remarks on the generator's machine, which may have made requests late.
     """
     reasons: list[str] = []
     notes: list[str] = []
-    if not figures.completed:
+    if not counts.answered:
         reasons.append("no request succeeded: nothing was measured")
     if figures.cpu_share is not None and figures.cpu_share > MOST_CPU:
         reasons.append(
@@ -124,17 +98,8 @@ def invalid_because(
     if plan.open_model:
         # Two robots are compared by their service times, which begin at the actual start: lag affects both alike.
         (notes if plan.robots > 1 else reasons).extend(_late(figures, pacing, spoilt))
-        accounted = figures.started + figures.dropped
-        if figures.scheduled and accounted < LEAST_ACHIEVED * figures.scheduled:
-            share = accounted / figures.scheduled
-            reasons.append(
-                f"only {accounted} of {figures.scheduled} scheduled requests were accounted for ({share:.0%})"
-            )
-    if figures.queued_by_generator:
-        notes.append(
-            f"{figures.queued_by_generator} requests waited for a free connection while the generator was busy: "
-            "their wait counts as the generator's lag"
-        )
+        if counts.lost > (1 - LEAST_ACHIEVED) * counts.asked:
+            reasons.append(f"{counts.lost} of {counts.asked} requests were neither sent nor given up")
     if figures.resends:
         reasons.append(f"a client library silently retried {figures.resends} requests")
     return reasons, notes
@@ -153,13 +118,13 @@ def _late(figures: GeneratorFigures, pacing: str, spoilt: Sequence[str]) -> list
     return [f"requests started {' and '.join(late)} after their time ({pacing}): {causes}{hint}"]
 
 
-def failures(figures: GeneratorFigures) -> list[str]:
+def failures(counts: Counts) -> list[str]:
     """Return why the robot's failures leave nothing to compare; thresholds are judged all the same."""
-    found = []
-    if figures.error_share > MOST_ERRORS:
-        found.append(f"{figures.errors} of {figures.started} requests failed ({figures.error_share:.1%})")
-    if figures.dropped > MOST_ERRORS * max(1, figures.scheduled):
-        found.append(f"{figures.dropped} of {figures.scheduled} requests never started: no connection was free in time")
+    found, failed = [], sum(counts.failed.values())
+    if failed > MOST_ERRORS * counts.sent:
+        found.append(f"{failed} of {counts.sent} requests failed ({failed / counts.sent:.1%})")
+    if counts.not_sent > MOST_ERRORS * max(1, counts.asked):
+        found.append(f"{counts.not_sent} of {counts.asked} requests never started: no connection was free in time")
     return found
 
 

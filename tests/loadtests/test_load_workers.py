@@ -182,13 +182,13 @@ def test_any_number_of_workers_measures_a_described_device_alike(network, device
         )
         join(*(worker(own_clock=place % 2 == 1) for place in range(number)))
         run = finish()
-        told = run.result["generator"]
+        told = run.result["counts"]
         requests = [entry["requests"] for entry in run.result["workers"]]
-        missing = told["dropped"] + sum(entry["arrivals_lost"] for entry in run.result["workers"])
-        assert (len(requests), sum(requests)) == (number, told["started"])
-        assert told["scheduled"] == told["started"] + missing, run.err
+        missing = told["not_sent"] + sum(entry["arrivals_lost"] for entry in run.result["workers"])
+        assert (len(requests), sum(requests)) == (number, told["sent"])
+        assert told["asked"] == told["sent"] + missing, run.err
         assert max(requests) - min(requests) <= 4 + missing, "each has its share"
-        assert (told["asked_rate"], told["errors"]) == (pytest.approx(30, rel=0.03), 0)
+        assert (told["asked_rate"], told["failed"]) == (pytest.approx(30, rel=0.03), {})
         # A machine that is busy with other work delays responses by as much as requests.
         median = run.series("GET /state", "rest")["service_ms"]["p50"]
         assert 150 <= median < 300 + 3 * told["lag_ms"]["max"], told["lag_ms"]
@@ -220,8 +220,8 @@ def test_workers_run_their_own_copy_of_a_scenario(device, worker, begin, tmp_pat
     join(worker(own_clock=True), worker())
     run = finish()
     assert [entry["state"] for entry in run.result["workers"]] == ["finished"] * 2
-    assert run.result["generator"]["achieved_rate"] == pytest.approx(30, rel=0.35)
-    assert run.result["generator"]["errors"] == 0
+    assert run.result["counts"]["achieved_rate"] == pytest.approx(30, rel=0.35)
+    assert run.result["counts"]["failed"] == {}
 
 
 @pytest.mark.parametrize(

@@ -223,8 +223,8 @@ def test_arrivals_wait_for_a_user_when_all_are_busy_and_are_dropped_after_their_
     taken, dropped, _ = paced(plan, 1, work=0.05, timeout_ns=100_000_000)
     assert len(taken) < len(everything(plan))
     assert dropped
-    assert any(arrival.queued for arrival, _ in taken)
-    assert not taken[0][0].queued
+    assert any(arrival.noticed_ns for arrival, _ in taken)
+    assert not taken[0][0].noticed_ns
 
 
 def test_users_of_the_closed_model_go_on_as_soon_as_they_are_done():

@@ -74,9 +74,11 @@ def recorded(events):
             recorder.fail(segment, operation, error, f"{error} of {lag}", lag)
             recorder.count("connects")
         else:
-            start = 10**10 + lag
+            start, noticed = 10**10 + lag, (10**10 + lag // 2) * queued
             received = start + service // 2
-            recorder.record(segment, operation, 10**10, start, start, received, start + service, server, queued=queued)
+            recorder.record(
+                segment, operation, 10**10, start, start, received, start + service, server, noticed=noticed
+            )
     return recorder
 
 
