@@ -221,7 +221,7 @@ def test_a_worker_that_is_killed_is_missed_and_named_and_one_that_was_silent_is_
     assert abs(lost["requests"] + lost["arrivals_lost"] - kept["requests"]) <= 4, "nothing is lost without being missed"
     assert any("was lost" in note for note in result["notes"])
     assert run.code == 4
-    assert any("accounted for" in reason for reason in result["invalid_because"])
+    assert any("neither sent nor given up" in reason for reason in result["invalid_because"])
 
 
 @pytest.mark.parametrize("option", ["--master-port", "--web-port", "--metrics-port"])
