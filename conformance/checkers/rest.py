@@ -6,7 +6,6 @@ from typing import Final
 from conformance.api.rest.request_context import RequestContext
 from conformance.checkers import conditional, declared, fields, problem
 from conformance.checkers.changes import Changes
-from conformance.checkers.contents import Contents
 from conformance.checkers.entity_tags import EntityTags
 from conformance.checkers.identities import Identities, Uniques
 from conformance.checkers.lists import Lists
@@ -43,7 +42,7 @@ class RestCheckers:
         self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
         self._over_time = (
             conditional.Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
-            self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(),
+            self._writes, Uniques(), self._changes, declared.WriteOnly(),
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:

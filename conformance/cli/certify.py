@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import gc
 import sys
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from conformance.api.call_rules import CallRules, told
+from conformance.cli.certify_drive import checked, drive_options, with_map
 from conformance.cli.certify_init import init, init_described
 from conformance.cli.certify_options import CertifyOptions
 from conformance.cli.summary import print_summary
@@ -45,6 +45,9 @@ Judge a device by its own OpenAPI description or WSDL. Only what reads is called
 Call operations that change something as well:
   roaas certify http://robot:8000/openapi.json --call 'POST /api/move/*'
 
+See whether it moves and stops as told; this moves it:
+  roaas certify http://robot:8000/openapi.json --drive 'PUT /velocity' --allow-motion
+
 Write down what is known of the device in a file, which later runs are given:
   roaas certify http://robot:8000/openapi.json --init roaas.toml"""
 
@@ -74,6 +77,7 @@ Write down what is known of the device in a file, which later runs are given:
 @click.option(
     "--allow-motion", is_flag=True, help="Allow the suite to move the robot; most of the paper's contract needs that."
 )
+@drive_options
 @click.option(
     "--request-rate", type=click.FloatRange(min=1), metavar="R", help="At most R requests per second, 1 or more."
 )
@@ -153,6 +157,10 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> Comma
     options = CertifyOptions.of(given)
     if options.as_json and (options.plan or options.init):
         raise click.UsageError("--json prints the result of a run, and --plan and --init have none: give one of them")
+    source, statement = None, None
+    if not options.fleet:
+        source, statement = told_apart(named_or_usual(targets, given), options.openapi or options.wsdl)
+    options = checked(options, named=bool(source or statement))
     if options.fleet:
         from conformance.cli.certify_fleet import certify_fleet  # noqa: PLC0415 - one robot needs nothing of it
 
@@ -163,7 +171,6 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> Comma
         return certify_fleet(Path(options.fleet), options)
     if options.parallel is not None:
         raise click.UsageError("--parallel says how many robots of a --fleet are judged at once: give --fleet")
-    source, statement = told_apart(named_or_usual(targets, given), options.openapi or options.wsdl, new=options.init)
     try:
         done = _judge(door, source, statement, options)
     except UnreachableError as unreachable:
@@ -205,6 +212,8 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
     notary = door.notary(Path(options.key), str(contract.directory)) if options.key else None
     if options.plan:
         return _plan(chosen, options, contract)
+    if options.drive:
+        judged = with_map(judged, options, _run(chosen, options, contract), source)
     outcome = _certify(door, judged, options, statement)
     if outcome.unwritten:
         print_summary(outcome)
@@ -293,16 +302,8 @@ def _notes(run: Run) -> tuple[str, ...]:
         f"Class {name} is not claimed: the robot's {' and '.join(missing)} interface has no address."
         for name, missing in run.statement.lacking(run.contract).items()
     ]
-    operations = operations_of(run.contract) if run.contract.openapi_path else ()
-    labels = [one.label for one in operations]
-    for pattern in CallRules.of(run).unused(operations):
-        near = difflib.get_close_matches(pattern, labels, 1)
-        meant = f"; did you mean {near[0]!r}?" if near else "."
-        notes.append(f"The pattern {pattern!r} matches no operation of the description{meant}")
-    if run.allow_motion and not (run.contract.is_claimed or run.statement.motion_map):
-        notes.append(
-            "--allow-motion allows nothing here, as the statement has no motion map: --call allows operations."
-        )
+    unused = CallRules.of(run).unused(operations_of(run.contract)) if run.contract.openapi_path else ()
+    notes += [f"The pattern {one!r} matches no operation of the description." for one in unused]
     if run.contract.is_claimed and not run.allow_motion:
         notes.append("Without --allow-motion nothing was sent that moves the robot; what needs motion is skipped.")
     return tuple(notes)

@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
+from conformance.api.call_rules import CallRules
 from conformance.target.naming import DeviceOptions
 
 
@@ -31,6 +32,20 @@ class CertifyOptions(DeviceOptions):
     key: str | None = None
     progress: str = "auto"
     as_json: bool = False
+    drive: str | None = None
+    read: str | None = None
+    yes: bool = False
+    save_map: Path | None = None
+
+    @property
+    def moves(self) -> bool:
+        """Whether the class ``motion`` is judged without a statement that has a map."""
+        return self.drive is not None
+
+    @property
+    def calls(self) -> CallRules:
+        """What the options alone say of what may be called."""
+        return CallRules(self.allow, self.never)
 
     def check_nonce(self) -> None:
         """Check that the seed follows from the nonce, where there is one.

@@ -39,6 +39,7 @@ def print_summary(outcome: Certification) -> None:
         click.echo(f"error: {inert(next(reasons, 'the robot could not be reached'))}", err=True)
         return
     click.echo(f"{inert(document['refused'])}\n" if "refused" in document else "")
+    _print_answers(document.get("motion", ()))
     for name, value in document["classes"].items():
         reason = document["class_reasons"].get(name, "")
         view = " (black box)" if document["class_views"].get(name) == "black box" else ""
@@ -78,6 +79,17 @@ def print_summary(outcome: Certification) -> None:
         f"\n{document['verdict_line']}{accepted}: {told}; "
         f"{counted(document['requests'], 'request')} in {document['duration_s']:.1f} s, seed {document['seed']}"
     )
+
+
+def _print_answers(found: Sequence[Mapping[str, str]]) -> None:
+    """Print the answers to the questions that a user of a moving device asks first."""
+    for one in found:
+        mark = click.style(
+            f"{one['answer']:<9}", fg=_COLOURS[{"yes": "pass", "no": "fail"}.get(one["answer"], "inconclusive")]
+        )
+        click.echo(f"  {one['question']:<42} {mark} {inert(one['figure'])}".rstrip())
+    if found:
+        click.echo()
 
 
 def warning(document: Mapping[str, Any], which: str = "") -> str:

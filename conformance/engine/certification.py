@@ -19,6 +19,7 @@ from conformance.contract.classes import Prerequisite
 from conformance.contract.described import MOTION, SOAP
 from conformance.engine.checks_plugin import ChecksPlugin
 from conformance.engine.interruption import remembered
+from conformance.engine.motion_answers import answers
 from conformance.engine.planning import conftests, pytest_options
 from conformance.engine.progress import Progress
 from conformance.engine.resending import look_again, mask
@@ -190,6 +191,8 @@ def _concluded(
         notes=remarks,
         interrupted=run.interrupted,
     )
+    if found := answers(run.statement.motion_map, verdicts, recordings):
+        document["motion"] = found
     document = SECRETS.masked_json(document)
     path, unwritten = _written(document, recordings, out)
     if run.interrupted or unwritten:

@@ -1,5 +1,6 @@
 """The implementation conformance statement: what a vendor declares about a device, and what it is judged by."""
 
+import tomllib
 from pathlib import Path
 from typing import Any, Self
 
@@ -163,6 +164,18 @@ class _Claims(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 class _Map(msgspec.Struct, frozen=True):
     motion: MotionMap
+
+
+def motion_map_of(text: str, where: str) -> MotionMap:
+    """Return a motion map from its TOML; ``where`` is the beginning of messages.
+
+    Raises:
+        StatementError: it is none.
+    """
+    try:
+        return fit(tomllib.loads(text), _Map, where, StatementError).motion
+    except tomllib.TOMLDecodeError as error:
+        raise StatementError(f"{where} is no TOML: {error}") from error
 
 
 class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -1,0 +1,136 @@
+"""``roaas certify --drive``: find a device's axes by driving it a little, after asking once, and judge its motion."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+import msgspec
+from click.core import ParameterSource
+
+from conformance.commandline.atomic_write import write_atomically
+from conformance.commandline.terminal import inert
+from conformance.contract.described import MOTION
+from conformance.contract.toml_file import basic_string
+from conformance.documents.openapi import operations_of
+from conformance.statement.statement import Calls, StatementError, motion_map_of
+from conformance.target.naming import Judged
+
+if TYPE_CHECKING:
+    from conformance.cli.certify_options import CertifyOptions
+    from conformance.verdict.run import Run
+
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+_OPTIONS = (
+    click.option(
+        "--drive",
+        metavar="OPERATION",
+        help="Judge how the robot moves, without a file: 'PUT /velocity' commands it. Its axes are found by driving it "
+        "a little; asks before it moves.",
+    ),
+    click.option("--read", metavar="OPERATION", help="With --drive: 'GET /state' tells where it is.  [default: found]"),
+    click.option("--yes", is_flag=True, help="With --drive: move the robot without asking."),
+    click.option(
+        "--save-map",
+        type=click.Path(dir_okay=False, path_type=Path),
+        metavar="FILE",
+        help="With --drive: write a statement with the map that was found.",
+    ),
+)
+
+
+def drive_options(command: _Command) -> _Command:
+    """Add the options of a run that finds the motion map by itself."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def checked(options: CertifyOptions, *, named: bool) -> CertifyOptions:
+    """Return the options of a run; one with --drive judges motion alone, quickly, unless they say otherwise.
+
+    Args:
+        options: as they are given.
+        named: whether a description or a statement is named.
+
+    Raises:
+        click.UsageError: they do not fit together, or nobody can be asked.
+    """
+    if options.drive is None:
+        given = {"--read": options.read, "--yes": options.yes, "--save-map": options.save_map}
+        for name in (name for name, value in given.items() if value):
+            raise click.UsageError(f"{name} says more on --drive: give --drive 'METHOD /path' as well")
+        return options
+    for name, value in (("--init", options.init), ("--plan", options.plan), ("--fleet", options.fleet)):
+        if value:
+            raise click.UsageError(f"--drive moves one robot, and {name} does not: give one of them")
+    if not named:
+        raise click.UsageError("--drive goes by the device's own description: name its URL or file")
+    if not options.allow_motion:
+        raise click.UsageError("--drive moves the robot: give --allow-motion, and give the robot room")
+    if options.save_map and options.save_map.exists() and not options.force:
+        raise click.UsageError(f"{options.save_map} exists already; --force overwrites it")
+    if not (options.yes or sys.stdin.isatty()):
+        raise click.UsageError("--drive asks before the robot moves, and nobody can answer here: give --yes")
+    default = click.get_current_context().get_parameter_source("effort") is ParameterSource.DEFAULT
+    classes = options.classes if options.classes or options.profile else (MOTION,)
+    return replace(options, classes=classes, effort="quick" if default else options.effort)
+
+
+def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | None) -> Judged:
+    """Show what would be driven, ask, drive the robot a little, and return what is judged with the map of that.
+
+    Raises:
+        StatementError: the statement has a map, or no map could be found; the message says why.
+        KeyboardInterrupt: nobody wants it to move.
+    """
+    # What talks to a device is imported late: --help need not pay for it.
+    from conformance.api.permission import Permission  # noqa: PLC0415
+    from conformance.api.rest.interface import RestInterface  # noqa: PLC0415
+    from conformance.engine.finding import plan_of  # noqa: PLC0415
+    from conformance.engine.found_positions import PositionFinder  # noqa: PLC0415
+    from conformance.engine.found_velocities import VelocityFinder  # noqa: PLC0415
+    from conformance.scenarios.motion.binding import binding_of  # noqa: PLC0415
+    from conformance.scenarios.scenario import NotPossibleError  # noqa: PLC0415
+    from conformance.target.connecting import connection_of  # noqa: PLC0415
+    from conformance.transport.client import HttpClient  # noqa: PLC0415
+    from conformance.transport.exchange import NoAnswerError  # noqa: PLC0415
+
+    statement = judged.statement
+    if MOTION not in judged.contract.classes:
+        raise StatementError("--drive is for a device that is judged by its own description: name its URL or file")
+    if statement.motion_map is not None:
+        raise StatementError("the statement has a motion map: leave --drive out, or take [motion] out")
+    drive = options.drive or ""
+    try:
+        plan = plan_of(operations_of(judged.contract), drive, options.read, options.calls)
+        for line in plan.told():
+            click.echo(inert(line), err=True)
+        if not options.yes and not click.confirm("May the robot move?", err=True):
+            raise KeyboardInterrupt
+        calls = Calls((*statement.calls.allow, plan.drive.label), statement.calls.never)
+        run.statement = msgspec.structs.replace(statement, calls=calls)
+        connection = connection_of(statement.endpoints)
+        connection.permit = Permission(run).refusal
+        api = RestInterface(run, HttpClient(statement.endpoints.rest or "", connection))
+        finder = VelocityFinder if plan.is_velocity else PositionFinder
+        found = finder(api, binding_of(api), plan).found()
+        api.client.close()
+    except NoAnswerError as none:
+        raise StatementError(f"--drive: {none}") from none
+    except NotPossibleError as reason:
+        raise StatementError(f"--drive: {reason}") from reason
+    text = "\n".join(found.lines)
+    for line in ("", "# The motion map that was found:", *found.lines, ""):
+        click.echo(inert(line), err=True)
+    motion = motion_map_of(text, f"the map of {drive}")
+    if options.save_map:
+        where = f"[api]\nopenapi = {basic_string(source)}\n\n" if source else ""
+        write_atomically(options.save_map, f"{where}{text}\n")
+        click.echo(f"wrote {options.save_map}", err=True)
+    notes = tuple(f"Found by driving: {note}" for note in found.notes)
+    return Judged(msgspec.structs.replace(statement, motion_map=motion), judged.contract, (*judged.remarks, *notes))

@@ -1,0 +1,211 @@
+"""What a request of an operation commands: the numbers of its body and path, their limits, and a body for them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from conformance.documents.json_schema import Schema, is_numeric
+from conformance.documents.openapi import Operation, is_json
+
+_LASTS: Final = re.compile(r"duration|seconds|timeout|time|hold|ttl", re.IGNORECASE)
+_TURNS: Final = re.compile(
+    r"angular|angle|yaw|roll|pitch|turn|rot|theta|omega|heading|azimuth|orientation|\b[rw][xyz]\b|pan|tilt|joint",
+    re.IGNORECASE,
+)
+# What a moment, a count or an id says is no axis.
+NO_AXIS: Final = re.compile(
+    r"^(?:n?anosec|nsec|sec|secs|stamp|timestamp|time|seq|sequence|id|uid|number|count|index|version|covariance"
+    r"|clientid|transactionid|clienttransactionid|servertransactionid|errornumber|battery|uptime)$|_(?:id|count)$",
+    re.IGNORECASE,
+)
+_DEPTH: Final = 6
+_FORMS: Final = ("application/x-www-form-urlencoded", "multipart/form-data")
+# Of the declared limit a robot is driven at that part; without limits, in rad and in m.
+_PART, _TURN, _WAY = 0.1, 0.1, 0.05
+
+
+@dataclass(frozen=True)
+class Commanded:
+    """A number that a request commands.
+
+    Attributes:
+        name: what a map calls it.
+        place: its JSON pointer in the body; of a path parameter its name in braces.
+        schema: of the number.
+        turns: whether its names say that it is an angle, or turns the device.
+    """
+
+    name: str
+    place: str
+    schema: Schema
+    turns: bool
+
+    @property
+    def declared(self) -> tuple[float, float] | None:
+        """The least and the greatest value by the schema; None: it does not declare both."""
+        least, most = _bound(self.schema, "minimum"), _bound(self.schema, "maximum")
+        return (float(least), float(most)) if least is not None and most is not None and least < most else None
+
+    @property
+    def little(self) -> float:
+        """A little of it: a tenth of what is declared, or 0.05 m/s or 0.1 rad/s."""
+        usual = _TURN if self.turns else _WAY
+        if self.declared is None:
+            return usual
+        part = _PART * max(map(abs, self.declared))
+        return max(1.0, part) if self.schema.get("type") == "integer" else part
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Its limits in a map: those declared, or twice a little."""
+        if self.declared is None:
+            return -2 * self.little, 2 * self.little
+        return self.declared
+
+
+def _bound(schema: Schema, word: str) -> float | None:
+    for part in parts_of(schema):
+        for key in (word, f"exclusive{word.capitalize()}"):
+            value = part.get(key)
+            if isinstance(value, int | float) and not isinstance(value, bool):
+                return value
+    return None
+
+
+def commanded_by(operation: Operation) -> list[Commanded]:
+    """Return the numbers that a request commands, without durations, ids and times."""
+    found = [
+        (f"{{{one.name}}}", one.name, one.schema)
+        for one in operation.parameters
+        if one.where == "path" and is_numeric(one.schema) and is_axis(one.name)
+    ]
+    schema = body_schema(operation)
+    found += [(at, at, part) for at, part in numbers_in(schema or {}) if is_axis(at.rpartition("/")[2])]
+    names = unique_names([at for at, _, _ in found])
+    return [
+        Commanded(names[at], at, part, bool(_TURNS.search(f"{said} {operation.template if not at else ''}")))
+        for at, said, part in found
+    ]
+
+
+def is_axis(name: str) -> bool:
+    """Return whether a number of this name may be an axis or a velocity."""
+    return not (NO_AXIS.search(name) or _LASTS.search(name))
+
+
+def unique_names(places: Sequence[str]) -> dict[str, str]:
+    """Return a name for each place, as short as tells it from the others."""
+    parts = {at: [part for part in re.split(r"[/#]", at.strip("{}")) if part] or ["value"] for at in places}
+    for length in range(1, _DEPTH + 2):
+        names = {at: "_".join(one[-_least(one, length) :]) for at, one in parts.items()}
+        if len(set(names.values())) == len(names):
+            break
+    return {at: re.sub(r"[^A-Za-z0-9_-]", "_", name) for at, name in names.items()}
+
+
+def _least(parts: Sequence[str], length: int) -> int:
+    """Return how many of the last parts make a name that is not only a number."""
+    while length < len(parts) and all(part.isdecimal() for part in parts[-length:]):
+        length += 1
+    return length
+
+
+def body_type(operation: Operation) -> str:
+    """Return the media type in which a map's body is written: JSON, if it is declared; empty: there is no body."""
+    json = next((name for name in operation.bodies if is_json(name)), "")
+    return json or next((name for name in operation.bodies if name in _FORMS), "")
+
+
+def body_schema(operation: Operation) -> Schema | None:
+    """Return the schema of the body that a map fills; None: the operation has none that can be filled."""
+    name = body_type(operation)
+    return operation.bodies[name].schema if name else None
+
+
+def parts_of(schema: Any) -> Iterator[Schema]:
+    """Yield a schema and its alternatives."""
+    if not isinstance(schema, dict):
+        return
+    yield schema
+    for key in ("allOf", "anyOf", "oneOf"):
+        for part in schema.get(key, ()):
+            yield from parts_of(part)
+
+
+def numbers_in(schema: Schema, at: str = "", depth: int = _DEPTH) -> Iterator[tuple[str, Schema]]:
+    """Yield the JSON pointers of the numbers in an object, with their schemas, each once."""
+    seen = set[str]()
+    for part in parts_of(schema) if depth else ():
+        for name, member in part.get("properties", {}).items():
+            place = f"{at}/{name.replace('~', '~0').replace('/', '~1')}"
+            if not isinstance(member, dict) or place in seen:
+                continue
+            seen.add(place)
+            if is_numeric(member):
+                yield place, member
+            else:
+                yield from numbers_in(member, place, depth - 1)
+
+
+def template_of(schema: Schema, names: Mapping[str, str], at: str = "", depth: int = _DEPTH) -> dict[str, Any]:
+    """Return a body with a template for some places, and a value for what else is required.
+
+    Args:
+        schema: of the body.
+        names: templates, or values, by JSON pointer.
+        at: the pointer of this part.
+        depth: so deep at most.
+    """
+    made: dict[str, Any] = {}
+    for part in _chosen(schema, names, at) if depth else ():
+        required = part.get("required", ())
+        for name, member in part.get("properties", {}).items():
+            place = f"{at}/{name.replace('~', '~0').replace('/', '~1')}"
+            if not isinstance(member, dict) or name in made:
+                continue
+            if place in names:
+                made[name] = names[place]
+            elif is_numeric(member) and re.search(r"duration|seconds", name, re.IGNORECASE):
+                made[name] = "{seconds}"
+            elif any(one.startswith(f"{place}/") for one in names) or (name in required and _is_object(member)):
+                made[name] = template_of(member, names, place, depth - 1)
+            elif name in required:
+                made[name] = usual_value(member)
+    return made
+
+
+def _is_object(schema: Schema) -> bool:
+    return any("properties" in part for part in parts_of(schema))
+
+
+def _chosen(schema: Schema, names: Mapping[str, str], at: str) -> Iterator[Schema]:
+    """Yield a schema's parts, and of its alternatives the one with the most of the places."""
+    yield schema
+    for part in schema.get("allOf", ()):
+        yield from _chosen(part, names, at)
+    for key in ("anyOf", "oneOf"):
+        ranked = sorted(
+            (part for part in schema.get(key, ()) if isinstance(part, dict)),
+            key=lambda part: sum(place in names for place, _ in numbers_in(part, at)),
+        )
+        if ranked:
+            yield from _chosen(ranked[-1], names, at)
+
+
+def usual_value(schema: Schema) -> Any:
+    """Return a value that a schema declares: its default, constant, example or first choice, or the least usual one."""
+    for part in parts_of(schema):
+        for key in ("default", "const", "example"):
+            if part.get(key) is not None:
+                return part[key]
+        for key in ("enum", "examples"):
+            if isinstance(part.get(key), list) and part[key]:
+                return part[key][0]
+    kinds = {part.get("type") for part in parts_of(schema)}
+    if is_numeric(schema):
+        least = _bound(schema, "minimum")
+        return max(0, least) if least is not None else 0
+    return False if "boolean" in kinds else [] if "array" in kinds else {} if "object" in kinds else ""

@@ -1,0 +1,90 @@
+"""The numbers that a device tells, by JSON pointer, and how they are looked at while it is driven a little."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from conformance.measures.samples import Sample
+from conformance.scenarios.motion.templates import NoValueError, angle_of
+from conformance.statement.motion_map import Angle
+
+# Budget of one document: so deep, so many numbers, so many members of one list.
+_DEEP, _MANY, _LISTED = 8, 400, 24
+# So far from 1 is the length of what is no quaternion.
+_UNIT: Final = 0.02
+#: Stands between the pointer of a quaternion and the angle that is meant.
+ANGLE: Final = "#"
+_ANGLES: Final[tuple[Angle, ...]] = ("roll", "pitch", "yaw")
+
+Numbers = dict[str, float]
+"""Numbers by pointer; an angle of a quaternion by its pointer, `#` and the angle's name."""
+
+
+def numbers_of(document: Any) -> Numbers:
+    """Return the numbers of a JSON document, at most some hundreds."""
+    found: Numbers = {}
+    for place, value in _numbers(document, "", _DEEP):
+        found[place] = value
+        if len(found) >= _MANY:
+            break
+    return found
+
+
+def _numbers(value: Any, at: str, deep: int) -> Iterator[tuple[str, float]]:
+    if isinstance(value, bool) or not deep:
+        return
+    if isinstance(value, int | float):
+        # An integer of thousands of digits is no measurement.
+        if abs(value) < 1e300:  # noqa: PLR2004
+            yield at, float(value)
+    elif isinstance(value, Mapping):
+        angles = _angles(value)
+        if angles:
+            yield from ((f"{at}{ANGLE}{name}", angle) for name, angle in angles.items())
+            return
+        for key, item in value.items():
+            yield from _numbers(item, f"{at}/{str(key).replace('~', '~0').replace('/', '~1')}", deep - 1)
+    elif isinstance(value, list):
+        for index, item in enumerate(value[:_LISTED]):
+            yield from _numbers(item, f"{at}/{index}", deep - 1)
+
+
+def _angles(value: Mapping[str, Any]) -> dict[str, float]:
+    """Return the angles of what is a quaternion; empty: it is none."""
+    if set(value) != set("xyzw") or not all(isinstance(one, int | float) for one in value.values()):
+        return {}
+    if abs(math.hypot(*map(float, value.values())) - 1) > _UNIT:
+        return {}
+    try:
+        return {name: angle_of(value, name) for name in _ANGLES}
+    except NoValueError:
+        return {}
+
+
+class Looks:
+    """What was read of a device, by operation: the time in the middle of each reading, and its numbers."""
+
+    def __init__(self) -> None:
+        self._seen: dict[str, list[tuple[float, Numbers]]] = {}
+
+    def add(self, operation: str, moment: float, numbers: Numbers) -> None:
+        """Keep one reading."""
+        self._seen.setdefault(operation, []).append((moment, numbers))
+
+    def places(self, operation: str) -> list[str]:
+        """Return the places that every reading of an operation has."""
+        seen = self._seen.get(operation, [])
+        return [place for place in seen[0][1] if all(place in one for _, one in seen)] if seen else []
+
+    def samples(self, operation: str, place: str, begin: float, end: float = math.inf) -> list[Sample]:
+        """Return the samples of a place between two moments; what turns goes on beyond a whole turn."""
+        found: list[Sample] = []
+        for moment, numbers in self._seen.get(operation, []):
+            if begin <= moment <= end and place in numbers:
+                value = numbers[place]
+                if found and ANGLE in place:
+                    value = found[-1][1] + math.remainder(value - found[-1][1], math.tau)
+                found.append((moment, value))
+        return found

@@ -1,0 +1,218 @@
+"""Find a device's axes by driving it a little: a motion map without a file (``roaas certify --drive``).
+
+First the description says what can be commanded and what can be read. Then each number is commanded a little, forth and
+back, and what changes meanwhile is its axis.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from conformance.api.call_rules import CallRules, harmful_words
+from conformance.api.rest.interface import RestInterface
+from conformance.documents.openapi import Operation, is_json
+from conformance.engine.commanded import Commanded, body_schema, commanded_by, template_of
+from conformance.engine.driven_numbers import Looks, numbers_of
+from conformance.measures.samples import SEVERAL
+from conformance.observe.clock import WALL_CLOCK, Clock
+from conformance.scenarios.motion.binding import Binding
+from conformance.scenarios.motion.templates import NoValueError, filled
+from conformance.scenarios.scenario import NotPossibleError
+from conformance.transport.exchange import Exchange
+
+_PACE_S: Final = 0.02
+_MOST_NUMBERS, _MOST_READS = 8, 6
+_STATE: Final = re.compile(
+    r"state|status|pose|odom|position|velocit|speed|twist|telemetry|joint|axes|angle", re.IGNORECASE
+)
+#: What a device repeats of its commands is no measurement.
+ECHO: Final = re.compile(r"target|command|cmd|set_?point|goal|desired|requested|last_", re.IGNORECASE)
+_STOP: Final = re.compile(r"stop|halt|cancel|abort", re.IGNORECASE)
+_DRIVES: Final = re.compile(r"velocit|twist|cmd_?vel|drive|speed|jog|continuous|moveaxis", re.IGNORECASE)
+#: A robot is kept that near to where it is, m; a fast one as near as it comes in so many s.
+ROOM_M, ROOM_S = 0.5, 1.5
+#: Statuses by which an operation declares that it refuses an invalid request.
+REFUSED: Final = frozenset({"400", "422", "4XX", "4xx"})
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What can be commanded and read, by the description.
+
+    Attributes:
+        drive: the operation that commands.
+        numbers: what it commands.
+        reads: operations that may show it, the likeliest first.
+        is_velocity: whether it commands velocities; else positions.
+        stop: the operation beside it that stops the device, by its name; or None.
+    """
+
+    drive: Operation
+    numbers: tuple[Commanded, ...]
+    reads: tuple[Operation, ...]
+    is_velocity: bool
+    stop: Operation | None = None
+
+    def told(self) -> Iterator[str]:
+        """Yield what will be done, in lines."""
+        yield f"{self.drive.label} commands, by its description:"
+        for one in self.numbers:
+            declared = (
+                f"{one.declared[0]:g} to {one.declared[1]:g}, as declared" if one.declared else "no limits declared"
+            )
+            yield f"  {one.name:<16} {declared}; tried at {one.little:g}"
+        yield f"Read meanwhile: {', '.join(one.label for one in self.reads)}."
+        far = max(abs(end) for one in self.numbers for end in one.limits)
+        room = max(ROOM_M, ROOM_S * far)
+        driven = f"up to {far:g} per second, no farther than {room:g} from where it is"
+        yield f"Then it is judged: {driven if self.is_velocity else 'within the limits of the map that is found'}."
+
+
+@dataclass
+class Found:
+    """A map that was found.
+
+    Attributes:
+        lines: its TOML.
+        notes: what was seen on the way, for a person.
+        drives_on_s: for so long a device was seen to drive on after its last command; None: it stopped by itself.
+    """
+
+    lines: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    drives_on_s: float | None = None
+
+
+def plan_of(operations: Sequence[Operation], drive: str, read: str | None, rules: CallRules) -> Plan:
+    """Return what can be commanded and read, by a description.
+
+    Raises:
+        NotPossibleError: it says too little; the message says what.
+    """
+    chosen = _named(operations, drive, "--drive")
+    if chosen.never or any(pattern == chosen.label for pattern in rules.never):
+        raise NotPossibleError(f"{chosen.label} must never be called: the description or --never says so")
+    numbers = commanded_by(chosen)[:_MOST_NUMBERS]
+    if not numbers:
+        bodies = ", ".join(chosen.bodies) or "none"
+        raise NotPossibleError(f"--drive {drive!r}: its path and body (declared: {bodies}) have no numbers to command")
+    if missing := [
+        one.name
+        for one in chosen.parameters
+        if one.where == "path" and f"{{{one.name}}}" not in {number.place for number in numbers}
+    ]:
+        raise NotPossibleError(f"--drive {drive!r}: write the path with a value for {{{missing[0]}}}")
+    reads = [_named(operations, read, "--read")] if read else list(_reads(operations, rules))[:_MOST_READS]
+    if not reads:
+        raise NotPossibleError("the description has no GET with JSON that could show where the device is: give --read")
+    is_velocity = bool(_DRIVES.search(f"{chosen.template} {chosen.id}"))
+    return Plan(chosen, tuple(numbers), tuple(reads), is_velocity, _stop(operations, chosen))
+
+
+def _stop(operations: Sequence[Operation], drive: Operation) -> Operation | None:
+    """Return the operation in the same folder that is called stop or the like; one that latches is none."""
+    folder = posixpath.dirname(drive.template)
+    for one in operations:
+        named = posixpath.basename(one.template)
+        if posixpath.dirname(one.template) == folder and _STOP.fullmatch(named) and one.method in {"POST", "PUT"}:
+            return None if one.never or one.parameters else one
+    return None
+
+
+def _named(operations: Sequence[Operation], label: str, option: str) -> Operation:
+    found = next((one for one in operations if one.label == label.strip() or one.id == label.strip()), None)
+    if found is None:
+        import difflib  # noqa: PLC0415 - of an error alone
+
+        near = difflib.get_close_matches(label, [one.label for one in operations], 1, 0)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise NotPossibleError(f"{option} {label!r} is no operation of the description{hint}")
+    return found
+
+
+def _reads(operations: Sequence[Operation], rules: CallRules) -> Iterator[Operation]:
+    """Yield what may be read and has JSON, first what its name says to be a state."""
+    found = [
+        one
+        for one in operations
+        if one.method == "GET"
+        and rules.decide(one).may
+        and not harmful_words(one)
+        and any(map(is_json, one.formats))
+        and not any(item.required for item in one.parameters)
+    ]
+    yield from sorted(found, key=lambda one: not _STATE.search(f"{one.template} {one.id}"))
+
+
+class Finder(ABC):
+    """Drives a device a little, and finds what shows it.
+
+    Args:
+        api: the device.
+        binding: how calls become requests.
+        plan: what can be commanded and read.
+        clock: by which it is watched.
+    """
+
+    def __init__(self, api: RestInterface, binding: Binding, plan: Plan, clock: Clock = WALL_CLOCK) -> None:
+        self._api, self._binding, self._plan, self._clock = api, binding, plan, clock
+        self._looks, self._turn = Looks(), 0
+        schema = body_schema(plan.drive)
+        named = {one.place: f"{{{one.name}}}" for one in plan.numbers}
+        self._body = template_of(schema, named) if schema is not None else None
+        self._reads = list(plan.reads)
+        self._found = Found()
+        self._answer: Any = None
+
+    @abstractmethod
+    def found(self) -> Found:
+        """Return the map of the device.
+
+        Raises:
+            NotPossibleError: nothing shows that it moves; the message says what was tried.
+            NoAnswerError: there is no response.
+        """
+
+    def _look(self) -> None:
+        """Read one of the operations; one that does not tell numbers is not read again."""
+        operation = self._reads[self._turn % len(self._reads)]
+        self._turn += 1
+        sent = self._clock.now()
+        exchange = self._send(operation.label, None)
+        numbers = numbers_of(self._binding.content(exchange.response.body)) if exchange.response.ok else {}
+        moment = (sent + self._clock.now()) / 2
+        if numbers:
+            self._looks.add(operation.label, moment, numbers)
+        elif len(self._reads) > 1:
+            self._reads.remove(operation)
+        else:
+            raise NotPossibleError(f"{operation.label} got {exchange.came}, without numbers that show where it is")
+        self._clock.sleep(sent + _PACE_S - self._clock.now())
+
+    def _watch(self, seconds: float) -> None:
+        """Read for some time, and each operation several times."""
+        until, least = self._clock.now() + seconds, SEVERAL * len(self._reads)
+        while self._clock.now() < until or least > 0:
+            self._look()
+            least -= 1
+
+    def _send(self, call: str, body: Any) -> Exchange:
+        made = self._binding.made(call, body)
+        return self._api.client.send(made.method, made.target, headers=made.headers, body=made.body)
+
+    def _command(self, values: Mapping[str, float]) -> Exchange:
+        """Command some numbers; the others are 0, or as near as their limits allow."""
+        zero = {one.name: min(max(0.0, one.limits[0]), one.limits[1]) for one in self._plan.numbers}
+        written = {**zero, **values, "seconds": 1.0}
+        for one in self._plan.numbers:
+            if one.schema.get("type") == "integer":
+                written[one.name] = round(written[one.name])
+        try:
+            return self._send(filled(self._plan.drive.label, written), filled(self._body, written))
+        except NoValueError as error:
+            raise NotPossibleError(str(error)) from error

@@ -1,0 +1,216 @@
+"""Find by moving a device a little how it is sent to positions: those whose names a reading has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+from conformance.engine.commanded import Commanded, body_schema, parts_of, template_of
+from conformance.engine.driven_numbers import ANGLE
+from conformance.engine.finding import ECHO, REFUSED, Finder, Found
+from conformance.engine.map_text import inline, key, string
+from conformance.measures.samples import SEVERAL, Noise
+from conformance.scenarios.motion.templates import filled
+from conformance.scenarios.scenario import NotPossibleError
+
+# How long the device is watched before and after a little move, and how long it has for that, s.
+_BEFORE_S, _MOVES_S = 0.25, 3.0
+# Of a little: so much is tried, and so far off an axis may end, or another one may go with it.
+_PARTS, _FOLLOWS = (1.0, 0.2), 0.15
+
+
+@dataclass(frozen=True)
+class Moved:
+    """How an axis followed a target.
+
+    Attributes:
+        place: where it is read.
+        took_s: time until it was there, s.
+        off: how far from its target it rested.
+        sigma: the standard deviation of its noise.
+        way: how far it was sent to each side.
+    """
+
+    place: str
+    took_s: float
+    off: float
+    sigma: float
+    way: float
+
+
+class PositionFinder(Finder):
+    """Finds the map of a device that is sent to positions."""
+
+    def found(self) -> Found:
+        """Return the map; see Finder.found()."""
+        self._watch(_BEFORE_S)
+        counts = {one.label: self._named_places(one.label) for one in self._reads}
+        read = max(counts, key=lambda label: len(counts[label]))
+        if not counts[read]:
+            wanted = ", ".join(one.name for one in self._plan.numbers)
+            raise NotPossibleError(
+                f"{self._plan.drive.label} takes {wanted}, and {', '.join(counts)} tell no number of such a name: "
+                "give --read, or write a map (docs/motion.md)"
+            )
+        self._reads = [one for one in self._reads if one.label == read]
+        # What else the operation may take is left out, so that it stays where it is.
+        schema = body_schema(self._plan.drive)
+        named = {one.place: f"{{{one.name}}}" for one in self._plan.numbers if one.name in counts[read]}
+        self._body = None if schema is None else template_of(schema, named)
+        begun = self._clock.now() - _BEFORE_S
+        start = {
+            name: median(value for _, value in self._looks.samples(read, place, begun))
+            for name, place in counts[read].items()
+        }
+        moved: dict[str, Moved] = {}
+        try:
+            for number in self._plan.numbers:
+                if number.name in start:
+                    found = self._followed(number, counts[read], start)
+                    if found is not None:
+                        moved[number.name] = found
+        finally:
+            self._command(start)
+        if not moved:
+            raise NotPossibleError(f"{self._plan.drive.label} was accepted, and {read} did not follow any target")
+        self._found.lines = list(self._goto_lines(read, start, moved))
+        return self._found
+
+    def _named_places(self, operation: str) -> dict[str, str]:
+        """Return the places of an operation's numbers by the name of what is commanded under the same name."""
+        places, found = self._looks.places(operation), dict[str, str]()
+        for number in self._plan.numbers:
+            words = number.place.strip("{}").split("/")
+            own = words[-1].lower()
+            same = [one for one in places if one.rpartition("/")[2].partition(ANGLE)[0].lower() == own]
+            if own in operation.rpartition("/")[2].lower():
+                same += [one for one in places if one.lower() in {"", "/value", f"/{own}/value"}]
+            # Of several, the one whose path has most in common with that of what is commanded.
+            same.sort(key=lambda one: (bool(ECHO.search(one)), -len(set(words) & set(one.split("/")))))
+            if same and same[0] not in found.values():
+                found[number.name] = same[0]
+        return found
+
+    def _followed(self, number: Commanded, places: Mapping[str, str], start: Mapping[str, float]) -> Moved | None:
+        """Send one axis a little to each side, less far if it does not get there; return how it followed, or None."""
+        why = ""
+        for part in _PARTS:
+            little = part * number.little
+            tries = [
+                self._moved(number, places, start, way)
+                for way in (little, -little)
+                if not number.declared or number.declared[0] <= start[number.name] + way <= number.declared[1]
+            ]
+            if tries and all(isinstance(one, Moved) for one in tries):
+                found = [one for one in tries if isinstance(one, Moved)]
+                return Moved(
+                    found[0].place,
+                    max(one.took_s for one in found),
+                    max(one.off for one in found),
+                    max(one.sigma for one in found),
+                    little,
+                )
+            why = next((one for one in tries if isinstance(one, str)), "its limits leave no room")
+        self._found.notes.append(f"{number.name} stays where it is: {why}.")
+        return None
+
+    def _moved(
+        self, number: Commanded, places: Mapping[str, str], start: Mapping[str, float], way: float
+    ) -> Moved | str:
+        """Send one axis a little farther, and back; return how it followed, or why it counts as no axis of its own."""
+        place, read, goal = places[number.name], self._reads[0].label, start[number.name] + way
+        rested = self._clock.now()
+        self._watch(_BEFORE_S)
+        sigma = Noise.of([value for _, value in self._looks.samples(read, place, rested)]).sigma
+        exchange = self._command({**start, number.name: goal})
+        sent = self._clock.now()
+        if not exchange.response.ok:
+            said = exchange.response.body[:300].decode("utf-8", "replace")
+            raise NotPossibleError(
+                f"{self._plan.drive.label} with {number.name} {goal:.4g} got {exchange.came}: {said}"
+            )
+        self._answer = self._binding.content(exchange.response.body)
+        near = max(_FOLLOWS * abs(way), 6 * sigma)
+
+        def is_there() -> bool:
+            last = [value for _, value in self._looks.samples(read, place, sent)[-SEVERAL:]]
+            return len(last) == SEVERAL and all(abs(one - goal) < near for one in last)
+
+        while self._clock.now() < sent + _MOVES_S and not is_there():
+            self._look()
+        took_s = self._clock.now() - sent
+        self._watch(_BEFORE_S)
+        ends = {
+            name: median(value for _, value in self._looks.samples(read, at, sent)[-SEVERAL:])
+            for name, at in places.items()
+        }
+        self._command(start)
+        self._watch(max(_BEFORE_S, took_s))
+        if abs(ends[number.name] - goal) > near:
+            return f"sent to {goal:.4g}, it came to {ends[number.name]:.4g}"
+        for name, end in ends.items():
+            own = next(one.little for one in self._plan.numbers if one.name == name)
+            if name != number.name and abs(end - start[name]) > max(_FOLLOWS * own, _FOLLOWS * abs(way)):
+                return f"with it {name} went from {start[name]:.4g} to {end:.4g}"
+        return Moved(place, took_s, abs(ends[number.name] - goal), sigma, abs(way))
+
+    def _goto_lines(self, read: str, start: Mapping[str, float], moved: Mapping[str, Moved]) -> Iterator[str]:
+        numbers = {one.name: one for one in self._plan.numbers if one.name in moved}
+        still = {name: round(start[name], 5) for name in start.keys() - moved.keys()}
+        yield "[motion.state]"
+        yield f"read = {string(read)}"
+        yield "fresh_s = 1.0  # the suite's"
+        yield ""
+        yield "[motion.state.axes]"
+        widest = 0.0
+        for name, found in moved.items():
+            number, here = numbers[name], start[name]
+            near = (here - found.way, here + found.way)
+            limits = [round(one, 4) for one in number.declared or near]
+            widest = max(widest, (limits[1] - limits[0]) / found.way)
+            pointer, _, angle = found.place.partition(ANGLE)
+            given: dict[str, Any] = {"at": pointer, "unit": "rad" if number.turns else "", "limits": limits}
+            given["tolerance"] = round(max(2 * found.off, 8 * found.sigma, 0.2 * found.way), 5)
+            given |= {"angle": angle} if angle else {}
+            source = "as declared" if number.declared else "none are declared; so far it was seen to go"
+            yield f"{key(name)} = {inline(given)}  # limits: {source}"
+        yield ""
+        yield "[motion.goto]"
+        template, lasts = self._plan.drive.label, "{seconds}" in inline(self._body or {})
+        for name, value in still.items():
+            template = template.replace(f"{{{name}}}", f"{value:g}")
+        yield f"send = {string(template)}"
+        if self._body is not None:
+            named = {name: f"{{{name}}}" for name in moved}
+            yield f"body = {inline(filled(self._body, {**named, **still, 'seconds': '{seconds}'}))}"
+        slowest = max(one.took_s for one in moved.values())
+        if lasts:
+            yield "seconds = 1.0  # the suite's: the duration that it asks for"
+            yield f"settle_s = {max(0.5, slowest - 1.0 + 0.3):.2f}  # seen: a move of 1 s took {slowest:.2f} s"
+        else:
+            yield f"within_s = {2.0 + slowest * widest:.1f}  # seen: a part of the way took {slowest:.2f} s"
+        off = max(max(2 * one.off, 8 * one.sigma) for one in moved.values())
+        yield f"tolerance = {off + 0.01:.3g}  # twice what was seen, and room"
+        if REFUSED & self._plan.drive.responses.keys() and all(one.declared for one in numbers.values()):
+            yield 'beyond_limits = "refused"  # the description declares limits, and a response for invalid requests'
+        yield from self._stop_lines()
+
+    def _stop_lines(self) -> Iterator[str]:
+        """Yield the stop beside the operation that moves the device, if what it takes is known."""
+        stop = self._plan.stop
+        if stop is None:
+            return
+        schema = body_schema(stop)
+        wanted = [name for part in parts_of(schema) for name in part.get("required", ())]
+        told = self._answer if isinstance(self._answer, dict) else {}
+        if any(name not in told for name in wanted):
+            self._found.notes.append(f"{stop.label} is not used: what it takes ({', '.join(wanted)}) is not known.")
+            return
+        yield ""
+        yield "[motion.stop]"
+        yield f"send = {string(stop.label)}"
+        if wanted:
+            yield f"body = {inline({name: f'{{goto:/{name}}}' for name in wanted})}"
+        yield "rests_within_s = 1.0  # the suite's"

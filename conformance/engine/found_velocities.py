@@ -1,0 +1,289 @@
+"""Find by driving a device a little which of its numbers shows each velocity that it is given."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
+
+from conformance.engine.commanded import Commanded, is_axis, unique_names
+from conformance.engine.driven_numbers import ANGLE
+from conformance.engine.finding import ECHO, REFUSED, ROOM_M, ROOM_S, Finder, Found
+from conformance.engine.map_text import inline, key, string
+from conformance.measures.responses import Response, agreed, response_to, rests_from
+from conformance.measures.samples import Sample
+from conformance.scenarios.motion.templates import filled
+from conformance.scenarios.scenario import NotPossibleError
+
+# How long a velocity is driven, kept up every so many s, and how long the device is watched before and after, s.
+_DRIVEN_S, _KEPT_S, _BEFORE_S, _AFTER_S = 0.7, 0.1, 0.25, 0.6
+# Nothing is sent for so long at most to see whether the device stops by itself, s; it rests when it did so long.
+_LET_GO_S, _SURE_S = 3.0, 0.5
+# How many units of a position are one m or one rad.
+_UNITS: Final = {1.0: ("m", "rad"), 100.0: ("cm", ""), 1000.0: ("mm", ""), math.degrees(1): ("", "deg")}
+_NEAR: Final = 2.0
+# Beyond this factor one rate is none of the other's kind.
+_OTHER: Final = 4.0
+_ROOM_RAD: Final = 3.0
+
+
+class VelocityFinder(Finder):
+    """Finds the map of a device that is given velocities."""
+
+    def found(self) -> Found:
+        """Return the map; see Finder.found()."""
+        try:
+            responses = self._responses()
+            shown = self._measured(responses)
+            name, (place, response) = next(iter(shown.items()))
+            settle_s = self._settle_s
+            hold_s = self._hold_s(next(one for one in self._plan.numbers if one.name == name), place, response)
+        finally:
+            self._command({})
+        self._found.lines = list(self._lines(responses, shown, settle_s, hold_s))
+        return self._found
+
+    def _drive(self, number: Commanded, speed: float, *, end: bool = True) -> tuple[float, float]:
+        """Drive at a velocity and end it; return when it had begun, and when the last command was answered.
+
+        Raises:
+            NotPossibleError: it was refused.
+        """
+        begun = last = 0.0
+        until = math.inf
+        while self._clock.now() < until:
+            if self._clock.now() >= last + _KEPT_S:
+                exchange = self._command({number.name: speed})
+                last = self._clock.now()
+                if not exchange.response.ok:
+                    said = exchange.response.body[:300].decode("utf-8", "replace")
+                    raise NotPossibleError(
+                        f"{self._plan.drive.label} with {number.name} {speed:g} got {exchange.came}: {said}"
+                    )
+                begun, until = (begun, until) if begun else (last, last + _DRIVEN_S)
+            self._look()
+        if end:
+            self._command({})
+        return begun, last
+
+    def _responses(self) -> dict[str, dict[tuple[str, str], Response]]:
+        """Return how each number that was read responds, by what was commanded, operation and place."""
+        found: dict[str, dict[tuple[str, str], Response]] = {}
+        self._settle_s = 0.3
+        for number in self._plan.numbers:
+            least, most = number.limits
+            speeds = [number.little] if most > 0 else []
+            speeds += [-number.little] if least < 0 else []
+            drives = []
+            for speed in speeds:
+                rested = self._clock.now()
+                self._watch(_BEFORE_S)
+                begun, _ = self._drive(number, speed)
+                ended = self._clock.now()
+                self._watch(_AFTER_S)
+                drives.append((speed, rested, begun, ended, self._clock.now()))
+                if len(drives) == 1 and not self._alike(drives):
+                    break
+            found[number.name] = self._alike(drives)
+            for (operation, place), response in found[number.name].items():
+                speed, _, _, ended, done = drives[-1]
+                after = self._looks.samples(operation, place, ended, done)
+                since = rests_from(after, response.sigma, response.ratio * speed)
+                self._settle_s = max(self._settle_s, 1.5 * (since - ended) + 0.15 if since else 1.0)
+        return found
+
+    def _alike(self, drives: Sequence[tuple[float, ...]]) -> dict[tuple[str, str], Response]:
+        found = {}
+        for operation in (one.label for one in self._reads):
+            for place in self._looks.places(operation):
+                seen = [
+                    response_to(
+                        speed,
+                        *(
+                            self._looks.samples(operation, place, *span)
+                            for span in ((rested, begun), (begun, ended), (ended, done))
+                        ),
+                    )
+                    for speed, rested, begun, ended, done in drives
+                ]
+                response = agreed(seen)
+                named = place.rpartition("/")[2].partition(ANGLE)[0]
+                if response is not None and not ECHO.search(f"{operation} {place}") and is_axis(named or "value"):
+                    found[operation, place] = response
+        return found
+
+    def _measured(self, responses: Mapping[str, Mapping[tuple[str, str], Response]]) -> dict[str, tuple[str, Response]]:
+        """Return by which place of one operation each commanded number is measured.
+
+        Raises:
+            NotPossibleError: nothing shows any of them.
+        """
+        counts = {
+            one.label: sum(any(operation == one.label for operation, _ in own) for own in responses.values())
+            for one in self._reads
+        }
+        read = max(counts, key=lambda label: counts[label])
+        if not counts[read]:
+            tried = ", ".join(f"{one.name} at {one.little:g}" for one in self._plan.numbers)
+            raise NotPossibleError(
+                f"{self._plan.drive.label} was accepted ({tried}), and no number of {', '.join(counts)} changed with it"
+            )
+        self._reads = [one for one in self._reads if one.label == read]
+        own = {
+            name: {place: one for (operation, place), one in given.items() if operation == read}
+            for name, given in responses.items()
+        }
+        turns = {one.name for one in self._plan.numbers if one.turns and own[one.name]}
+        shown = {one.name: self._shown(one, own[one.name], turning=bool(turns)) for one in self._plan.numbers}
+        if turns and not any(shown[name] for name in shown.keys() - turns):
+            # Where it goes is seen in one direction only: without turning, that is the direction in which it drives.
+            ahead = {name: self._shown_as_position(own[name]) for name in shown.keys() - turns}
+            if any(ahead.values()):
+                shown = {name: ahead.get(name) for name in shown}
+                self._found.notes.append(
+                    f"{', '.join(turns)} stays 0: nothing shows how fast it drives once it has turned."
+                )
+        for one in self._plan.numbers:
+            if shown[one.name] is None:
+                why = "nothing changed with it" if not own[one.name] else "no single number shows it"
+                self._found.notes.append(f"{one.name} stays 0: {why}.")
+        found = {name: one for name, one in shown.items() if one}
+        if not found:
+            raise NotPossibleError(f"{read} changes when the device is driven, but no number of it is an axis' own")
+        return found
+
+    def _shown(self, number: Commanded, own: Mapping[str, Response], *, turning: bool) -> tuple[str, Response] | None:
+        velocities = {place: one for place, one in own.items() if not one.is_position and 1 / _NEAR < one.ratio < _NEAR}
+        position = self._shown_as_position(own)
+        if position and (number.turns or not turning):
+            return position
+        return min(velocities.items(), key=lambda item: abs(math.log(item[1].ratio)), default=None)
+
+    def _shown_as_position(self, own: Mapping[str, Response]) -> tuple[str, Response] | None:
+        """Return the place of the position that alone shows a velocity."""
+        positions = {place: one for place, one in own.items() if one.is_position and one.ratio > 0}
+        best = min(positions.items(), key=lambda item: _off(item[1].ratio), default=None)
+        alone = best and not any(
+            1 / _OTHER < abs(one.ratio / best[1].ratio) < _OTHER
+            for place, one in own.items()
+            if one.is_position and place != best[0]
+        )
+        return best if alone and best else None
+
+    def _hold_s(self, number: Commanded, place: str, response: Response) -> float | None:
+        """Let the device go; return how long it drove on, s, and stop it. None: for longer than the suite waits."""
+        speed = number.little if number.limits[1] > 0 else -number.little
+        self._watch(_BEFORE_S)
+        _, last = self._drive(number, speed, end=False)
+        read, moving = self._reads[0].label, response.ratio * speed
+        while self._clock.now() < last + _LET_GO_S:
+            self._look()
+            samples = self._looks.samples(read, place, last)
+            since = self._still_since(samples, response, moving)
+            if since is not None and self._clock.now() >= since + _SURE_S:
+                held_s = since - last
+                if response.is_position:
+                    # By how far it came: noise hides when it came to rest.
+                    held_s = (samples[-1][1] - samples[0][1]) / moving
+                self._found.notes.append(f"Let go, it came to rest {held_s:.2f} s after the last command.")
+                return max(0.1, math.ceil(held_s * 20) / 20)
+        self._found.drives_on_s = self._clock.now() - last
+        self._found.notes.append(
+            f"Let go, it drove on for all of the {self._found.drives_on_s:.1f} s that it was watched."
+        )
+        return None
+
+    @staticmethod
+    def _still_since(samples: list[Sample], response: Response, moving: float) -> float | None:
+        if response.is_position:
+            return rests_from(samples, response.sigma, moving)
+        since = None
+        for moment, value in reversed(samples):
+            if abs(value) > 0.3 * abs(moving):
+                break
+            since = moment
+        return since
+
+    def _lines(
+        self,
+        responses: Mapping[str, Mapping[tuple[str, str], Response]],
+        shown: Mapping[str, tuple[str, Response]],
+        settle_s: float,
+        hold_s: float | None,
+    ) -> Iterator[str]:
+        """Yield the lines of the map, each figure with where it comes from."""
+        read, numbers = self._reads[0].label, {one.name: one for one in self._plan.numbers}
+        places = {
+            place: one
+            for name in shown
+            for (operation, place), one in responses[name].items()
+            if operation == read and one.is_position and 1 / _OTHER < one.ratio / _unit(one.ratio)[0] < _OTHER
+        }
+        names = unique_names(list(places))
+        driven = {place: name for name, (place, one) in shown.items() if one.is_position}
+        yield "[motion.state]"
+        yield f"read = {string(read)}"
+        yield ""
+        yield "[motion.state.axes]" + ("" if places else "  # nothing shows where it is")
+        for place, response in places.items():
+            number = numbers.get(driven.get(place, ""))
+            yield f"{key(names[place])} = {self._axis(place, response, number)}"
+        yield ""
+        yield "[motion.velocity]"
+        yield f"send = {string(self._plan.drive.label)}"
+        still = {one.name: 0 for one in self._plan.numbers if one.name not in shown}
+        if self._body is not None:
+            named = {name: f"{{{name}}}" for name in shown}
+            yield f"body = {inline(filled(self._body, {**named, **still, 'seconds': 1}))}"
+        widest = {name: max(map(abs, numbers[name].limits)) for name in shown}
+        yield f"tolerance = {0.15 * max(widest.values()):.3g}  # the suite's: 15 % of the fastest"
+        yield f"settle_s = {min(settle_s, 2.0):.2f}  # seen: so long it took to rest, and half as long again"
+        if hold_s is not None:
+            yield f"hold_s = {hold_s:.2f}  # seen: let go, it stopped by itself"
+        refuses = bool(REFUSED & self._plan.drive.responses.keys()) and all(numbers[name].declared for name in shown)
+        if refuses:
+            yield 'beyond_limits = "refused"  # the description declares limits, and a response for invalid requests'
+        yield ""
+        yield "[motion.velocity.axes]"
+        for name, (place, response) in shown.items():
+            number = numbers[name]
+            given: dict[str, Any] = {"limits": list(number.limits)}
+            given |= {"of": names[place]} if response.is_position else {"at": place}
+            scale, _ = _unit(response.ratio)
+            if response.is_position and scale != 1:
+                given["scale"] = scale
+            given["tolerance"] = round(max(0.15 * widest[name], 8 * (0 if response.is_position else response.sigma)), 4)
+            source = "limits as declared" if number.declared else "limits: the suite's, as none are declared"
+            yield f"{key(name)} = {inline(given)}  # {source}; changed by {response.ratio:.3g} at velocity 1"
+
+    def _axis(self, place: str, response: Response, number: Commanded | None) -> str:
+        """Return an axis of the state, within some room around where it is."""
+        samples = self._looks.samples(self._reads[0].label, place, 0.0)
+        here = samples[-1][1]
+        scale, (way, turn) = _unit(response.ratio)
+        turns = number.turns if number else ANGLE in place
+        pointer, _, angle = place.partition(ANGLE)
+        unit = turn if turns else way
+        if turns and unit == "rad" and not angle and re.search(r"yaw|heading|theta|orientation", place, re.IGNORECASE):
+            angle = "yaw"
+        fastest = max(map(abs, number.limits)) * scale if number else 0.1 * scale
+        room = _ROOM_RAD * scale if turns else max(ROOM_M * scale, ROOM_S * fastest)
+        limits = [-3, 3] if angle else [round(here - room, 4), round(here + room, 4)]
+        given: dict[str, Any] = {"at": pointer, "unit": unit, "limits": limits}
+        given["tolerance"] = round(max(6 * response.sigma, 0.06 * fastest, 0.002 * scale), 4)
+        given |= {"angle": angle} if angle else {}
+        return f"{inline(given)}  # limits: {'all around' if angle else f'{room:.3g} {unit} around where it was'}"
+
+
+def _off(ratio: float) -> float:
+    """Return how far a ratio is from that of a unit, as a logarithm."""
+    return min(abs(math.log(ratio / unit)) for unit in _UNITS)
+
+
+def _unit(ratio: float) -> tuple[float, tuple[str, str]]:
+    """Return by how much a velocity has to be multiplied, and what its unit is called; the ratio, if it is none."""
+    near = min(_UNITS, key=lambda unit: abs(math.log(abs(ratio) / unit)))
+    if abs(math.log(abs(ratio) / near)) < math.log(_NEAR):
+        return near, _UNITS[near]
+    return float(f"{abs(ratio):.2g}"), ("", "")

@@ -1,0 +1,195 @@
+"""The four questions that a user of a moving device asks first, answered by a run: with a figure and a picture each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, Final
+
+from conformance.contract.described import MOTION
+from conformance.measures.samples import SEVERAL, Sample, slope
+from conformance.rules.motion.judging import measured
+from conformance.scenarios.motion.attempts import attempts_at_rest
+from conformance.scenarios.motion.moves import stops, targets
+from conformance.scenarios.motion.trace import Drive, Leg, Quiet, Reading
+from conformance.scenarios.motion.vanishing import WAYS, vanishing
+from conformance.scenarios.motion.velocities import let_go, velocities
+from conformance.scenarios.scenario import Recordings, Scenario
+from conformance.statement.motion_map import MotionMap
+from conformance.verdict.finding import counted
+from conformance.verdict.verdicts import Verdict
+
+#: The questions, and the requirements by which each is answered.
+QUESTIONS: Final[dict[str, tuple[str, ...]]] = {
+    "Does it move as told?": ("velocity", "reaches", "stays", "last-of-many", "new-target", "one-client"),
+    "Does it stop when told?": ("velocity-stop", "stop", "stop-lasts"),
+    "Does it stop when its client vanishes?": ("watchdog",),
+    "Does it refuse what is beyond its limits?": ("beyond-limits", "refused-still"),
+}
+_BROKEN: Final = frozenset({"fail", "warn"})
+# Of its velocity: a device that was let go, and moves at that part of it, drives on.
+_DRIVES_ON: Final = 0.5
+_LONG: Final = 160
+
+
+def answers(motion: MotionMap | None, verdicts: Iterable[Verdict], recordings: Recordings) -> list[dict[str, str]]:
+    """Return question, answer ("yes", "no" or "not seen"), figure and picture of each; empty for no moving device.
+
+    The picture is what ``reports`` calls the drive or move: its name in the traces.
+    """
+    if motion is None:
+        return []
+    judged = {
+        one.requirement.id.removeprefix(f"{MOTION}/"): one for one in verdicts if one.requirement.class_ == MOTION
+    }
+    figures = (_moves, _stops, _vanishes, _refuses)
+    found = []
+    for (question, ids), figure in zip(QUESTIONS.items(), figures, strict=True):
+        own = [judged[id_] for id_ in ids if id_ in judged]
+        value = _answer(own)
+        said, picture = figure(motion, recordings)
+        if value == "no":
+            said, picture = _fault(own, picture)
+        elif value == "not seen" and said.startswith("no: "):
+            value, said = "no", said.removeprefix("no: ")
+        elif value == "not seen":
+            said = next((one.reason for one in own if one.reason), "") or said or "nothing was tried"
+        found.append({"question": question, "answer": value, "figure": said[:_LONG], "picture": picture})
+    return found
+
+
+def _answer(verdicts: Sequence[Verdict]) -> str:
+    values = {one.value for one in verdicts}
+    return "no" if values & _BROKEN else "yes" if "pass" in values else "not seen"
+
+
+def _fault(verdicts: Sequence[Verdict], picture: str) -> tuple[str, str]:
+    """Return what the first finding expected and saw, and the picture that it names."""
+    findings = [one for item in verdicts if item.value in _BROKEN for one in item.evidence.findings.values()]
+    if not findings:
+        return "", picture
+    said = f"{findings[0].observed}; expected {findings[0].expected}"
+    named = findings[0].expected.rpartition("(")[2].rstrip(")")
+    return said, named or picture
+
+
+def _parts(recordings: Recordings, *scenarios: Scenario) -> Iterator[Any]:
+    for scenario in scenarios:
+        recording = recordings.played.get(scenario.name)
+        trace = recording.trace if recording else None
+        yield from trace if isinstance(trace, tuple) else [trace] if trace is not None else []
+
+
+def _drives(recordings: Recordings, *scenarios: Scenario) -> list[Drive]:
+    return [one for one in _parts(recordings, *scenarios) if isinstance(one, Drive)]
+
+
+def _moves(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
+    """Return how far the velocities, or the targets, were off at most."""
+    worst: tuple[float, str, str] | None = None
+    count = 0
+    for drive in _drives(recordings, velocities):
+        begun = drive.commands[0].answered + (motion.velocity.settle_s if motion.velocity else 0.0)
+        seen = [one for one in drive.under_way if one.sent >= begun]
+        for name, wanted in drive.wanted.items():
+            found = measured(seen, name, motion) if wanted else None
+            if found is not None:
+                count += 1
+                said = f"{name} {found:.3g} in place of {wanted:.3g} per second"
+                worst = max(worst or (-1.0, "", ""), (abs(found - wanted), said, drive.what))
+    if worst:
+        return f"{worst[1]} is the farthest off of {counted(count, 'velocity')}".replace(
+            "velocitys", "velocities"
+        ), worst[2]
+    for leg in (one for one in _parts(recordings, targets) if isinstance(one, Leg) and one.readings):
+        goal, last = leg.commands[-1].targets, leg.after(0.0)[-1:]
+        for name, wanted in goal.items() if last else ():
+            count += 1
+            off = abs(motion.state.axes[name].apart(last[0].values[name], wanted))
+            worst = max(
+                worst or (-1.0, "", ""), (off, f"{name} {last[0].values[name]:.3g} in place of {wanted:.3g}", leg.what)
+            )
+    return (f"{worst[1]} is the farthest off of {counted(count, 'target')}", worst[2]) if worst else ("", "")
+
+
+def _stops(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
+    """Return how long a device took to rest at most."""
+    ended = [(one, one.end) for one in _drives(recordings, velocities) if one.end is not None]
+    took = [(took_s, one.what) for one, end in ended if (took_s := _rested_s(one, end.answered, motion)) is not None]
+    if took:
+        longest, what = max(took)
+        return (
+            f"it went on for {max(0.0, longest):.2f} s after velocity 0 at most, in {counted(len(took), 'drive')}",
+            what,
+        )
+    stopped = [one for one in _parts(recordings, stops) if isinstance(one, Leg)]
+    return (f"stopped under way {counted(len(stopped), 'time')}", stopped[0].what) if stopped else ("", "")
+
+
+def _vanishes(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
+    """Return how long a device went on after its last command, by how its client vanished."""
+    said, on, picture = [], "", ""
+    for drive in _drives(recordings, vanishing):
+        way = next((one for one in WAYS if drive.what.endswith(one)), "").removeprefix("and ")
+        took_s = _rested_s(drive, drive.commands[-1].answered, motion)
+        picture = picture or drive.what
+        lapse_s = drive.after[-1].received - drive.commands[-1].answered if drive.after else 0.0
+        if _drives_on(drive, motion):
+            on, picture = on or f"no: it still drove {lapse_s:.1f} s later when {way.removeprefix('the ')}", drive.what
+        elif took_s is not None:
+            said.append(f"{max(0.0, took_s):.2f} s ({way})")
+    if on:
+        return on, picture
+    if not said:
+        gone = _drives(recordings, let_go)
+        return (f"let go {counted(len(gone), 'time')}", gone[0].what) if gone else ("", "")
+    return f"it went on for {', '.join(said)}", picture
+
+
+def _drives_on(drive: Drive, motion: MotionMap) -> bool:
+    """Return whether the last readings of a drive show it at half of its velocity or more."""
+    last = list(drive.after)[-2 * SEVERAL - 1 :]
+    for name, wanted in drive.wanted.items():
+        found = measured(last, name, motion) if wanted else None
+        if found is not None and found * wanted > 0 and abs(found) >= _DRIVES_ON * abs(wanted):
+            return True
+    return False
+
+
+def _rested_s(drive: Drive, since: float, motion: MotionMap) -> float | None:
+    """Return how long after a moment a device was at rest, by how far it still came; None if that was not seen."""
+    name = max(drive.wanted, key=lambda one: abs(drive.wanted[one]), default="")
+    speed = motion.velocity.axes.get(name) if motion.velocity else None
+    if speed is None or not drive.under_way or len(drive.after) < SEVERAL:
+        return None
+    if not speed.of:
+        moving = [
+            one.received for one in drive.after if abs(one.speeds.get(name, 0.0)) > _DRIVES_ON * abs(drive.wanted[name])
+        ]
+        return max(moving) - since if moving else 0.0 if drive.after[0].sent - since < 0.1 else None  # noqa: PLR2004
+    under_way, after = _samples(drive.under_way, speed.of), _samples(drive.after, speed.of)
+    rate = slope(under_way[len(under_way) // 2 :])
+    if not rate or len(after) < SEVERAL:
+        return None
+    end = sorted(value for _, value in after[-SEVERAL:])[SEVERAL // 2]
+    # From the middle of the last readings under way: one of them alone is as far off as its noise.
+    there = sorted(under_way[-SEVERAL:], key=lambda one: one[1])[SEVERAL // 2]
+    return there[0] + (end - there[1]) / rate - since
+
+
+def _samples(readings: Sequence[Reading], axis: str) -> list[Sample]:
+    return [((one.sent + one.received) / 2, one.values[axis]) for one in readings if one.values]
+
+
+def _refuses(_motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
+    """Return how many targets and velocities beyond the limits were refused."""
+    tried = [
+        one
+        for quiet in _parts(recordings, attempts_at_rest)
+        if isinstance(quiet, Quiet)
+        for one in quiet.tried
+        if one.kind == "beyond" and one.exchange is not None
+    ]
+    if not tried:
+        return "the map declares no limits that are refused", ""
+    refused = sum(not one.exchange.response.ok for one in tried if one.exchange)
+    return f"{refused} of {len(tried)} beyond the limits were refused, the first {tried[0].what}", ""

@@ -1,0 +1,121 @@
+"""``roaas certify --drive``: the axes are found by driving, and four questions are answered, without a file."""
+
+import json
+import sys
+import tomllib
+
+import pytest
+import rover
+from arm import Arm
+from body import Body
+from judged_devices import RUNS
+from processes import ended
+from rover import Rover, serving_rover
+from serving_apps import serving_app
+
+from conformance.statement.statement import motion_map_of
+from reports.rendering import render
+
+
+class WokenByReading(Body):
+    """A rover that holds its velocity for as long as somebody reads where it is."""
+
+    def said(self, now):
+        if any(self.speeds.values()) and now < self.held_until:
+            self.held_until = now + rover.HOLD_S
+        return super().said(now)
+
+
+class WithoutWatchdog(Body):
+    """A rover that drives on until it gets another command."""
+
+    def drive(self, speeds, hold_s, now):  # noqa: ARG002 - it holds for ever
+        super().drive(speeds, 1e9, now)
+
+
+def _driven(url, tmp_path, *more, drive="PUT /velocity"):
+    out = tmp_path / "out"
+    done = ended(
+        sys.executable, "-m", "roaas", "certify", url, "--drive", drive, "--allow-motion", "--yes",
+        "--out", out, *more,
+    )  # fmt: skip
+    assert "Traceback" not in done.stdout + done.stderr, done.stderr
+    result = json.loads((out / "result.json").read_text(encoding="utf-8")) if (out / "result.json").exists() else {}
+    return done, result, [one["answer"] for one in result.get("motion", ())]
+
+
+def test_the_axes_of_a_rover_are_found_and_the_four_questions_answered(tmp_path):
+    saved = tmp_path / "rover.toml"
+    with serving_rover(Rover(Body(rover.LIMITS, noise=0.001))) as url:
+        for _ in range(RUNS):  # a loaded machine may keep a run from seeing something; it never makes it fail
+            done, result, given = _driven(url, tmp_path, "--save-map", saved, "--force")
+            assert "no" not in given, done.stdout
+            if given == ["yes"] * 4:
+                break
+    assert given == ["yes"] * 4, done.stdout + done.stderr
+    assert done.stdout.index("Does it move as told?") < done.stdout.index("description"), "the answers come first"
+    text = saved.read_text(encoding="utf-8")
+    tables = tomllib.loads(text)
+    motion = motion_map_of(text.partition("[motion.state]")[1] + text.partition("[motion.state]")[2], "it")
+    assert tables["api"]["openapi"] == url
+    assert motion.velocity is not None
+    ways = {name: motion.state.axes[one.of].at for name, one in motion.velocity.axes.items()}
+    assert (motion.state.read, ways) == ("GET /pose", {"ahead": "/pose/0", "left": "/pose/1"})
+    assert motion.velocity.axes["left"].limits == (-rover.FASTEST, rover.FASTEST), "as the description declares"
+    assert motion.velocity.beyond_limits == "refused"
+    assert 0.8 * rover.HOLD_S <= (motion.velocity.hold_s or 0) <= 2 * rover.HOLD_S
+    assert {one["picture"] for one in result["motion"][:3]} - {""}
+    page = render(tmp_path / "out")[0].read_text(encoding="utf-8")
+    assert page.count('class="answer"') == 4
+
+
+@pytest.mark.parametrize("body", [WokenByReading, WithoutWatchdog])
+def test_a_rover_that_drives_on_when_its_client_vanishes_is_told(body, tmp_path):
+    with serving_rover(Rover(body(rover.LIMITS))) as url:
+        done, _, given = _driven(url, tmp_path)
+    assert given[2] == "no", done.stdout
+    assert "no" not in given[:2], done.stdout
+
+
+def test_an_arm_that_is_sent_to_positions_is_found_by_the_names_of_its_joints(tmp_path):
+    with serving_app(Arm().app()) as url:
+        done, _, given = _driven(url, tmp_path, drive="POST /move")
+    assert "no" not in given, done.stdout
+    assert given[0] == "yes", done.stdout
+    assert 'body = { id = "{goto:/id}" }' in done.stderr, "the stop takes what the move told"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--drive", "PUT /velocity", "--yes"], "--allow-motion"),
+        (["--drive", "PUT /velocity", "--allow-motion"], "--yes"),
+        (["--drive", "PUT /velocities", "--allow-motion", "--yes"], "did you mean 'PUT /velocity'"),
+        (["--drive", "PUT /velocity", "--read", "GET /poses", "--allow-motion", "--yes"], "did you mean 'GET /pose'"),
+        (["--drive", "DELETE /goal", "--allow-motion", "--yes"], "no numbers"),
+        (["--drive", "PUT /velocity", "--allow-motion", "--yes", "--never", "PUT /velocity"], "never"),
+        (["--drive", "PUT /velocity", "--allow-motion", "--plan"], "--plan"),
+        (["--read", "GET /pose"], "--drive"),
+    ],
+)
+def test_what_does_not_fit_is_told_and_nothing_moves(options, said, tmp_path):
+    right = Rover(Body(rover.LIMITS))
+    with serving_rover(right) as url:
+        done = ended(sys.executable, "-m", "roaas", "certify", url, *options, "--out", tmp_path / "out", input="")
+    assert (done.returncode, said in done.stderr) == (2, True), done.stderr
+    assert right.body.speeds == dict.fromkeys(rover.LIMITS, 0.0)
+    assert right.body.moves == 0
+
+
+class Stuck(Body):
+    """A rover that accepts every velocity and never moves."""
+
+    def drive(self, speeds, hold_s, now):
+        pass
+
+
+def test_a_rover_that_never_moves_is_told_so_at_once(tmp_path):
+    with serving_rover(Rover(Stuck(rover.LIMITS))) as url:
+        done, _, given = _driven(url, tmp_path)
+    assert (done.returncode, given) == (2, [])
+    assert "was accepted (ahead at 0.05, left at 0.05), and no number" in done.stderr
